@@ -1,0 +1,1 @@
+"""Grasp maps and planners for objects of revolution."""

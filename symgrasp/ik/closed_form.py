@@ -1,0 +1,122 @@
+"""Inverse kinematics of 6-joint arms, and of 7-joint arms with one joint locked, through EAIK.
+
+Locking a joint turns a 7-joint arm into a 6-joint arm whose closed form EAIK finds from the
+axes alone. The locked joint's value is the redundancy φ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from eaik.IK_HP import HPRobot
+
+from symgrasp.errors import UrdfError
+from symgrasp.poses import Array, pose_error
+from symgrasp.robot import Arm
+
+__all__ = ["ClosedFormIK", "Solutions", "Tolerance"]
+
+LOCK_PREFERENCE = (6, 2, 0, 4, 1, 5, 3)
+"""Which of seven joints to lock, first choice first: the last one leaves the arm's reach whole,
+the elbow (3) would fix it."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """By how much a returned configuration may miss the pose."""
+
+    position: float = 1e-6
+    """metres"""
+    rotation: float = 1e-6
+    """radians"""
+
+
+class Solutions(NamedTuple):
+    """Candidate configurations of one pose, in the order of Algorithm 1: by φ, then by branch.
+
+    Attributes:
+        q: (m, n) joint values, turned into the limits where full turns can do that.
+        sample: (m,) index of the redundancy sample.
+        branch: (m,) index of the closed form's branch at that sample.
+        inside: (m,) whether all joints are inside their limits.
+    """
+
+    q: Array
+    sample: np.ndarray
+    branch: np.ndarray
+    inside: np.ndarray
+
+
+class ClosedFormIK:
+    """All branches of the inverse kinematics of an arm.
+
+    Args:
+        arm: the arm.
+        samples: number of redundancy samples; a 6-joint arm always has one.
+        tolerance: what a solution may miss the pose by.
+
+    Raises:
+        UrdfError: no closed form is known for the arm, whichever joint is locked.
+
+    Attributes:
+        locked: index of the locked joint, or None for a 6-joint arm.
+        phi: (samples,) values of the locked joint: centres of equal parts of its range.
+    """
+
+    def __init__(self, arm: Arm, samples: int, tolerance: Tolerance | None = None) -> None:
+        self.arm = arm
+        self.tolerance = tolerance or Tolerance()
+        self.locked = _lockable_joint(arm)
+        if self.locked is None:
+            self.phi = np.zeros(1)
+        else:
+            lower, upper = arm.lower[self.locked], arm.upper[self.locked]
+            if not np.isfinite(upper - lower):
+                lower, upper = -np.pi, np.pi
+            self.phi = lower + (np.arange(samples) + 0.5) * (upper - lower) / samples
+        self._solvers = [self._solver(phi) for phi in self.phi]
+
+    def _solver(self, phi: float) -> HPRobot:
+        locks = [] if self.locked is None else [(self.locked, float(phi))]
+        return HPRobot(self.arm.H, self.arm.P, locks)
+
+    def solve(self, T_base_tool: Array) -> Solutions:
+        """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""
+        return self._collect(T_base_tool, self._solvers)
+
+    def solve_at(self, T_base_tool: Array, phi: float) -> Solutions:
+        """Return every configuration that reaches a pose (4, 4) at one redundancy value."""
+        return self._collect(T_base_tool, [self._solver(phi)])
+
+    def _collect(self, T_base_tool: Array, solvers: list[HPRobot]) -> Solutions:
+        target = np.array(T_base_tool, dtype=float)
+        target[:3, :3] = target[:3, :3] @ self.arm.R0.T  # EAIK's tool is unturned at zero
+        found = [np.reshape(solver.IK(target).Q, (-1, self.arm.dof)) for solver in solvers]
+        counts = [len(q) for q in found]
+        q = np.concatenate(found)
+        sample = np.repeat(np.arange(len(solvers)), counts)
+        branch = np.concatenate([np.arange(n) for n in counts]) if counts else np.zeros(0, dtype=int)
+        # EAIK also returns least-squares answers where a pose is out of reach; forward kinematics
+        # tells them from solutions.
+        position, rotation = pose_error(self.arm.tool_pose(q), T_base_tool)
+        exact = (position <= self.tolerance.position) & (rotation <= self.tolerance.rotation)
+        q, inside = self.arm.within_limits(q[exact])
+        return Solutions(q, sample[exact], branch[exact], inside)
+
+
+def _lockable_joint(arm: Arm) -> int | None:
+    """Return the joint to lock, or None where the arm has a closed form as it is."""
+    choices = [None] if arm.dof == 6 else list(LOCK_PREFERENCE)
+    for joint in choices:
+        # Any value serves for the question; zero could make axes parallel that are not.
+        locks = [] if joint is None else [(joint, 0.3)]
+        if HPRobot(arm.H, arm.P, locks).hasKnownDecomposition():
+            return joint
+    raise UrdfError(
+        arm.robot.model.path,
+        f"arm {arm.name}",
+        list(arm.joint_names),
+        "joints whose axes have a closed-form inverse kinematics (a spherical wrist or shoulder)",
+    )
