@@ -205,7 +205,7 @@ class RobotModel:
 
     def colliding_links(self) -> tuple[str, ...]:
         """Return the links that have a collision shape."""
-        return tuple(name for name in self.link_names if self._collisions[name])
+        return tuple(filter(self.has_shape, self.link_names))
 
     def neighbours(self) -> frozenset[frozenset[str]]:
         """Return the pairs of links with shapes that a joint, or only shapeless links, connect."""
@@ -230,12 +230,19 @@ class RobotModel:
             self._hulls[link] = tuple(hulls)
         return self._hulls[link]
 
-    def portable_urdf(self) -> bytes:
-        """Return the URDF with every mesh as an absolute path, for parsers that search otherwise."""
-        tree = ET.parse(self.path)
-        for mesh in tree.getroot().iter("mesh"):
+    def has_shape(self, link: str) -> bool:
+        """Whether a link has a collision shape."""
+        return bool(self._collisions[link])
+
+    def collision_urdf(self) -> bytes:
+        """Return the URDF without what is only seen, and with every mesh as an absolute path."""
+        root = ET.parse(self.path).getroot()
+        for link in root.iter("link"):
+            for visual in link.findall("visual"):
+                link.remove(visual)
+        for mesh in root.iter("mesh"):
             mesh.set("filename", str(self.mesh_path(mesh.get("filename", "")).resolve()))
-        return ET.tostring(tree.getroot())
+        return ET.tostring(root)
 
 
 def _root_link(urdf: yourdfpy.URDF) -> str:

@@ -86,6 +86,10 @@ class ClosedFormIK:
         """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""
         return self._collect(T_base_tool, self._solvers)
 
+    def solve_sample(self, T_base_tool: Array, sample: int) -> Solutions:
+        """Return every configuration that reaches a pose (4, 4) at one redundancy sample."""
+        return self._collect(T_base_tool, [self._solvers[sample]])
+
     def solve_at(self, T_base_tool: Array, phi: float) -> Solutions:
         """Return every configuration that reaches a pose (4, 4) at one redundancy value."""
         return self._collect(T_base_tool, [self._solver(phi)])

@@ -1,0 +1,407 @@
+"""Feasibility maps: where on an object an arm can hold it for a task, and why not elsewhere."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from symgrasp import pictures
+from symgrasp.errors import MapError, ProfileError
+from symgrasp.files import write_atomically
+from symgrasp.hand import Hand
+from symgrasp.ik import ClosedFormIK, Solutions
+from symgrasp.manifold import ROLLS, Manifold
+from symgrasp.poses import Array, inverse, rotation_z, translation
+from symgrasp.profile import Profile
+from symgrasp.reason import Reason
+from symgrasp.robot import Arm
+from symgrasp.scene import Scene
+from symgrasp.world import BulletWorld, Collision
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Cell", "FeasibilityMap", "Margin", "Progress", "Witness", "create_map"]
+
+Progress = Callable[[float], None]
+"""Told the finished share (0 to 1) of a long computation; may raise `Cancelled` to stop it."""
+
+FORMAT_VERSION = 1
+
+RETREAT_STEP = 0.01
+"""Largest step (m) between the poses that are checked along a retreat."""
+
+RETREAT_TURN = 0.5
+"""Largest change of a joint (rad) in one such step; more is another branch, not a motion."""
+
+
+class Cell(NamedTuple):
+    """A cell of a map: a grasp on the grid."""
+
+    roll: int
+    row: int
+    column: int
+
+
+class Witness(NamedTuple):
+    """A configuration that proves a cell feasible.
+
+    Attributes:
+        q: (n,) joint values.
+        phi: redundancy value (rad).
+        sample: its index.
+        branch: branch of the closed form.
+        opening: opening of the hand (m).
+    """
+
+    q: Array
+    phi: float
+    sample: int
+    branch: int
+    opening: float
+
+
+class Margin(NamedTuple):
+    """How far a feasible cell's centre is from the nearest infeasible one, at most the whole map.
+
+    Attributes:
+        along: along the axis (m); the ends of the object count as infeasible.
+        around: around it (rad).
+    """
+
+    along: float
+    around: float
+
+
+@dataclass(frozen=True, eq=False)
+class FeasibilityMap:
+    """The map m(x, T) of one arm and one task, by roll, height and angle.
+
+    All arrays are read-only. R = 2 rolls, H heights, A angles, n joints.
+
+    Attributes:
+        scene: name of the scene.
+        arm: name of the arm.
+        task: name of the task.
+        T_world_object: object pose (4, 4).
+        manifold: the grid.
+        reason: (R, H, A) uint8 of `Reason`.
+        q: (R, H, A, n) joint values of the witnesses, NaN where infeasible.
+        sample: (R, H, A) int16 redundancy sample of the witness, -1 where infeasible.
+        branch: (R, H, A) int16 branch of the witness, -1 where infeasible.
+        phi: (K,) redundancy samples (rad).
+        opening: (H,) opening of the hand (m).
+        bodies: names of bodies.
+        pair: (R, H, A, 2) int16 into ``bodies``: what hits what, for a cell whose reason is a
+            collision, of the candidate that came closest to being free; -1 elsewhere.
+        depth: (R, H, A) how much closer (m) than allowed that pair is, NaN elsewhere.
+    """
+
+    scene: str
+    arm: str
+    task: str
+    T_world_object: Array
+    manifold: Manifold
+    reason: np.ndarray
+    q: Array
+    sample: np.ndarray
+    branch: np.ndarray
+    phi: Array
+    opening: Array
+    bodies: tuple[str, ...]
+    pair: np.ndarray
+    depth: Array
+
+    def __post_init__(self) -> None:
+        for name in ("T_world_object", "reason", "q", "sample", "branch", "phi", "opening", "pair", "depth"):
+            array = np.array(getattr(self, name))
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @cached_property
+    def feasible(self) -> np.ndarray:
+        """(R, H, A) bool."""
+        return self.reason == Reason.FEASIBLE
+
+    def witness(self, cell: Cell | tuple[int, int, int]) -> Witness | None:
+        """Return the configuration that proves a cell feasible, or None where it is not."""
+        cell = Cell(*cell)
+        if not self.feasible[cell]:
+            return None
+        sample = int(self.sample[cell])
+        return Witness(
+            self.q[cell],
+            float(self.phi[sample]),
+            sample,
+            int(self.branch[cell]),
+            float(self.opening[cell.row]),
+        )
+
+    def why(self, cell: Cell | tuple[int, int, int]) -> str:
+        """Say in one line whether a cell is feasible, and if not, why."""
+        cell = Cell(*cell)
+        text = Reason(int(self.reason[cell])).label
+        first, second = self.pair[cell]
+        if first < 0:
+            return text
+        return f"{text}: {self.bodies[first]} and {self.bodies[second]}, {1e3 * self.depth[cell]:.1f} mm too close"
+
+    def counts(self) -> dict[Reason, int]:
+        """Return how many cells each reason has, most frequent first."""
+        values, counts = np.unique(self.reason, return_counts=True)
+        order = np.argsort(-counts, kind="stable")
+        return {Reason(int(values[k])): int(counts[k]) for k in order}
+
+    def margin(self, cell: Cell | tuple[int, int, int]) -> Margin:
+        """Return how far a cell may be off along and around the object and still be feasible."""
+        cell = Cell(*cell)
+        column = self.feasible[cell.roll, :, cell.column]
+        row = np.roll(self.feasible[cell.roll, cell.row], -cell.column)
+        blocked = np.flatnonzero(~column)
+        rows = min([cell.row + 1, len(column) - cell.row, *(abs(blocked - cell.row).tolist())])
+        blocked = np.flatnonzero(~row)
+        columns = min([len(row) // 2, *np.minimum(blocked, len(row) - blocked).tolist()])
+        return Margin(rows * self.manifold.dh, columns * self.manifold.dtheta)
+
+    def shift(self, delta: float) -> FeasibilityMap:
+        """Return the map for the object turned by ``delta`` (rad) about its axis, without recomputing it.
+
+        Equation 3: ``m((h, θ), T·Rz(δ)) = m((h, θ + δ), T)``. Exact for every angle: whole cells
+        roll the map, the rest moves the start of the grid.
+        """
+        manifold, k = self.manifold.shift(delta)
+        rolled = {
+            name: np.roll(getattr(self, name), -k, axis=2)
+            for name in ("reason", "q", "sample", "branch", "pair", "depth")
+        }
+        turned = self.T_world_object @ rotation_z(delta)
+        return replace(self, T_world_object=turned, manifold=manifold, **rolled)
+
+    def plot(self) -> Figure:
+        """Draw both rolls of the map with axes, reasons and counts."""
+        m = self.manifold
+        title = f"{self.scene} · {self.task} · {self.arm}"
+        return pictures.draw_map(self.reason, (m.profile.h_min, m.profile.h_max), m.theta_start, title)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows."""
+        return pictures.to_png(self.plot())
+
+    def save(self, path: str | Path) -> None:
+        """Write the map as npz, in one piece."""
+        meta = {
+            "format": "symgrasp feasibility map",
+            "version": FORMAT_VERSION,
+            "units": "m, rad",
+            "scene": self.scene,
+            "arm": self.arm,
+            "task": self.task,
+            "heights": self.manifold.heights,
+            "angles": self.manifold.angles,
+            "theta_start": self.manifold.theta_start,
+            "bodies": list(self.bodies),
+        }
+        with write_atomically(Path(path)) as file:
+            np.savez_compressed(
+                file,
+                meta=np.array(json.dumps(meta)),
+                profile=self.manifold.profile.points,
+                **{name: getattr(self, name) for name in _ARRAYS},
+            )
+
+    @staticmethod
+    def load(path: str | Path) -> FeasibilityMap:
+        """Read a map written by `save`.
+
+        Raises:
+            MapError: the file is missing or is not such a map.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                data = {name: file[name] for name in (*_ARRAYS, "profile", "meta")}
+            meta = json.loads(str(data.pop("meta")))
+        except FileNotFoundError:
+            raise MapError(path, "file", str(path), "an existing map file") from None
+        except Exception as error:  # zipfile, zlib, numpy and json each raise their own
+            raise MapError(path, "file", str(error), "a map written by symgrasp") from error
+        if meta.get("version") != FORMAT_VERSION:
+            raise MapError(path, "version", meta.get("version"), str(FORMAT_VERSION))
+        try:
+            manifold = Manifold(
+                Profile(data.pop("profile"), str(path)), meta["heights"], meta["angles"], meta["theta_start"]
+            )
+            shape = (len(ROLLS), manifold.heights, manifold.angles)
+            for name in ("reason", "sample", "branch", "depth"):
+                if data[name].shape != shape:
+                    raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
+            names = {key: meta[key] for key in ("scene", "arm", "task")}
+            return FeasibilityMap(**names, manifold=manifold, bodies=tuple(meta["bodies"]), **data)
+        except (KeyError, ProfileError) as error:
+            raise MapError(path, "meta", str(error), "a map written by symgrasp") from error
+
+
+_ARRAYS = ("T_world_object", "reason", "q", "sample", "branch", "phi", "opening", "pair", "depth")
+
+
+def create_map(
+    scene: Scene,
+    arm: str | None = None,
+    task: str | None = None,
+    *,
+    manifold: Manifold | None = None,
+    world: BulletWorld | None = None,
+    progress: Progress | None = None,
+) -> FeasibilityMap:
+    """Compute the feasibility map of an arm and a task: Algorithm 1 of the paper.
+
+    Args:
+        scene: the scene.
+        arm: name of the arm; the task's first if None.
+        task: name of the task; the scene's first if None.
+        manifold: another grid than the scene's.
+        world: a world of this scene's robots and obstacles to use again; one is made if None.
+        progress: told the finished share after every row; may raise `Cancelled`.
+
+    Raises:
+        SceneError: there is no such arm or task.
+        UrdfError: the arm has no closed-form inverse kinematics.
+    """
+    the_task = scene.task(task)
+    the_arm = scene.arm(arm or the_task.arms[0])
+    grid = manifold or scene.manifold
+    ik = ClosedFormIK(the_arm, scene.settings.redundancy)
+    draft = _Draft(grid, the_arm, ik)
+    T_base_world = inverse(the_arm.robot.T_world_base)
+    T_base_tool = T_base_world @ grid.tool_poses(the_task.T_world_object, the_arm.hand.finger_depth)
+
+    with nullcontext(world) if world else BulletWorld(scene) as W:
+        W.set_object(the_task.T_world_object)
+        judge = _Judge(W, the_arm, ik, scene.settings.approach)
+        for row, h in enumerate(grid.h):
+            stage = fit(the_arm.hand, grid.profile, h)
+            for roll, column in np.ndindex(len(ROLLS), grid.angles):
+                cell = Cell(roll, row, column)
+                if stage is not None:
+                    draft.reason[cell] = stage
+                    continue
+                judge.opening = draft.opening[row]
+                draft.record(cell, *judge.verdict(T_base_tool[cell]))
+            if progress:
+                progress((row + 1) / grid.heights)
+        for name in scene.robots:
+            W.park(name)
+    return draft.finish(scene.name, the_task.name, the_task.T_world_object)
+
+
+def fit(hand: Hand, profile: Profile, h: float) -> Reason | None:
+    """Return why a hand cannot hold a profile at height h whatever the arm does, or None."""
+    if not hand.spans(float(profile.radius(h))):
+        return Reason.HAND_TOO_SMALL
+    if not hand.pads_rest(profile, h):
+        return Reason.SURFACE_TOO_STEEP
+    return None
+
+
+class _Judge:
+    """Lines 5 to 9 of Algorithm 1: try every redundancy sample and branch of one tool pose."""
+
+    def __init__(self, world: BulletWorld, arm: Arm, ik: ClosedFormIK, approach: float) -> None:
+        self.world, self.arm, self.ik = world, arm, ik
+        self.opening = 0.0
+        steps = int(np.ceil(approach / RETREAT_STEP - 1e-9))
+        self.retreat = [translation([0, 0, -approach * (k + 1) / steps]) for k in range(steps)]
+
+    def verdict(self, T_base_tool: Array) -> tuple[Reason, Collision | None, tuple[Solutions, int] | None]:
+        """Return the furthest stage, the shallowest collision at it, and the witness if free."""
+        reached, closest = Reason.UNREACHABLE, None
+        solutions = self.ik.solve(T_base_tool)
+        for k, q in enumerate(solutions.q):
+            stage, collision = Reason.JOINT_LIMITS, None
+            if solutions.inside[k]:
+                stage, collision = self._try(T_base_tool, q, int(solutions.sample[k]))
+                if stage == Reason.FEASIBLE:
+                    return stage, None, (solutions, k)
+            shallower = collision and (closest is None or collision.depth < closest.depth)
+            if stage > reached or (stage == reached and shallower):
+                reached, closest = stage, collision
+        return reached, closest, None
+
+    def _try(self, T_base_tool: Array, q: Array, sample: int) -> tuple[Reason, Collision | None]:
+        self.world.set_arm(self.arm, q, self.opening)
+        collision = self.world.first_collision(self.arm)
+        if collision:
+            return collision.reason, collision
+        for step in self.retreat:
+            follow = self._follow(T_base_tool @ step, q, sample)
+            if follow is None:
+                return Reason.APPROACH_BLOCKED, None
+            q = follow
+            self.world.set_arm(self.arm, q, self.opening)
+            collision = self.world.first_collision(self.arm)
+            if collision:
+                return Reason.APPROACH_BLOCKED, collision
+        return Reason.FEASIBLE, None
+
+    def _follow(self, T_base_tool: Array, q: Array, sample: int) -> Array | None:
+        """Return the configuration at the same φ that continues q to the next pose, if any does."""
+        solutions = self.ik.solve_sample(T_base_tool, sample)
+        candidates = solutions.q[solutions.inside]
+        if not len(candidates):
+            return None
+        turn = np.abs(candidates - q).max(axis=1)
+        nearest = int(turn.argmin())
+        return candidates[nearest] if turn[nearest] <= RETREAT_TURN else None
+
+
+class _Draft:
+    """The arrays of a map while it is being computed."""
+
+    def __init__(self, grid: Manifold, arm: Arm, ik: ClosedFormIK) -> None:
+        shape = (len(ROLLS), grid.heights, grid.angles)
+        self.grid, self.arm, self.ik = grid, arm, ik
+        self.opening = np.array([arm.hand.opening(r) for r in grid.profile.radius(grid.h)])
+        self.reason = np.zeros(shape, dtype=np.uint8)
+        self.q = np.full((*shape, arm.dof), np.nan)
+        self.sample = np.full(shape, -1, dtype=np.int16)
+        self.branch = np.full(shape, -1, dtype=np.int16)
+        self.pair = np.full((*shape, 2), -1, dtype=np.int16)
+        self.depth = np.full(shape, np.nan)
+        self.bodies: dict[str, int] = {}
+
+    def record(
+        self,
+        cell: Cell,
+        reason: Reason,
+        collision: Collision | None,
+        witness: tuple[Solutions, int] | None,
+    ) -> None:
+        self.reason[cell] = reason
+        if collision:
+            self.pair[cell] = [self._body(str(collision.a)), self._body(str(collision.b))]
+            self.depth[cell] = collision.depth
+        if witness:
+            solutions, k = witness
+            self.q[cell] = solutions.q[k]
+            self.sample[cell], self.branch[cell] = solutions.sample[k], solutions.branch[k]
+
+    def _body(self, name: str) -> int:
+        return self.bodies.setdefault(name, len(self.bodies))
+
+    def finish(self, scene: str, task: str, T_world_object: Array) -> FeasibilityMap:
+        return FeasibilityMap(
+            scene=scene,
+            arm=self.arm.name,
+            task=task,
+            T_world_object=T_world_object,
+            manifold=self.grid,
+            bodies=tuple(self.bodies),
+            phi=self.ik.phi,
+            **{name: getattr(self, name) for name in ("reason", "q", "sample", "branch", "opening", "pair", "depth")},
+        )

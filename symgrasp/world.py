@@ -1,0 +1,451 @@
+"""Collisions in PyBullet: the only module that knows it.
+
+Every question is put as "which links are closer than a distance", which Bullet answers from the
+poses alone; its contact cache, which remembers earlier configurations, is not used. Collision
+margins are set to zero, so distances are those of the shapes themselves.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike
+
+from symgrasp.errors import MeshError, SceneError, SymgraspError, UrdfError
+from symgrasp.poses import Array, axis_frame, quat_wxyz, wxyz_to_xyzw
+from symgrasp.reason import Reason
+from symgrasp.robot import Arm, Robot, RobotModel
+from symgrasp.scene import Obstacle, Scene
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Send what C code prints, on either stream, to nowhere."""
+    flush = ctypes.CDLL(None).fflush
+    sys.stdout.flush()
+    flush(None)
+    saved = [(stream, os.dup(stream)) for stream in (1, 2)]
+    try:
+        with Path(os.devnull).open("w") as null:
+            for stream, _ in saved:
+                os.dup2(null.fileno(), stream)
+        yield
+    finally:
+        flush(None)
+        for stream, copy in saved:
+            os.dup2(copy, stream)
+            os.close(copy)
+
+
+with _silenced():  # it prints its build time
+    import pybullet
+
+__all__ = ["Body", "BulletWorld", "Collision", "check_tasks"]
+
+RESTING_DEPTH = 1e-3
+"""How deep (m) an object may sink into what it stands on and still count as resting."""
+
+SELF_SAMPLES = 2000
+"""Random configurations that tell which links of a robot always or never collide."""
+
+NEVER_GAP = 0.02
+"""Links that come closer than this (m) in some sample are always checked, collided or not."""
+
+
+class Body(NamedTuple):
+    """A link of a robot, or a whole obstacle or object (with an empty or inner link name)."""
+
+    body: str
+    link: str
+
+    def __str__(self) -> str:
+        return f"{self.body}/{self.link}" if self.link else self.body
+
+
+class Collision(NamedTuple):
+    """Two bodies that are closer than they may be.
+
+    Attributes:
+        reason: the kind of collision, seen from the arm.
+        a: the link of the robot.
+        b: what it hits.
+        depth: how much closer (m) than allowed; the penetration where the margin is zero.
+    """
+
+    reason: Reason
+    a: Body
+    b: Body
+    depth: float
+
+
+class _Query(NamedTuple):
+    """One closest-points call: all links of two bodies, or two links."""
+
+    reason: Reason
+    a: int
+    b: int
+    link_a: int | None = None
+    link_b: int | None = None
+    skip_a: frozenset[int] = frozenset()
+    skip_b: frozenset[int] = frozenset()
+
+
+class BulletWorld:
+    """All bodies of a scene in one PyBullet DIRECT client of its own; use it in a ``with`` block.
+
+    Robots start at home; the object starts at the first task.
+
+    Args:
+        scene: the scene.
+
+    Raises:
+        UrdfError: PyBullet could not use all shapes of a URDF.
+        MeshError: an obstacle's mesh is unusable.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.margin = scene.settings.margin
+        self._client = pybullet.connect(pybullet.DIRECT)
+        if self._client < 0:
+            raise SymgraspError("PyBullet has no free physics client; close worlds you no longer need")
+        try:
+            self._links: dict[int, tuple[str, ...]] = {}  # body → names of links -1, 0, 1, …
+            self._names: dict[int, str] = {}
+            self._robots = {r.name: self._load_robot(r) for r in scene.robots.values()}
+            self._obstacles = [self._load_obstacle(o) for o in scene.obstacles]
+            self._object = self._load_object()
+            self._joints = {name: self._movable(name) for name in self._robots}
+            self._queries = {arm.name: self._arm_queries(arm) for arm in scene.arms.values()}
+            self.set_object(scene.task().T_world_object)
+            for name in self._robots:
+                self.park(name)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> BulletWorld:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the physics client; a second call does nothing."""
+        if self._client >= 0:
+            pybullet.disconnect(self._client)
+            self._client = -1
+
+    # -- building ---------------------------------------------------------------------------
+
+    def _register(self, body: int, name: str, links: Sequence[str]) -> int:
+        self._names[body] = name
+        self._links[body] = tuple(links)
+        for link in range(-1, len(links) - 1):
+            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=self._client)
+        return body
+
+    def _load_urdf(self, model: RobotModel, name: str, pose: Array) -> int:
+        body = _load_urdf(self._client, model, pose)
+        joints = range(pybullet.getNumJoints(body, self._client))
+        infos = [pybullet.getJointInfo(body, j, self._client) for j in joints]
+        links = [pybullet.getBodyInfo(body, self._client)[0].decode(), *(i[12].decode() for i in infos)]
+        return self._register(body, name, links)
+
+    def _load_robot(self, robot: Robot) -> int:
+        return self._load_urdf(robot.model, robot.name, robot.T_world_base)
+
+    def _load_obstacle(self, o: Obstacle) -> int:
+        if o.kind == "urdf":
+            assert o.path is not None
+            return self._load_urdf(RobotModel(o.path), o.name, o.T_world_obstacle)
+        client = self._client
+        if o.kind == "box":
+            half = [0.5 * s for s in o.size]
+            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+        elif o.kind == "cylinder":
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_CYLINDER, radius=o.size[0], height=o.size[1], physicsClientId=client
+            )
+        elif o.kind == "sphere":
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_SPHERE, radius=o.size[0], physicsClientId=client
+            )
+        else:
+            shape = self._mesh_shape(o)
+        return self._body(shape, o.name, o.T_world_obstacle)
+
+    def _mesh_shape(self, o: Obstacle) -> int:
+        """Keep the true surface: hollow meshes stay hollow.
+
+        An arm inside a closed mesh would go unnoticed by its surface alone, but an arm hangs
+        together and on its base, so some moving link crosses the surface.
+        """
+        assert o.path is not None
+        try:
+            mesh = trimesh.load(o.path, force="mesh", skip_materials=True)
+            vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces)
+        except Exception as error:  # trimesh raises whatever its many parsers raise
+            raise MeshError(o.path, f"obstacle {o.name}", str(error), "a readable mesh") from error
+        if not len(faces) or not np.isfinite(vertices).all():
+            raise MeshError(o.path, f"obstacle {o.name}", f"{len(faces)} triangles", "triangles with finite corners")
+        return pybullet.createCollisionShape(
+            pybullet.GEOM_MESH,
+            vertices=vertices.tolist(),
+            indices=faces.ravel().tolist(),
+            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+            physicsClientId=self._client,
+        )
+
+    def _body(self, shape: int, name: str, pose: Array) -> int:
+        if shape < 0:
+            raise SymgraspError(f"PyBullet cannot make the shape of {name!r}")
+        body = pybullet.createMultiBody(
+            0.0, shape, basePosition=pose[:3, 3].tolist(), baseOrientation=_xyzw(pose), physicsClientId=self._client
+        )
+        return self._register(body, name, [""])
+
+    def _load_object(self) -> list[int]:
+        bodies = []
+        for vertices in self.scene.profile.convex_pieces():
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_MESH, vertices=vertices.tolist(), physicsClientId=self._client
+            )
+            bodies.append(self._body(shape, self.scene.file.object.name, np.eye(4)))
+        return bodies
+
+    def _movable(self, robot: str) -> list[tuple[int, int, float, float]]:
+        """Return (PyBullet joint, index into the robot's values, ratio, offset) of all moving joints."""
+        index = {link: i - 1 for i, link in enumerate(self._links[self._robots[robot]])}
+        model = self.scene.robots[robot].model
+        return [
+            (index[model.link_names[j.child]], j.source, j.ratio, j.offset)
+            for j in model.joints
+            if j.source >= 0
+        ]
+
+    def _arm_queries(self, arm: Arm) -> list[_Query]:
+        """List what is checked for an arm, in the order of the reasons."""
+        robot = arm.robot
+        body = self._robots[robot.name]
+        index = {link: i - 1 for i, link in enumerate(self._links[body])}
+        mount = frozenset(index[link] for link in robot.model.mount_links())
+        touch = frozenset(index[link] for link in arm.hand.touch_links)
+        queries = [
+            _Query(Reason.SELF_COLLISION, body, body, index[a], index[b])
+            for a, b in _checked_self_pairs(robot.model)
+        ]
+        queries += [_Query(Reason.OBJECT_COLLISION, body, piece, skip_a=touch) for piece in self._object]
+        queries += [_Query(Reason.SCENE_COLLISION, body, o, skip_a=mount) for o in self._obstacles]
+        queries += [
+            _Query(Reason.ROBOT_COLLISION, body, other) for name, other in self._robots.items() if other != body
+        ]
+        return queries
+
+    # -- state ------------------------------------------------------------------------------
+
+    def set_object(self, T_world_object: ArrayLike) -> None:
+        """Place the object by its origin and axis; its spin about the axis does not matter."""
+        pose = axis_frame(T_world_object)
+        for body in self._object:
+            pybullet.resetBasePositionAndOrientation(
+                body, pose[:3, 3].tolist(), _xyzw(pose), physicsClientId=self._client
+            )
+
+    def set_arm(self, arm: Arm, q: ArrayLike, opening: float) -> None:
+        """Put an arm at joint values (n,) with its hand open by ``opening`` (m), the robot's rest at home."""
+        self._set(arm.robot.name, arm.robot_values(q, opening))
+
+    def park(self, robot: str) -> None:
+        """Put a robot at home."""
+        self._set(robot, self.scene.robots[robot].home)
+
+    def set_robot(self, robot: str, values: ArrayLike) -> None:
+        """Put all joints (n,) of a robot, in the order of its model's ``joint_names``."""
+        self._set(robot, np.asarray(values, dtype=float))
+
+    def _set(self, robot: str, values: Array) -> None:
+        joints = self._joints[robot]
+        pybullet.resetJointStatesMultiDof(
+            self._robots[robot],
+            [j for j, *_ in joints],
+            [[ratio * float(values[source]) + offset] for _, source, ratio, offset in joints],
+            physicsClientId=self._client,
+        )
+
+    def link_pose(self, robot: str, link: str) -> Array:
+        """Return the pose (4, 4) of a robot's link in the world, as PyBullet has it."""
+        body = self._robots[robot]
+        index = self._links[body].index(link) - 1
+        if index < 0:
+            return self.scene.robots[robot].T_world_base
+        state = pybullet.getLinkState(body, index, computeForwardKinematics=True, physicsClientId=self._client)
+        pose = np.eye(4)
+        pose[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+        pose[:3, 3] = state[4]
+        return pose
+
+    # -- questions --------------------------------------------------------------------------
+
+    def first_collision(self, arm: Arm) -> Collision | None:
+        """Return the deepest collision of the first stage at which the arm collides, or None.
+
+        Stages in order: with its own robot, the object, obstacles, other robots. Links that no
+        joint moves are not checked against obstacles; the hand's touch links may touch the object.
+        """
+        stage: list[Collision] = []
+        for query in self._queries[arm.name]:
+            if stage and query.reason != stage[0].reason:
+                break
+            stage += self._ask(query)
+        return max(stage, key=lambda c: c.depth, default=None)
+
+    def collisions(self, arms: Sequence[Arm]) -> list[Collision]:
+        """Return all collisions of several arms at once, deepest first.
+
+        Of a robot with several arms, the touch links of all of them may touch the object.
+        """
+        touch = {(a.robot.name, link) for a in arms for link in a.hand.touch_links}
+        found = {
+            (frozenset((c.a, c.b)), c.reason): c
+            for arm in arms
+            for query in self._queries[arm.name]
+            for c in self._ask(query)
+            if not (c.reason == Reason.OBJECT_COLLISION and c.a in touch)
+        }
+        return sorted(found.values(), key=lambda c: -c.depth)
+
+    def object_contacts(self) -> list[Collision]:
+        """Return the obstacles that the object is inside of, deepest first (depth in metres)."""
+        found = [
+            c
+            for piece in self._object
+            for obstacle in self._obstacles
+            for c in self._ask(_Query(Reason.SCENE_COLLISION, piece, obstacle))
+        ]
+        return sorted(found, key=lambda c: -c.depth)
+
+    def clearance(self, arm: Arm, limit: float) -> float:
+        """Return the smallest distance (m) of all pairs that are checked for an arm, at most ``limit``."""
+        gaps = [limit - c.depth for query in self._queries[arm.name] for c in self._ask(query, limit)]
+        return min(gaps, default=limit)
+
+    def _ask(self, query: _Query, margin: float | None = None) -> list[Collision]:
+        margin = self.margin if margin is None else margin
+        links = () if query.link_a is None else (query.link_a, query.link_b)
+        points = pybullet.getClosestPoints(query.a, query.b, margin, *links, physicsClientId=self._client)
+        return [
+            Collision(query.reason, self._body_name(query.a, p[3]), self._body_name(query.b, p[4]), margin - p[8])
+            for p in points or ()
+            if p[8] < margin and p[3] not in query.skip_a and p[4] not in query.skip_b
+        ]
+
+    def _body_name(self, body: int, link: int) -> Body:
+        return Body(self._names[body], self._links[body][link + 1])
+
+
+def check_tasks(scene: Scene) -> None:
+    """Check that the object is clear of all obstacles in every task; resting contact is fine.
+
+    Raises:
+        SceneError: it is not; names both bodies and the depth.
+    """
+    with BulletWorld(scene) as world:
+        world.margin = 0.0
+        for i, task in enumerate(scene.tasks.values()):
+            world.set_object(task.T_world_object)
+            for c in world.object_contacts()[:1]:
+                if c.depth > RESTING_DEPTH:
+                    raise SceneError(
+                        scene.source,
+                        f"tasks[{i}].pose",
+                        task.name,
+                        f"a pose outside of every obstacle; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
+                    )
+
+
+def _xyzw(pose: Array) -> list[float]:
+    return wxyz_to_xyzw(quat_wxyz(pose)).tolist()
+
+
+def _load_urdf(client: int, model: RobotModel, pose: Array) -> int:
+    """Load the collision shapes of a URDF, and see that every one of them arrived."""
+    with tempfile.NamedTemporaryFile(suffix=".urdf") as file:
+        file.write(model.collision_urdf())
+        file.flush()
+        with _silenced():
+            body = pybullet.loadURDF(
+                file.name,
+                basePosition=pose[:3, 3].tolist(),
+                baseOrientation=_xyzw(pose),
+                useFixedBase=True,
+                physicsClientId=client,
+            )
+    for i, link in enumerate(_link_names(client, body)):
+        shapes = pybullet.getCollisionShapeData(body, i - 1, physicsClientId=client)
+        if model.has_shape(link) and not shapes:
+            raise UrdfError(model.path, f"link {link}: collision", None, "a shape that PyBullet can load")
+    return body
+
+
+def _link_names(client: int, body: int) -> list[str]:
+    joints = range(pybullet.getNumJoints(body, client))
+    base = pybullet.getBodyInfo(body, client)[0].decode()
+    return [base, *(pybullet.getJointInfo(body, j, client)[12].decode() for j in joints)]
+
+
+@lru_cache(maxsize=32)
+def _checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of a robot's links that can collide, but need not.
+
+    Left out are neighbours, pairs that overlap in every one of many random configurations (a
+    flange and the hand on it), and pairs that stay well apart in all of them.
+    """
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        body = _load_urdf(client, model, np.eye(4))
+        index = {link: i - 1 for i, link in enumerate(_link_names(client, body))}
+        for link in index.values():
+            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=client)
+        solid = model.colliding_links()
+        neighbours = model.neighbours()
+        pairs = [
+            (a, b)
+            for i, a in enumerate(solid)
+            for b in solid[i + 1 :]
+            if frozenset((a, b)) not in neighbours
+        ]
+        moving = [(index[model.link_names[j.child]], j) for j in model.joints if j.source >= 0]
+        lower = np.where(np.isfinite(model.lower), model.lower, -np.pi)
+        upper = np.where(np.isfinite(model.upper), model.upper, np.pi)
+        samples = np.random.default_rng(0).uniform(lower, upper, (SELF_SAMPLES, len(lower)))
+        always = dict.fromkeys(pairs, True)
+        near = dict.fromkeys(pairs, False)
+        for q in samples:
+            pybullet.resetJointStatesMultiDof(
+                body,
+                [j for j, _ in moving],
+                [[j.ratio * q[j.source] + j.offset] for _, j in moving],
+                physicsClientId=client,
+            )
+            for a, b in pairs:
+                if near[a, b] and not always[a, b]:
+                    continue
+                points = pybullet.getClosestPoints(
+                    body, body, NEVER_GAP, index[a], index[b], physicsClientId=client
+                )
+                near[a, b] |= bool(points)
+                always[a, b] &= any(p[8] < 0 for p in points)
+        return tuple(pair for pair in pairs if near[pair] and not always[pair])
+    finally:
+        pybullet.disconnect(client)
