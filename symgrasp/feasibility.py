@@ -403,5 +403,8 @@ class _Draft:
             manifold=self.grid,
             bodies=tuple(self.bodies),
             phi=self.ik.phi,
-            **{name: getattr(self, name) for name in ("reason", "q", "sample", "branch", "opening", "pair", "depth")},
+            **{
+                name: getattr(self, name)
+                for name in ("reason", "q", "sample", "branch", "opening", "pair", "depth")
+            },
         )

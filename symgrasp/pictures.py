@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_map", "to_png"]
 
 
-def draw_map(
-    reason: np.ndarray, heights: tuple[float, float], theta_start: float, title: str
-) -> Figure:
+def draw_map(reason: np.ndarray, heights: tuple[float, float], theta_start: float, title: str) -> Figure:
     """Draw a map, one panel for each roll, with a legend of reasons and counts.
 
     Args:

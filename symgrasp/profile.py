@@ -33,7 +33,9 @@ class Profile:
         try:
             array = np.array(points, dtype=float)
         except (TypeError, ValueError):
-            raise ProfileError(source, "profile", points, "a list of [height, radius] pairs in metres") from None
+            raise ProfileError(
+                source, "profile", points, "a list of [height, radius] pairs in metres"
+            ) from None
         if array.ndim != 2 or array.shape[1:] != (2,) or len(array) < 2:
             raise ProfileError(source, "profile", points, "at least two [height, radius] pairs in metres")
         for i, (h, r) in enumerate(array):
@@ -43,7 +45,10 @@ class Profile:
                 raise ProfileError(source, f"profile[{i}]", float(r), "a radius that is not negative")
             if i and h <= array[i - 1, 0]:
                 raise ProfileError(
-                    source, f"profile[{i}]", float(h), f"a height above the one before it ({array[i - 1, 0]:g})"
+                    source,
+                    f"profile[{i}]",
+                    float(h),
+                    f"a height above the one before it ({array[i - 1, 0]:g})",
                 )
         if not array[:, 1].any():
             raise ProfileError(source, "profile", points, "a radius above zero somewhere")

@@ -83,9 +83,7 @@ class RobotModel:
         self._collisions = {link.name: list(link.collisions) for link in urdf.robot.links}
         self._hulls: dict[str, tuple[Array, ...]] = {}
         self._check_files(urdf)
-        self.joint_names = tuple(
-            j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None
-        )
+        self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
         self.joints, self.link_names = self._build_tree(urdf, root)
         by_name = {joint.name: joint for joint in self.joints}
         self.lower = np.array([by_name[name].lower for name in self.joint_names])
@@ -199,9 +197,7 @@ class RobotModel:
 
     def mount_links(self) -> frozenset[str]:
         """Return the links that no joint moves."""
-        return frozenset(
-            name for name in self.link_names if not any(j.source >= 0 for j in self.chain(name))
-        )
+        return frozenset(name for name in self.link_names if not any(j.source >= 0 for j in self.chain(name)))
 
     def colliding_links(self) -> tuple[str, ...]:
         """Return the links that have a collision shape."""
@@ -404,7 +400,9 @@ class Arm:
         """
         q = np.asarray(q, dtype=float)
         bounded = np.isfinite(self.lower) & np.isfinite(self.upper)
-        middle = np.where(bounded, 0.5 * (np.where(bounded, self.lower, 0) + np.where(bounded, self.upper, 0)), 0)
+        middle = np.where(
+            bounded, 0.5 * (np.where(bounded, self.lower, 0) + np.where(bounded, self.upper, 0)), 0
+        )
         q = q + 2 * np.pi * np.round((middle - q) / (2 * np.pi))
         return q, ((q >= self.lower) & (q <= self.upper)).all(axis=-1)
 

@@ -488,7 +488,9 @@ class _Builder:
         tool = entry.arm_files()[k].tool
         if tool not in model.link_names:
             field = f"robots[{i}].tool" if entry.arms is None else f"robots[{i}].arms[{k}].tool"
-            raise SceneError(self.source, field, tool, f"a link of {model.path.name}: " + one_of(model.link_names, tool))
+            raise SceneError(
+                self.source, field, tool, f"a link of {model.path.name}: " + one_of(model.link_names, tool)
+            )
         return [j.name for j in model.chain(tool) if j.source >= 0 and j.kind != "prismatic"]
 
     def _hand(self, i: int, hand: str | HandFile) -> Hand:
@@ -510,7 +512,9 @@ class _Builder:
         elif isinstance(entry.home, dict):
             given = entry.home
         elif len(entry.home) != len(order):
-            raise SceneError(self.source, field, list(entry.home), f"{len(order)} values, for " + ", ".join(order))
+            raise SceneError(
+                self.source, field, list(entry.home), f"{len(order)} values, for " + ", ".join(order)
+            )
         else:
             given = dict(zip(order, entry.home, strict=True))
         for name, value in given.items():

@@ -198,7 +198,9 @@ class BulletWorld:
         except Exception as error:  # trimesh raises whatever its many parsers raise
             raise MeshError(o.path, f"obstacle {o.name}", str(error), "a readable mesh") from error
         if not len(faces) or not np.isfinite(vertices).all():
-            raise MeshError(o.path, f"obstacle {o.name}", f"{len(faces)} triangles", "triangles with finite corners")
+            raise MeshError(
+                o.path, f"obstacle {o.name}", f"{len(faces)} triangles", "triangles with finite corners"
+            )
         return pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
             vertices=vertices.tolist(),
@@ -211,7 +213,11 @@ class BulletWorld:
         if shape < 0:
             raise SymgraspError(f"PyBullet cannot make the shape of {name!r}")
         body = pybullet.createMultiBody(
-            0.0, shape, basePosition=pose[:3, 3].tolist(), baseOrientation=_xyzw(pose), physicsClientId=self._client
+            0.0,
+            shape,
+            basePosition=pose[:3, 3].tolist(),
+            baseOrientation=_xyzw(pose),
+            physicsClientId=self._client,
         )
         return self._register(body, name, [""])
 
@@ -248,7 +254,9 @@ class BulletWorld:
         queries += [_Query(Reason.OBJECT_COLLISION, body, piece, skip_a=touch) for piece in self._object]
         queries += [_Query(Reason.SCENE_COLLISION, body, o, skip_a=mount) for o in self._obstacles]
         queries += [
-            _Query(Reason.ROBOT_COLLISION, body, other) for name, other in self._robots.items() if other != body
+            _Query(Reason.ROBOT_COLLISION, body, other)
+            for name, other in self._robots.items()
+            if other != body
         ]
         return queries
 
@@ -289,7 +297,9 @@ class BulletWorld:
         index = self._links[body].index(link) - 1
         if index < 0:
             return self.scene.robots[robot].T_world_base
-        state = pybullet.getLinkState(body, index, computeForwardKinematics=True, physicsClientId=self._client)
+        state = pybullet.getLinkState(
+            body, index, computeForwardKinematics=True, physicsClientId=self._client
+        )
         pose = np.eye(4)
         pose[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
         pose[:3, 3] = state[4]
@@ -345,7 +355,9 @@ class BulletWorld:
         links = () if query.link_a is None else (query.link_a, query.link_b)
         points = pybullet.getClosestPoints(query.a, query.b, margin, *links, physicsClientId=self._client)
         return [
-            Collision(query.reason, self._body_name(query.a, p[3]), self._body_name(query.b, p[4]), margin - p[8])
+            Collision(
+                query.reason, self._body_name(query.a, p[3]), self._body_name(query.b, p[4]), margin - p[8]
+            )
             for p in points or ()
             if p[8] < margin and p[3] not in query.skip_a and p[4] not in query.skip_b
         ]
@@ -420,10 +432,7 @@ def _checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
         solid = model.colliding_links()
         neighbours = model.neighbours()
         pairs = [
-            (a, b)
-            for i, a in enumerate(solid)
-            for b in solid[i + 1 :]
-            if frozenset((a, b)) not in neighbours
+            (a, b) for i, a in enumerate(solid) for b in solid[i + 1 :] if frozenset((a, b)) not in neighbours
         ]
         moving = [(index[model.link_names[j.child]], j) for j in model.joints if j.source >= 0]
         lower = np.where(np.isfinite(model.lower), model.lower, -np.pi)
