@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -151,7 +152,8 @@ class FeasibilityMap:
         first, second = self.pair[cell]
         if first < 0:
             return text
-        return f"{text}: {self.bodies[first]} and {self.bodies[second]}, {1e3 * self.depth[cell]:.1f} mm too close"
+        depth = 1e3 * self.depth[cell]
+        return f"{text}: {self.bodies[first]} and {self.bodies[second]}, {depth:.1f} mm too close"
 
     def counts(self) -> dict[Reason, int]:
         """Return how many cells each reason has, most frequent first."""
@@ -194,9 +196,8 @@ class FeasibilityMap:
         """What a notebook shows."""
         return pictures.to_png(self.plot())
 
-    def save(self, path: str | Path) -> None:
-        """Write the map as npz, in one piece."""
-        meta = {
+    def _meta(self) -> dict[str, Any]:
+        return {
             "format": "symgrasp feasibility map",
             "version": FORMAT_VERSION,
             "units": "m, rad",
@@ -208,13 +209,33 @@ class FeasibilityMap:
             "theta_start": self.manifold.theta_start,
             "bodies": list(self.bodies),
         }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the map as plain data for JSON: the grid, and by roll, height and angle the reasons."""
+        return {
+            **self._meta(),
+            "T_world_object": self.T_world_object.tolist(),
+            "profile": self.manifold.profile.points.tolist(),
+            "rolls": list(ROLLS),
+            "h": self.manifold.h.tolist(),
+            "theta": self.manifold.theta.tolist(),
+            "opening": self.opening.tolist(),
+            "reasons": [r.name for r in Reason],
+            "reason": self.reason.tolist(),
+        }
+
+    def to_npz(self) -> bytes:
+        """Return the map as the content of an npz file."""
+        buffer = io.BytesIO()
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        meta = np.array(json.dumps(self._meta()))
+        np.savez_compressed(buffer, meta=meta, profile=self.manifold.profile.points, **arrays)
+        return buffer.getvalue()
+
+    def save(self, path: str | Path) -> None:
+        """Write the map as npz, in one piece."""
         with write_atomically(Path(path)) as file:
-            np.savez_compressed(
-                file,
-                meta=np.array(json.dumps(meta)),
-                profile=self.manifold.profile.points,
-                **{name: getattr(self, name) for name in _ARRAYS},
-            )
+            file.write(self.to_npz())
 
     @staticmethod
     def load(path: str | Path) -> FeasibilityMap:

@@ -34,7 +34,7 @@ turning the object by whole cells gives bit for bit the same tool poses in the w
 
 def wrap(angle: ArrayLike) -> Array:
     """Wrap angles (rad) into [-π, π)."""
-    return (np.asarray(angle, dtype=float) + np.pi) % (2 * np.pi) - np.pi
+    return np.mod(np.asarray(angle, dtype=float) + np.pi, 2 * np.pi) - np.pi
 
 
 def grasp_to_tool(
@@ -105,7 +105,7 @@ class Manifold:
     @property
     def h(self) -> Array:
         """Heights (heights,) of the cell centres (m)."""
-        return self.profile.h_min + (np.arange(self.heights) + 0.5) * self.dh
+        return self.profile.h_min + (np.arange(self.heights, dtype=float) + 0.5) * self.dh
 
     @property
     def theta(self) -> Array:
@@ -123,9 +123,9 @@ class Manifold:
         Raises:
             ProfileError: a height lies outside the object.
         """
-        h, theta = np.broadcast_arrays(np.asarray(h, dtype=float), np.asarray(theta, dtype=float))
         r = self.profile.radius(h)
-        return np.stack([r * np.cos(theta), r * np.sin(theta), h], axis=-1)
+        points = [r * np.cos(theta), r * np.sin(theta), h]
+        return np.stack(np.broadcast_arrays(*points), axis=-1).astype(float)
 
     def cell(self, h: float, theta: float) -> tuple[int, int]:
         """Return the cell (i, j) that holds (h, θ); the top edge belongs to the last row.

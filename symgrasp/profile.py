@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
@@ -114,7 +116,7 @@ class Profile:
         angles = np.arange(COLLISION_FACETS) * (2 * np.pi / COLLISION_FACETS)
         circle = np.column_stack([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / COLLISION_FACETS)
         pieces = []
-        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        for first, last in pairwise(cuts):
             piece = knots[first : last + 1]
             if not piece[:, 1].any():
                 continue

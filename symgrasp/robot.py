@@ -13,9 +13,11 @@ import trimesh
 import yourdfpy
 from numpy.typing import ArrayLike
 
-from symgrasp.errors import InputError, MeshError, UrdfError, one_of
+from symgrasp.errors import InputError, UrdfError, one_of
 from symgrasp.files import resolve
-from symgrasp.hand import Hand
+from symgrasp.hand import Hand, Handprint, handprint
+from symgrasp.manifold import Manifold
+from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, from_rotation, inverse, rotation_about
 
 __all__ = ["Arm", "Joint", "Robot", "RobotModel"]
@@ -73,6 +75,7 @@ class RobotModel:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         try:
+            ET.parse(path)  # the loader below would only print what is wrong
             urdf = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
             self.name = str(urdf.robot.name)
             root = _root_link(urdf)
@@ -92,7 +95,7 @@ class RobotModel:
     def _check_files(self, urdf: yourdfpy.URDF) -> None:
         for link in urdf.robot.links:
             for shape in (*link.collisions, *link.visuals):
-                if shape.geometry.mesh is not None:
+                if shape.geometry is not None and shape.geometry.mesh is not None:
                     self.mesh_path(shape.geometry.mesh.filename, link.name)
 
     def mesh_path(self, reference: str, link: str = "mesh") -> Path:
@@ -257,6 +260,7 @@ def _motion(joint: Joint, value: Array) -> Array:
 
 def _hull(shape: yourdfpy.Collision, find: Callable[[str, str], Path], link: str) -> Array:
     geometry = shape.geometry
+    assert geometry is not None  # the parser requires it
     if geometry.box is not None:
         mesh = trimesh.creation.box(extents=geometry.box.size)
     elif geometry.cylinder is not None:
@@ -272,12 +276,10 @@ def _hull(shape: yourdfpy.Collision, find: Callable[[str, str], Path], link: str
         inradius = np.einsum("ij,ij->i", ball.face_normals, ball.triangles_center).min()
         mesh = ball.apply_scale(geometry.sphere.radius / inradius)
     else:
-        path = find(geometry.mesh.filename, link)
-        try:
-            mesh = trimesh.load(path, force="mesh", skip_materials=True)
-        except Exception as error:  # trimesh raises whatever its many parsers raise
-            raise MeshError(path, "mesh", str(error), "a readable mesh") from error
-        mesh.apply_scale(np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3))
+        assert geometry.mesh is not None  # the parser knows no other shape
+        mesh = read_mesh(find(geometry.mesh.filename, link), f"link {link}")
+        scale = geometry.mesh.scale
+        mesh.apply_scale(1.0 if scale is None else scale)
     return np.asarray(mesh.convex_hull.vertices)
 
 
@@ -404,7 +406,7 @@ class Arm:
             bounded, 0.5 * (np.where(bounded, self.lower, 0) + np.where(bounded, self.upper, 0)), 0
         )
         q = q + 2 * np.pi * np.round((middle - q) / (2 * np.pi))
-        return q, ((q >= self.lower) & (q <= self.upper)).all(axis=-1)
+        return q, np.all((q >= self.lower) & (q <= self.upper), axis=-1)
 
     def robot_values(self, q: ArrayLike, opening: float | None = None) -> Array:
         """Return values (N,) of all the robot's joints: this arm at ``q`` (n,), the rest at home.
@@ -432,3 +434,9 @@ class Arm:
         if not bodies:
             raise InputError(model.path, f"hand {self.hand.name}", list(self.hand.links), "links with bodies")
         return bodies
+
+    def handprint(self, manifold: Manifold, row: int, roll: int) -> Handprint:
+        """Return the print of the hand that grasps a row at column 0, open as it is at that height."""
+        radius = float(manifold.profile.radius(manifold.h[row]))
+        bodies = self.hand_bodies(self.hand.opening(radius))
+        return handprint(bodies, manifold, row, roll, self.hand.standoff(radius))

@@ -387,16 +387,15 @@ def describe(error: ValidationError, content: Any) -> tuple[str, object, str]:
     path: list[str | int] = []
     at = content
     for step in first["loc"]:
-        if isinstance(at, Mapping) and step in at:
+        try:
             at = at[step]
-        elif isinstance(at, (list, tuple)) and isinstance(step, int) and step < len(at):
-            at = at[step]
-        elif not (first["type"] == "missing" and step == first["loc"][-1]):
-            continue
+        except (KeyError, IndexError, TypeError):
+            if not (first["type"] == "missing" and step == first["loc"][-1]):
+                continue
         path.append(step)
     field = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path).lstrip(".")
     if first["type"] == "extra_forbidden":
-        return field, first["input"], "no such key here; check its spelling"
+        return field, first["input"], "a key of the file format; check its spelling"
     if first["type"] == "missing":
         return field, None, "a value; this key is required"
     expected = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
@@ -461,10 +460,8 @@ class _Builder:
     def _reference(self, field: str, reference: str, kind: str) -> str:
         path = resolve(reference, self.folder)
         if path is None:
-            raise SceneError(
-                self.source, field, reference,
-                f"an existing {kind} file: package://<python package>/<path>, or a path relative to the scene",
-            )  # fmt: skip
+            expected = "package://<python package>/<path>, or a path relative to the scene"
+            raise SceneError(self.source, field, reference, f"an existing {kind} file: {expected}")
         return reference if reference.startswith("package://") else str(path.resolve())
 
     def _path(self, reference: str) -> Path:

@@ -11,17 +11,17 @@ import ctypes
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
 
-from symgrasp.errors import MeshError, SceneError, SymgraspError, UrdfError
+from symgrasp.errors import SceneError, SymgraspError, UrdfError
+from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, axis_frame, quat_wxyz, wxyz_to_xyzw
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm, Robot, RobotModel
@@ -192,19 +192,11 @@ class BulletWorld:
         together and on its base, so some moving link crosses the surface.
         """
         assert o.path is not None
-        try:
-            mesh = trimesh.load(o.path, force="mesh", skip_materials=True)
-            vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces)
-        except Exception as error:  # trimesh raises whatever its many parsers raise
-            raise MeshError(o.path, f"obstacle {o.name}", str(error), "a readable mesh") from error
-        if not len(faces) or not np.isfinite(vertices).all():
-            raise MeshError(
-                o.path, f"obstacle {o.name}", f"{len(faces)} triangles", "triangles with finite corners"
-            )
+        mesh = read_mesh(o.path, f"obstacle {o.name}")
         return pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
-            vertices=vertices.tolist(),
-            indices=faces.ravel().tolist(),
+            vertices=mesh.vertices.tolist(),
+            indices=mesh.faces.ravel().tolist(),
             flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
             physicsClientId=self._client,
         )
@@ -273,6 +265,17 @@ class BulletWorld:
     def set_arm(self, arm: Arm, q: ArrayLike, opening: float) -> None:
         """Put an arm at joint values (n,) with its hand open by ``opening`` (m), the robot's rest at home."""
         self._set(arm.robot.name, arm.robot_values(q, opening))
+
+    def set_arms(self, postures: Iterable[tuple[Arm, ArrayLike, float]]) -> None:
+        """Put several arms at (arm, joint values, opening), and everything else at home."""
+        values = {name: robot.home.copy() for name, robot in self.scene.robots.items()}
+        for arm, q, opening in postures:
+            robot = values[arm.robot.name]
+            moved = arm.robot_values(q, opening)
+            changed = moved != arm.robot.home
+            robot[changed] = moved[changed]
+        for name, joints in values.items():
+            self._set(name, joints)
 
     def park(self, robot: str) -> None:
         """Put a robot at home."""

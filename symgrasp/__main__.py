@@ -1,0 +1,7 @@
+"""``python -m symgrasp``: the command line."""
+
+import sys
+
+from symgrasp.cli import main
+
+sys.exit(main())

@@ -1,0 +1,195 @@
+"""The command line. Bad input is one line on stderr and exit status 2."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from symgrasp.errors import InputError, NoPlanError, SymgraspError, one_of
+from symgrasp.files import write_atomically
+from symgrasp.scene import Scene, scene_schema, shipped_scenes
+
+if TYPE_CHECKING:
+    from symgrasp.feasibility import FeasibilityMap
+
+__all__ = ["main"]
+
+DEFAULT_SCENE = "bottle_on_table"
+MAP_ENDINGS = (".npz", ".png", ".json")
+
+# The heavy imports (PyBullet, viser) stand inside the commands that need them: `--help`,
+# `scenes` and error messages answer at once.
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; return its exit status: 0 done, 1 no plan exists, 2 bad input, 130 cancelled."""
+    args = _parser().parse_args(argv)
+    try:
+        return args.run(args)
+    except NoPlanError as error:
+        print(f"symgrasp: {error}", file=sys.stderr)
+        return 1
+    except SymgraspError as error:
+        print(f"symgrasp: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"symgrasp: {error.filename}: {error.strerror}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("\nsymgrasp: cancelled", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="symgrasp",
+        description="Where can a robot arm hold an object of revolution, and why not elsewhere?",
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def add(name: str, run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(run=run)
+        return command
+
+    def add_scene(command: argparse.ArgumentParser, nargs: str | None = None) -> None:
+        text = "name of a shipped scene, or a .yaml file"
+        command.add_argument("scene", metavar="SCENE", help=text, nargs=nargs, default=DEFAULT_SCENE)
+
+    app = add("app", _app, "Start the page and print its address.")
+    add_scene(app, "?")
+    app.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
+    app.add_argument("--port", type=int, default=8080, help="port to listen on (default: %(default)s)")
+
+    add("scenes", _scenes, "List the shipped scenes.")
+
+    map_ = add("map", _map, "Compute a feasibility map and count its cells by reason.")
+    add_scene(map_)
+    map_.add_argument("--task", metavar="NAME", help="task (default: the first)")
+    map_.add_argument("--arm", metavar="NAME", help="arm (default: the task's first)")
+    map_.add_argument("--out", metavar="FILE", type=Path, help="write the map: .npz, .png or .json")
+
+    plan = add("plan", _plan, "Plan grasps and write the plan as JSON.")
+    plan.add_argument("kind", choices=("sequential", "bimanual"), help="which planner")
+    add_scene(plan)
+    plan.add_argument("--out", metavar="FILE", type=Path, required=True, help="the plan file to write")
+    plan.add_argument("--arm", metavar="NAME", help="sequential: the arm (default: the first task's)")
+    plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
+    plan.add_argument("--seed", type=int, default=0, help="bimanual: seed (default: %(default)s)")
+
+    schema = add("schema", _schema, "Print the JSON Schema of a file format.")
+    schema.add_argument("format", choices=("scene", "plan"))
+    return parser
+
+
+def _app(args: argparse.Namespace) -> int:
+    from app.__main__ import serve  # the page is started only when asked for
+
+    serve(args.scene, host=args.host, port=args.port)
+    return 0
+
+
+def _scenes(args: argparse.Namespace) -> int:
+    for name in shipped_scenes():
+        print(f"{name:20} {Scene.load(name).file.description}")
+    return 0
+
+
+def _map(args: argparse.Namespace) -> int:
+    from symgrasp.feasibility import create_map
+
+    if args.out:
+        _check_folder(args.out)
+        if args.out.suffix not in MAP_ENDINGS:
+            raise InputError("command line", "--out", str(args.out), "an ending: " + one_of(MAP_ENDINGS))
+    scene = _checked(args.scene)
+    task = scene.task(args.task)
+    arm = scene.arm(args.arm or task.arms[0])
+    the_map = create_map(scene, arm.name, task.name, progress=_progress(f"map of {task.name}"))
+    cells = the_map.reason.size
+    print(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
+    for reason, count in the_map.counts().items():
+        print(f"  {reason.label:20} {count:6}  {100 * count / cells:5.1f} %")
+    if args.out:
+        with write_atomically(args.out) as file:
+            file.write(_map_content(the_map, args.out.suffix))
+        print(f"written to {args.out}")
+    return 0
+
+
+def _map_content(the_map: FeasibilityMap, ending: str) -> bytes:
+    if ending == ".png":
+        return the_map._repr_png_()
+    if ending == ".json":
+        return (json.dumps(the_map.to_dict(), allow_nan=False) + "\n").encode()
+    return the_map.to_npz()
+
+
+def _plan(args: argparse.Namespace) -> int:
+    from symgrasp.plan import plan_bimanual, plan_sequential
+
+    _check_folder(args.out)
+    scene = _checked(args.scene)
+    progress = _progress(f"{args.kind} plan")
+    if args.kind == "sequential":
+        plan = plan_sequential(scene, args.arm, progress=progress)
+    else:
+        plan = plan_bimanual(scene, args.task, seed=args.seed, progress=progress)
+    plan.save(args.out)
+    for task in plan.tasks:
+        print(f"{task.name}: turn the object by {_deg(task.delta):.1f}°")
+        for hold in task.holds:
+            grasp = hold.grasp
+            print(
+                f"  {hold.arm} holds at h = {100 * grasp.h:.1f} cm, θ = {_deg(grasp.theta):.1f}°, "
+                f"roll {_deg(grasp.roll):.0f}°, {1e3 * hold.clearance:.1f} mm clear"
+            )
+    print(f"written to {args.out}")
+    return 0
+
+
+def _schema(args: argparse.Namespace) -> int:
+    if args.format == "scene":
+        schema = scene_schema()
+    else:
+        from symgrasp.plan import plan_schema
+
+        schema = plan_schema()
+    print(json.dumps(schema, indent=2))
+    return 0
+
+
+def _checked(name: str) -> Scene:
+    from symgrasp.world import check_tasks
+
+    scene = Scene.load(name)
+    check_tasks(scene)
+    return scene
+
+
+def _check_folder(out: Path) -> None:
+    if not out.parent.is_dir():
+        raise InputError("command line", "--out", str(out), f"a file in an existing folder, not {out.parent}")
+    if out.is_dir():
+        raise InputError("command line", "--out", str(out), "a file, not a folder")
+
+
+def _progress(what: str) -> Callable[[float], None] | None:
+    """Return a callback that shows a running percentage on a terminal."""
+    if not sys.stderr.isatty():
+        return None
+
+    def show(share: float) -> None:
+        end = "\n" if share >= 1 else ""
+        print(f"\r{what}: {100 * share:3.0f} %", end=end, file=sys.stderr, flush=True)
+
+    return show
+
+
+def _deg(angle: float) -> float:
+    return math.degrees(angle)

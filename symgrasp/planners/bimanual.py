@@ -1,0 +1,142 @@
+"""Several hands on one object: Algorithm 3 of the paper, by hill climbing over handprints.
+
+Two misprints of the printed listing are put right: the random start must be feasible for its
+arm, and the hand moves in the best direction that was found, not in the last that was tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from symgrasp.errors import NoPlanError
+from symgrasp.feasibility import Cell, FeasibilityMap, Progress
+from symgrasp.hand import Handprint
+from symgrasp.planners.sequential import check_same_grid
+from symgrasp.robot import Arm
+
+__all__ = ["Climb", "Placement", "hill_climb", "print_overlap"]
+
+BodiesFree = Callable[[Sequence[Cell]], bool]
+"""Whether the whole robots are free of each other with every arm at the witness of its cell."""
+
+
+@dataclass(frozen=True)
+class Climb:
+    """Limits of the search.
+
+    Attributes:
+        restarts: MAX_RESTARTS of the listing.
+        iterations: MAX_ITERS of the listing.
+    """
+
+    restarts: int = 100
+    iterations: int = 200
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A cell for every arm, and what it took to find them.
+
+    Attributes:
+        cells: one cell an arm, in the order of the maps.
+        restarts: restarts begun.
+        iterations: moves considered, over all restarts.
+        print_checks: handprints compared.
+        body_checks: times the whole robots were checked.
+    """
+
+    cells: tuple[Cell, ...]
+    restarts: int
+    iterations: int
+    print_checks: int
+    body_checks: int
+
+
+def hill_climb(
+    maps: Sequence[FeasibilityMap],
+    arms: Sequence[Arm],
+    bodies_free: BodiesFree,
+    seed: int,
+    limits: Climb | None = None,
+    progress: Progress | None = None,
+) -> Placement:
+    """Place every arm's hand on a feasible cell so that no two prints share a cell: Algorithm 3.
+
+    Args:
+        maps: one map an arm, all over the same grid.
+        arms: the arms, in the same order.
+        bodies_free: asked once the prints are apart; if it says no, the search restarts.
+        seed: of the random choices; the same seed gives the same placement.
+        limits: how long to search.
+        progress: told the share of restarts used; may raise `Cancelled`.
+
+    Raises:
+        NoPlanError: nothing found within the limits, or an arm has no feasible cell.
+        InputError: the grids differ.
+    """
+    check_same_grid(maps)
+    limits = limits or Climb()
+    starts = [np.argwhere(m.feasible) for m in maps]
+    for m, cells in zip(maps, starts, strict=True):
+        if not len(cells):
+            raise NoPlanError(f"{m.arm} has no feasible cell in task {m.task}")
+    search = _Search(maps, arms)
+    rng = np.random.default_rng(seed)
+    iterations = body_checks = 0
+    for restart in range(limits.restarts):
+        if progress:
+            progress(restart / limits.restarts)
+        cells = [Cell(*map(int, rng.choice(choices))) for choices in starts]
+        for _ in range(limits.iterations):
+            if search.overlap(cells) == 0:
+                body_checks += 1
+                if bodies_free(cells):
+                    return Placement(tuple(cells), restart + 1, iterations, search.print_checks, body_checks)
+                break  # apart on the object, but the arms meet: start elsewhere
+            iterations += 1
+            arm = int(rng.integers(len(cells)))
+            cells[arm] = search.best_neighbour(cells, arm)
+    reason = "the arms always met" if body_checks else "the handprints always overlapped"
+    raise NoPlanError(f"no placement of {len(maps)} hands found in {limits.restarts} restarts: {reason}")
+
+
+def print_overlap(prints: Sequence[Handprint], columns: Sequence[int]) -> int:
+    """Return how many cells the prints at these columns share, summed over all pairs."""
+    return sum(
+        prints[a].overlap(prints[b], columns[b] - columns[a])
+        for a in range(len(prints))
+        for b in range(a + 1, len(prints))
+    )
+
+
+class _Search:
+    """Handprints of all arms, and moves between cells."""
+
+    def __init__(self, maps: Sequence[FeasibilityMap], arms: Sequence[Arm]) -> None:
+        self.maps = maps
+        self.print_checks = 0
+        grid = maps[0].manifold
+        self._print = cache(lambda arm, roll, row: arms[arm].handprint(grid, row, roll))
+
+    def overlap(self, cells: Sequence[Cell]) -> int:
+        self.print_checks += 1
+        prints = [self._print(arm, cell.roll, cell.row) for arm, cell in enumerate(cells)]
+        return print_overlap(prints, [cell.column for cell in cells])
+
+    def best_neighbour(self, cells: Sequence[Cell], arm: int) -> Cell:
+        """Return the feasible neighbour of an arm's cell with the fewest shared cells, or the cell."""
+        roll, row, column = cells[arm]
+        heights, angles = self.maps[arm].feasible.shape[1:]
+        best, fewest = cells[arm], np.inf
+        for dh, dtheta in ((1, 0), (0, 1), (-1, 0), (0, -1)):
+            cell = Cell(roll, row + dh, (column + dtheta) % angles)
+            if not 0 <= cell.row < heights or not self.maps[arm].feasible[cell]:
+                continue
+            count = self.overlap([*cells[:arm], cell, *cells[arm + 1 :]])
+            if count < fewest:
+                best, fewest = cell, count
+        return best
