@@ -1,0 +1,38 @@
+"""Scenes that many tests share, loaded once."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from symgrasp.files import SCENES_DIR
+from symgrasp.scene import Scene, shipped_scenes
+
+SHIPPED = list(shipped_scenes())
+
+
+@cache
+def load_small(name: str, heights: int = 8, angles: int = 16, redundancy: int = 6) -> Scene:
+    """Load a shipped scene with a grid that is quick to compute."""
+    return Scene.load(name).with_settings(heights=heights, angles=angles, redundancy=redundancy)
+
+
+@pytest.fixture(params=SHIPPED)
+def shipped(request: pytest.FixtureRequest) -> Scene:
+    return load_small(request.param)
+
+
+@pytest.fixture
+def content() -> dict[str, Any]:
+    """The content of a scene file, free to be changed."""
+    return yaml.safe_load((SCENES_DIR / "bottle_on_table.yaml").read_text())
+
+
+def write_scene(folder: Path, content: object, name: str = "scene.yaml") -> Path:
+    path = folder / name
+    path.write_text(content if isinstance(content, str) else yaml.safe_dump(content))
+    return path
