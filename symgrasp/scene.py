@@ -477,9 +477,10 @@ class _Builder:
         files = entry.arm_files()
         chains = [self._chain(i, k, entry, model) for k in range(len(files))]
         shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
-        home = self._home(i, entry, model, chains, shared)
+        hands = [self._hand(i, a.hand) for a in files]
+        home = self._home(i, entry, model, chains, shared, hands)
         robot = Robot(entry.name, model, entry.base.matrix(), home)
-        return robot, [Arm(a.name, robot, a.tool, self._hand(i, a.hand), shared) for a in files]
+        return robot, [Arm(a.name, robot, a.tool, h, shared) for a, h in zip(files, hands, strict=True)]
 
     def _chain(self, i: int, k: int, entry: RobotFile, model: RobotModel) -> list[str]:
         tool = entry.arm_files()[k].tool
@@ -498,10 +499,20 @@ class _Builder:
         return HANDS[hand]
 
     def _home(
-        self, i: int, entry: RobotFile, model: RobotModel, chains: list[list[str]], shared: frozenset[str]
+        self,
+        i: int,
+        entry: RobotFile,
+        model: RobotModel,
+        chains: list[list[str]],
+        shared: frozenset[str],
+        hands: list[Hand],
     ) -> Array:
         field = f"robots[{i}].home"
         values = model.default_values()
+        for hand in hands:  # parked hands stand open, unless the scene says otherwise
+            for name, value in hand.joint_values(hand.max_opening).items():
+                if name in model.joint_names:
+                    values[model.joint_names.index(name)] = value
         order = [n for chain in chains for n in chain if n not in shared]
         given: Mapping[str, float]
         if entry.home is None:

@@ -111,5 +111,3 @@ def test_an_arm_without_a_closed_form(kuka):
     skewed.P = rng.normal(size=(8, 3))
     with pytest.raises(UrdfError, match="closed-form"):
         ClosedFormIK(skewed, 4)
-
-

@@ -19,7 +19,9 @@ def test_inverse_undoes(T):
 def test_quaternion_round_trip_and_order(T):
     quat = poses.quat_wxyz(T)
     np.testing.assert_allclose(poses.from_position_quat(T[:3, 3], quat), T, atol=1e-12)
-    np.testing.assert_allclose(Rotation.from_quat(poses.wxyz_to_xyzw(quat)).as_matrix(), T[:3, :3], atol=1e-12)
+    np.testing.assert_allclose(
+        Rotation.from_quat(poses.wxyz_to_xyzw(quat)).as_matrix(), T[:3, :3], atol=1e-12
+    )
     np.testing.assert_array_equal(poses.xyzw_to_wxyz(poses.wxyz_to_xyzw(quat)), quat)
 
 
@@ -65,5 +67,7 @@ def test_batches_keep_their_shape():
 
 def test_rpy_follows_the_urdf_convention():
     T = poses.from_position_rpy([0, 0, 0], [0.1, 0.2, 0.3])
-    about = [poses.rotation_about(axis, angle) for axis, angle in zip(np.eye(3), (0.1, 0.2, 0.3), strict=True)]
+    about = [
+        poses.rotation_about(axis, angle) for axis, angle in zip(np.eye(3), (0.1, 0.2, 0.3), strict=True)
+    ]
     np.testing.assert_allclose(T[:3, :3], about[2] @ about[1] @ about[0], atol=1e-12)

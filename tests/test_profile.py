@@ -73,7 +73,9 @@ def test_pieces_contain_the_surface(p):
     heights = np.linspace(p.h_min, p.h_max, 50)
     turns = np.linspace(0, 2 * np.pi, 37)
     r = p.radius(heights)[:, None]
-    surface = np.stack(np.broadcast_arrays(r * np.cos(turns), r * np.sin(turns), heights[:, None]), -1).reshape(-1, 3)
+    surface = np.stack(
+        np.broadcast_arrays(r * np.cos(turns), r * np.sin(turns), heights[:, None]), -1
+    ).reshape(-1, 3)
     signed = np.min([(surface @ e[:, :3].T + e[:, 3]).max(axis=1) for e in hulls], axis=0)
     assert signed.max() < 1e-9
 

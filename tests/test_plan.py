@@ -1,0 +1,156 @@
+"""Plans hold in a fresh world, whoever made them."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import jsonschema
+import numpy as np
+import pytest
+
+from symgrasp.errors import NoPlanError, PlanError, SceneError
+from symgrasp.manifold import grasp_to_tool
+from symgrasp.plan import Plan, plan_bimanual, plan_schema, plan_sequential
+from symgrasp.poses import from_position_quat, pose_error, rotation_z
+from symgrasp.scene import Scene, scene_schema
+from symgrasp.world import BulletWorld
+from tests.conftest import load_small
+
+
+@cache
+def sequential() -> Plan:
+    return plan_sequential(load_small("pick_pour_place", 12, 24, 8))
+
+
+@cache
+def bimanual() -> Plan:
+    return plan_bimanual(load_small("log_two_robots", 20, 24, 6))
+
+
+PLANS = [sequential, bimanual]
+
+
+@pytest.mark.parametrize("make", PLANS)
+def test_a_plan_holds_in_a_fresh_world(make):
+    """Read back from JSON, with nothing but the plan: the tool is where it says, nothing touches."""
+    plan = Plan.model_validate_json(make().to_json())
+    scene = Scene.from_content(plan.scene.content)
+    assert plan.tasks
+    for task in plan.tasks:
+        turned = task.object_pose.array() @ rotation_z(task.delta)
+        np.testing.assert_allclose(task.object_pose_turned.array(), turned, atol=1e-12)
+        arms = [scene.arm(hold.arm) for hold in task.holds]
+        with BulletWorld(scene) as world:
+            world.set_object(turned)
+            postures = [
+                (arm, [hold.joints[n] for n in arm.joint_names], hold.opening)
+                for arm, hold in zip(arms, task.holds, strict=True)
+            ]
+            world.set_arms(postures)
+            assert not world.collisions(arms)
+            for arm, hold in zip(arms, task.holds, strict=True):
+                tool = world.link_pose(arm.robot.name, arm.tool)
+                position, rotation = pose_error(tool, hold.tool_pose.array())
+                assert position < 2e-6  # PyBullet reads the URDF in single precision
+                assert rotation < 2e-6
+                g = hold.grasp
+                standoff = arm.hand.standoff(float(scene.profile.radius(g.h)))
+                expected = grasp_to_tool(turned, g.h, g.theta, g.roll, standoff)
+                np.testing.assert_allclose(hold.tool_pose.array(), expected, atol=1e-8)
+                assert hold.clearance == pytest.approx(world.clearance(arm, 0.1), abs=1e-6)
+                assert hold.clearance > 0
+                assert hold.margin_along > 0
+
+
+def test_one_grasp_for_the_whole_sequence():
+    plan = sequential()
+    assert [task.name for task in plan.tasks] == ["pick", "pour", "place"]
+    assert len({task.holds[0].grasp for task in plan.tasks}) == 1
+    assert len({task.holds[0].opening for task in plan.tasks}) == 1
+    assert plan.tasks[0].delta == 0.0
+    assert any(task.delta != 0.0 for task in plan.tasks)
+
+
+def test_shipped_planners_do_not_end_at_the_first_cell():
+    first = load_small("pick_pour_place", 12, 24, 8).manifold
+    grasp = sequential().tasks[0].holds[0].grasp
+    assert first.cell(grasp.h, grasp.theta) != (0, 0)
+
+
+def test_two_arms_hold_apart():
+    left, right = bimanual().tasks[0].holds
+    assert (left.arm, right.arm) == ("left", "right")
+    assert (left.grasp.h, left.grasp.theta) != (right.grasp.h, right.grasp.theta)
+
+
+@pytest.mark.parametrize("make", PLANS)
+def test_json_is_valid_and_exact(make, tmp_path):
+    plan = make()
+    content = json.loads(plan.to_json())
+    schema = plan_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(content, schema)
+    jsonschema.validate(content["scene"]["content"], scene_schema())
+    plan.save(tmp_path / "plan.json")
+    back = Plan.load(tmp_path / "plan.json")
+    assert back == plan
+    assert back.to_json() == plan.to_json()
+    for task in back.tasks:
+        pose = task.object_pose
+        again = from_position_quat(pose.position, pose.quat_wxyz)
+        np.testing.assert_allclose(again, pose.array(), atol=1e-12)
+
+
+def test_the_same_seed_gives_the_same_bytes():
+    scene = load_small("log_two_robots", 20, 24, 6)
+    assert plan_bimanual(scene).to_json() == bimanual().to_json()
+    assert plan_bimanual(scene, seed=1).tasks != bimanual().tasks
+
+
+def test_the_scene_in_the_plan_is_the_scene():
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    record = sequential().scene
+    assert record.sha256 == scene.sha256 == Scene.from_content(record.content).sha256
+
+
+def test_planners_refuse_scenes_of_the_other_kind():
+    with pytest.raises(SceneError, match="two or more arms"):
+        plan_bimanual(load_small("soda_can"))
+    with pytest.raises(SceneError, match="does alone"):
+        plan_sequential(load_small("log_two_robots"))
+
+
+def test_no_plan_says_why():
+    scene = load_small("pick_pour_place", 4, 4, 1).with_settings(margin=0.05)
+    with pytest.raises(NoPlanError, match="pick allows"):
+        plan_sequential(scene)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (lambda c: c.pop("tasks"), "tasks"),
+        (lambda c: c.update(schema_version=2), "schema_version"),
+        (lambda c: c["tasks"][0].update(delta="x"), "tasks[0].delta"),
+        (lambda c: c["tasks"][0]["holds"][0]["grasp"].update(extra=1), "tasks[0].holds[0].grasp.extra"),
+    ],
+)
+def test_files_that_are_no_plans(change, field, tmp_path):
+    content = json.loads(sequential().to_json())
+    change(content)
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(PlanError) as caught:
+        Plan.load(path)
+    assert caught.value.field == field
+    path.write_text("{")
+    with pytest.raises(PlanError, match="readable JSON"):
+        Plan.load(path)
+
+
+def test_progress_grows_to_the_end():
+    shares: list[float] = []
+    plan_sequential(load_small("pick_pour_place"), progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0

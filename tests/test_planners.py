@@ -1,0 +1,182 @@
+"""The planners against plain loops over random maps, and against the printed algorithms."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from symgrasp.errors import InputError, NoPlanError
+from symgrasp.feasibility import Cell, FeasibilityMap
+from symgrasp.manifold import Manifold, wrap
+from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
+from symgrasp.planners.sequential import first_common_grasp
+from symgrasp.profile import Profile
+from symgrasp.reason import Reason
+from tests.conftest import load_small
+
+GRID = Manifold(Profile([[0, 0.03], [0.4, 0.03]]), 5, 12)
+
+
+def map_of(feasible: np.ndarray, name: str = "task", grid: Manifold = GRID) -> FeasibilityMap:
+    """A map with these feasible cells (2, H, A) and nothing else known."""
+    shape = feasible.shape
+    return FeasibilityMap(
+        scene="random",
+        arm="arm",
+        task=name,
+        T_world_object=np.eye(4),
+        manifold=grid,
+        reason=np.where(feasible, Reason.FEASIBLE, Reason.UNREACHABLE).astype(np.uint8),
+        q=np.zeros((*shape, 7)),
+        sample=np.zeros(shape, dtype=np.int16),
+        branch=np.zeros(shape, dtype=np.int16),
+        phi=np.zeros(1),
+        opening=np.zeros(grid.heights),
+        bodies=(),
+        pair=np.full((*shape, 2), -1),
+        depth=np.full(shape, np.nan),
+    )
+
+
+@st.composite
+def random_maps(draw: st.DrawFn, count: int) -> list[FeasibilityMap]:
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    density = draw(st.sampled_from([0.01, 0.03, 0.1, 0.4]))
+    shape = (2, GRID.heights, GRID.angles)
+    return [map_of(rng.random(shape) < density, f"task {k}") for k in range(count)]
+
+
+@given(st.integers(1, 5).flatmap(random_maps))
+@settings(max_examples=200, deadline=None)
+def test_first_common_grasp_by_brute_force(maps):
+    """It finds a grasp exactly when some height and roll serves all tasks, and the first of them."""
+    common = [
+        (row, roll)
+        for row, roll in product(range(5), range(2))
+        if all(m.feasible[roll, row].any() for m in maps)
+    ]
+    if not common:
+        with pytest.raises(NoPlanError, match="no height and roll"):
+            first_common_grasp(maps)
+        return
+    found = first_common_grasp(maps)
+    assert (found.grasp.row, found.grasp.roll) == common[0]
+    assert found.deltas[0] == 0.0
+    for m, cell, delta in zip(maps, found.cells, found.deltas, strict=True):
+        assert m.feasible[cell]
+        assert not m.feasible[cell.roll, cell.row, : cell.column].any()  # the first angle
+        # The same grasp (h, θ*) on the map of the turned object: equation 3.
+        assert m.shift(delta).feasible[found.grasp]
+        assert wrap(delta - (cell.column - found.grasp.column) * GRID.dtheta) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_why_there_is_no_common_grasp():
+    low, high = np.zeros((2, 5, 12), dtype=bool), np.zeros((2, 5, 12), dtype=bool)
+    low[0, 0:2, 3] = True
+    high[0, 4, 3] = True
+    with pytest.raises(NoPlanError) as caught:
+        first_common_grasp([map_of(low, "pick"), map_of(high, "place")])
+    text = str(caught.value)
+    assert "pick allows 4.0 to 12.0 cm at roll 0° and nothing at roll 180°" in text
+    assert "place allows 36.0 to 36.0 cm at roll 0°" in text
+
+
+def test_maps_must_share_a_grid():
+    other = Manifold(GRID.profile, 5, 10)
+    with pytest.raises(InputError, match="one grid"):
+        first_common_grasp([map_of(np.ones((2, 5, 12), bool)), map_of(np.ones((2, 5, 10), bool), grid=other)])
+    with pytest.raises(InputError, match="at least one map"):
+        first_common_grasp([])
+
+
+@cache
+def arms_and_grid():
+    scene = load_small("log_two_robots", 10, 16)
+    return list(scene.arms.values()), scene.manifold
+
+
+def free(cells) -> bool:
+    return True
+
+
+def shares_no_cell(cells) -> bool:
+    arms, grid = arms_and_grid()
+    prints = [arm.handprint(grid, c.row, c.roll) for arm, c in zip(arms, cells, strict=True)]
+    return print_overlap(prints, [c.column for c in cells]) == 0
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.2, 0.8]))
+@settings(max_examples=30, deadline=None)
+def test_hill_climb_places_hands_apart_on_feasible_cells(seed, density):
+    arms, grid = arms_and_grid()
+    rng = np.random.default_rng(seed)
+    maps = [map_of(rng.random((2, 10, 16)) < density, grid=grid) for _ in arms]
+    assume(all(m.feasible.any() for m in maps))
+    try:
+        found = hill_climb(maps, arms, free, seed)
+    except NoPlanError:
+        return
+    assert all(m.feasible[c] for m, c in zip(maps, found.cells, strict=True))
+    assert shares_no_cell(found.cells)
+    assert hill_climb(maps, arms, free, seed) == found
+
+
+def test_hill_climb_really_climbs():
+    """From starts that overlap it walks to where the hands are apart."""
+    arms, grid = arms_and_grid()
+    everything = map_of(np.ones((2, 10, 16), dtype=bool), grid=grid)
+    moved = [hill_climb([everything] * 2, arms, free, seed, Climb(restarts=1)) for seed in range(40)]
+    assert any(found.iterations > 0 for found in moved)
+    assert all(shares_no_cell(found.cells) for found in moved)
+
+
+def test_hill_climb_moves_in_the_best_direction():
+    """One free arm, one fixed: every step must go to a neighbour with the fewest shared cells."""
+    arms, grid = arms_and_grid()
+    fixed = np.zeros((2, 10, 16), dtype=bool)
+    fixed[0, 4, 8] = True
+    corridor = np.zeros((2, 10, 16), dtype=bool)
+    corridor[0, 4:, 8] = True  # the only way is up
+    found = hill_climb([map_of(fixed, grid=grid), map_of(corridor, grid=grid)], arms, free, 1)
+    assert found.cells[0] == Cell(0, 4, 8)
+    assert shares_no_cell(found.cells)
+    assert found.cells[1].row > 4
+
+
+def test_hill_climb_starts_on_feasible_cells_only():
+    arms, grid = arms_and_grid()
+    one = np.zeros((2, 10, 16), dtype=bool)
+    one[1, 2, 3] = True
+    other = np.zeros((2, 10, 16), dtype=bool)
+    other[0, 9, 3] = True
+    found = hill_climb([map_of(one, grid=grid), map_of(other, grid=grid)], arms, free, 5)
+    assert found.cells == (Cell(1, 2, 3), Cell(0, 9, 3))
+
+
+def test_hill_climb_says_what_stood_in_the_way():
+    arms, grid = arms_and_grid()
+    same = np.zeros((2, 10, 16), dtype=bool)
+    same[0, 5, 5] = True
+    m = map_of(same, grid=grid)
+    with pytest.raises(NoPlanError, match="handprints always overlapped"):
+        hill_climb([m, m], arms, free, 0, Climb(3, 10))
+    everything = map_of(np.ones((2, 10, 16), dtype=bool), grid=grid)
+    with pytest.raises(NoPlanError, match="arms always met"):
+        hill_climb([everything, everything], arms, lambda cells: False, 0, Climb(3, 50))
+    nothing = map_of(np.zeros((2, 10, 16), dtype=bool), grid=grid)
+    with pytest.raises(NoPlanError, match="no feasible cell"):
+        hill_climb([m, nothing], arms, free, 0)
+
+
+def test_three_hands():
+    arms, grid = arms_and_grid()
+    everything = map_of(np.ones((2, 10, 16), dtype=bool), grid=grid)
+    three = [arms[0], arms[1], arms[0]]
+    found = hill_climb([everything] * 3, three, free, 3)
+    prints = [a.handprint(grid, c.row, c.roll) for a, c in zip(three, found.cells, strict=True)]
+    assert print_overlap(prints, [c.column for c in found.cells]) == 0
