@@ -81,7 +81,7 @@ def test_the_map_by_brute_force():
             for roll, i, j in np.ndindex(m.reason.shape):
                 h, theta = m.manifold.h[i], m.manifold.theta[j]
                 radius = float(scene.profile.radius(h))
-                free, reached = False, Reason.UNREACHABLE
+                free, reached, depths = False, Reason.UNREACHABLE, {}
                 if not arm.hand.pads_rest(scene.profile, h):
                     reached = Reason.SURFACE_TOO_STEEP
                 else:
@@ -98,9 +98,13 @@ def test_the_map_by_brute_force():
                             hit = world.first_collision(arm)
                             free |= hit is None
                             stage = hit.reason if hit else Reason.FEASIBLE
+                            if hit:
+                                depths.setdefault(stage, []).append(hit.depth)
                         reached = max(reached, stage)
                 assert bool(m.feasible[roll, i, j]) == free
                 assert m.reason[roll, i, j] == reached
+                if reached in depths:  # the candidate that came closest to being free
+                    assert m.depth[roll, i, j] == pytest.approx(min(depths[reached]), abs=1e-9)
 
 
 def test_witnesses_prove_their_cells(shipped):
@@ -155,6 +159,16 @@ def test_an_approach_can_only_block(bottle_map):
     blocked = bottle_map.feasible & ~with_approach.feasible
     assert blocked.any()
     assert (with_approach.reason[blocked] == Reason.APPROACH_BLOCKED).all()
+
+
+def test_an_approach_follows_one_branch(bottle_map, monkeypatch):
+    """No step of the retreat may jump: with no room for the joints to move, everything is blocked."""
+    scene = load_small("bottle_on_table", 12, 24, 8).with_settings(approach=0.05)
+    assert create_map(scene).feasible.any()
+    monkeypatch.setattr("symgrasp.feasibility.RETREAT_TURN", 1e-6)
+    blocked = create_map(scene)
+    assert not blocked.feasible.any()
+    assert (blocked.reason[bottle_map.feasible] == Reason.APPROACH_BLOCKED).all()
 
 
 def test_a_margin_can_only_block(bottle_map):

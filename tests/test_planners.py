@@ -173,6 +173,17 @@ def test_hill_climb_says_what_stood_in_the_way():
         hill_climb([m, nothing], arms, free, 0)
 
 
+def test_prints_that_barely_share_a_cell_are_not_apart():
+    arms, grid = arms_and_grid()
+    prints = [arms[0].handprint(grid, row, 0) for row in range(10)]
+    overlap = {(row, c): prints[4].overlap(prints[row], c) for row, c in product(range(10), range(16))}
+    row, column = min((cell for cell, count in overlap.items() if count), key=lambda cell: overlap[cell])
+    one, other = np.zeros((2, 10, 16), dtype=bool), np.zeros((2, 10, 16), dtype=bool)
+    one[0, 4, 0] = other[0, row, column] = True
+    with pytest.raises(NoPlanError, match="overlapped"):
+        hill_climb([map_of(one, grid=grid), map_of(other, grid=grid)], arms, free, 0, Climb(2, 5))
+
+
 def test_three_hands():
     arms, grid = arms_and_grid()
     everything = map_of(np.ones((2, 10, 16), dtype=bool), grid=grid)
