@@ -161,16 +161,25 @@ class FeasibilityMap:
         order = np.argsort(-counts, kind="stable")
         return {Reason(int(values[k])): int(counts[k]) for k in order}
 
+    @cached_property
+    def margins(self) -> Array:
+        """(R, H, A, 2) distance along the axis (m) and angle around it (rad) to the nearest infeasible cell.
+
+        Zero where infeasible. Both ends of the object count as infeasible; around the object
+        half a turn is the most there is.
+        """
+        rows = np.minimum(_run_length(self.feasible, 1), _run_length(self.feasible[:, ::-1], 1)[:, ::-1])
+        around = np.concatenate([self.feasible] * 3, axis=2)
+        columns = np.minimum(_run_length(around, 2), _run_length(around[..., ::-1], 2)[..., ::-1])
+        angles = self.manifold.angles
+        columns = np.minimum(columns[..., angles : 2 * angles], angles // 2)
+        margins = np.stack([rows * self.manifold.dh, columns * self.manifold.dtheta], axis=-1)
+        margins.setflags(write=False)
+        return margins
+
     def margin(self, cell: Cell | tuple[int, int, int]) -> Margin:
         """Return how far a cell may be off along and around the object and still be feasible."""
-        cell = Cell(*cell)
-        column = self.feasible[cell.roll, :, cell.column]
-        row = np.roll(self.feasible[cell.roll, cell.row], -cell.column)
-        blocked = np.flatnonzero(~column)
-        rows = min([cell.row + 1, len(column) - cell.row, *(abs(blocked - cell.row).tolist())])
-        blocked = np.flatnonzero(~row)
-        columns = min([len(row) // 2, *np.minimum(blocked, len(row) - blocked).tolist()])
-        return Margin(rows * self.manifold.dh, columns * self.manifold.dtheta)
+        return Margin(*self.margins[Cell(*cell)].tolist())
 
     def shift(self, delta: float) -> FeasibilityMap:
         """Return the map for the object turned by ``delta`` (rad) about its axis, without recomputing it.
@@ -266,6 +275,12 @@ class FeasibilityMap:
             return FeasibilityMap(**names, manifold=manifold, bodies=tuple(meta["bodies"]), **data)
         except (KeyError, ProfileError) as error:
             raise MapError(path, "meta", str(error), "a map written by symgrasp") from error
+
+
+def _run_length(feasible: np.ndarray, axis: int) -> np.ndarray:
+    """Count along an axis how many cells ago the last infeasible one was (0 for itself)."""
+    position = np.arange(1, feasible.shape[axis] + 1).reshape([-1 if k == axis else 1 for k in range(3)])
+    return position - np.maximum.accumulate(np.where(feasible, 0, position), axis=axis)
 
 
 _ARRAYS = ("T_world_object", "reason", "q", "sample", "branch", "phi", "opening", "pair", "depth")

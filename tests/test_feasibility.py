@@ -288,3 +288,17 @@ def test_tilted_objects_have_maps_too():
     T = from_position_rpy([0.5, 0.0, 0.2], [0.9, 0.3, 0.0])
     m = create_map(turned(scene, "pick", T))
     assert m.feasible.any()
+
+
+def test_margins_by_walking(bottle_map):
+    """For every cell: walk up, down, left and right until a cell is infeasible or the object ends."""
+    rng = np.random.default_rng(0)
+    feasible = rng.random((2, 12, 24)) < 0.8
+    feasible[0, 3] = True  # a whole turn
+    m = replace(bottle_map, reason=np.where(feasible, Reason.FEASIBLE, Reason.UNREACHABLE))
+    for roll, i, j in np.ndindex(feasible.shape):
+        down = next(k for k in range(13) if i - k < 0 or not feasible[roll, i - k, j])
+        up = next(k for k in range(13) if i + k > 11 or not feasible[roll, i + k, j])
+        around = next((k for k in range(12) for s in (-k, k) if not feasible[roll, i, (j + s) % 24]), 12)
+        expected = (min(up, down) * m.manifold.dh, around * m.manifold.dtheta)
+        assert m.margin((roll, i, j)) == pytest.approx(expected)
