@@ -79,6 +79,8 @@ def _parser() -> argparse.ArgumentParser:
     add_scene(plan)
     plan.add_argument("--out", metavar="FILE", type=Path, required=True, help="the plan file to write")
     plan.add_argument("--arm", metavar="NAME", help="sequential: the arm (default: the first task's)")
+    methods = ("first", "best", "regrasp")
+    plan.add_argument("--method", choices=methods, default="best", help="sequential: default %(default)s")
     plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
     plan.add_argument("--seed", type=int, default=0, help="bimanual: seed (default: %(default)s)")
 
@@ -137,7 +139,7 @@ def _plan(args: argparse.Namespace) -> int:
     scene = _checked(args.scene)
     progress = _progress(f"{args.kind} plan")
     if args.kind == "sequential":
-        plan = plan_sequential(scene, args.arm, progress=progress)
+        plan = plan_sequential(scene, args.arm, method=args.method, progress=progress)
     else:
         plan = plan_bimanual(scene, args.task, seed=args.seed, progress=progress)
     plan.save(args.out)

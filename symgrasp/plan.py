@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from symgrasp.errors import PlanError, SceneError
+from symgrasp.errors import NoPlanError, PlanError, SceneError
 from symgrasp.feasibility import Cell, FeasibilityMap, Progress, create_map
 from symgrasp.files import write_atomically
 from symgrasp.manifold import ROLLS, grasp_to_tool
 from symgrasp.planners.bimanual import Climb, hill_climb
-from symgrasp.planners.sequential import first_common_grasp
+from symgrasp.planners.conflicts import explain_conflict, fewest_regrasps
+from symgrasp.planners.sequential import SequentialGrasp, best_common_grasp, first_common_grasp
 from symgrasp.poses import Array, quat_wxyz, rotation_z
 from symgrasp.robot import Arm
 from symgrasp.scene import Scene, Task, describe
@@ -28,6 +29,8 @@ __all__ = ["Plan", "plan_bimanual", "plan_schema", "plan_sequential"]
 
 CLEARANCE_LIMIT = 0.1
 """Clearances are measured up to this distance (m)."""
+
+SequentialMethod = Literal["first", "best", "regrasp"]
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Row = tuple[Finite, Finite, Finite, Finite]
@@ -159,18 +162,22 @@ def plan_sequential(
     scene: Scene,
     arm: str | None = None,
     maps: Mapping[str, FeasibilityMap] | None = None,
+    method: SequentialMethod = "best",
     progress: Progress | None = None,
 ) -> Plan:
-    """Find one grasp for all tasks that an arm does alone (Algorithm 2).
+    """Find one grasp for all tasks that an arm does alone.
 
     Args:
         scene: the scene.
         arm: the arm; the first task's if None.
         maps: task → map of that arm; computed where missing.
+        method: ``first`` is Algorithm 2 as printed, ``best`` the grasp with the largest margin in
+            its worst task, ``regrasp`` the fewest grasps that serve the whole sequence, with the
+            object set down in between.
         progress: told the finished share; may raise `Cancelled`.
 
     Raises:
-        NoPlanError: no grasp serves all tasks.
+        NoPlanError: no grasp serves all tasks; says which exclude each other.
         SceneError: no task is done by that arm alone.
     """
     the_arm = scene.arm(arm or scene.task().arms[0])
@@ -186,12 +193,38 @@ def plan_sequential(
                 step = _part(progress, k, len(tasks))
                 known[task.name] = create_map(scene, the_arm.name, task.name, world=world, progress=step)
         chosen = [known[task.name] for task in tasks]
-        found = first_common_grasp(chosen)
-        entries = [
-            _task_entry(world, task, delta, [(the_arm, m, cell, found.grasp.column)])
-            for task, m, cell, delta in zip(tasks, chosen, found.cells, found.deltas, strict=True)
-        ]
-    return _plan(scene, "sequential", Planner(algorithm="first"), entries)
+        resting = [k for k, task in enumerate(tasks) if world.rests(task.T_world_object)]
+        entries = []
+        for visits, found in _sequence(chosen, method, resting):
+            for k, cell, delta in zip(visits, found.cells, found.deltas, strict=True):
+                hold = (the_arm, chosen[k], cell, found.grasp.column)
+                entries.append(_task_entry(world, tasks[k], delta, [hold]))
+    return _plan(scene, "sequential", Planner(algorithm=method), entries)
+
+
+def _sequence(
+    maps: Sequence[FeasibilityMap], method: SequentialMethod, resting: Sequence[int]
+) -> list[tuple[list[int], SequentialGrasp]]:
+    """Return one or several grasps, each with the tasks that it visits in order.
+
+    A regrasp visits the task where the object is set down twice: at the end with the old grasp,
+    and at the beginning with the new one.
+    """
+    everything = list(range(len(maps)))
+    if method == "first":
+        return [(everything, first_common_grasp(maps))]
+    if method == "best":
+        return [(everything, best_common_grasp(maps))]
+    segments = fewest_regrasps(maps, resting)
+    if segments is None:
+        raise NoPlanError(explain_conflict(maps) + "; no regrasp helps")
+    grasps, entry = [], None
+    for segment in segments:
+        ends = [[k] if k is not None else [] for k in (entry, segment.set_down)]
+        visits = [*ends[0], *range(segment.first, segment.last + 1), *ends[1]]
+        grasps.append((visits, best_common_grasp([maps[k] for k in visits])))
+        entry = segment.set_down
+    return grasps
 
 
 def plan_bimanual(

@@ -348,6 +348,13 @@ class BulletWorld:
         ]
         return sorted(found, key=lambda c: -c.depth)
 
+    def rests(self, T_world_object: ArrayLike) -> bool:
+        """Whether the object stands on something at a pose; leaves it there."""
+        self.set_object(T_world_object)
+        support = [self._ask(_Query(Reason.SCENE_COLLISION, piece, o), RESTING_DEPTH)
+                   for piece in self._object for o in self._obstacles]  # fmt: skip
+        return any(support)
+
     def clearance(self, arm: Arm, limit: float) -> float:
         """Return the smallest distance (m) of all pairs that are checked for an arm, at most ``limit``."""
         gaps = [limit - c.depth for query in self._queries[arm.name] for c in self._ask(query, limit)]

@@ -99,7 +99,7 @@ def test_no_plan_is_status_1_and_leaves_no_file(content, tmp_path, capsys):
     content["map"] = {"heights": 2, "angles": 2, "redundancy": 1, "margin": 0.2}
     path = write_scene(tmp_path, content)
     assert main(["plan", "sequential", str(path), "--out", str(tmp_path / "plan.json")]) == 1
-    assert "no height and roll is feasible" in capsys.readouterr().err
+    assert "no grasp" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
 
 

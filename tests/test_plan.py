@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import jsonschema
@@ -10,9 +11,11 @@ import numpy as np
 import pytest
 
 from symgrasp.errors import NoPlanError, PlanError, SceneError
+from symgrasp.feasibility import create_map
 from symgrasp.manifold import grasp_to_tool
 from symgrasp.plan import Plan, plan_bimanual, plan_schema, plan_sequential
 from symgrasp.poses import from_position_quat, pose_error, rotation_z
+from symgrasp.reason import Reason
 from symgrasp.scene import Scene, scene_schema
 from symgrasp.world import BulletWorld
 from tests.conftest import load_small
@@ -123,7 +126,7 @@ def test_planners_refuse_scenes_of_the_other_kind():
 
 def test_no_plan_says_why():
     scene = load_small("pick_pour_place", 4, 4, 1).with_settings(margin=0.05)
-    with pytest.raises(NoPlanError, match="pick allows"):
+    with pytest.raises(NoPlanError, match="no grasp"):
         plan_sequential(scene)
 
 
@@ -147,6 +150,40 @@ def test_files_that_are_no_plans(change, field, tmp_path):
     path.write_text("{")
     with pytest.raises(PlanError, match="readable JSON"):
         Plan.load(path)
+
+
+def test_methods():
+    """The first grasp is Algorithm 2's, the best has the larger worst margin, and all can be replayed."""
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    maps = {task: create_map(scene, task=task) for task in scene.tasks}
+    first, best = (plan_sequential(scene, maps=maps, method=m) for m in ("first", "best"))
+
+    def worst(plan):
+        holds = [task.holds[0] for task in plan.tasks]
+        return min(min(h.margin_along, h.margin_around * scene.profile.radius(h.grasp.h)) for h in holds)
+
+    assert worst(best) >= worst(first) > 0
+    assert best == sequential()
+    assert plan_sequential(scene, maps=maps, method="regrasp").tasks == best.tasks  # none is needed
+
+
+def test_a_regrasp_where_one_grasp_does_not_do():
+    """Pick only low, pour only high: set down at the place, where both are feasible."""
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    maps = {task: create_map(scene, task=task) for task in scene.tasks}
+
+    def only(task, rows):
+        reason = np.full_like(maps[task].reason, Reason.UNREACHABLE)
+        reason[:, rows] = maps[task].reason[:, rows]
+        return replace(maps[task], reason=reason)
+
+    maps |= {"pick": only("pick", slice(0, 6)), "pour": only("pour", slice(6, 12))}
+    with pytest.raises(NoPlanError, match="no grasp serves pick and pour"):
+        plan_sequential(scene, maps=maps)
+    plan = plan_sequential(scene, maps=maps, method="regrasp")
+    assert [task.name for task in plan.tasks] == ["pick", "place", "place", "pour", "place"]
+    grasps = [task.holds[0].grasp for task in plan.tasks]
+    assert grasps[0] == grasps[1] != grasps[2] == grasps[3] == grasps[4]
 
 
 def test_progress_grows_to_the_end():

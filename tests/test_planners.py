@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import product
+from itertools import combinations, pairwise, product
 
 import numpy as np
 import pytest
@@ -14,7 +14,8 @@ from symgrasp.errors import InputError, NoPlanError
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import Manifold, wrap
 from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
-from symgrasp.planners.sequential import first_common_grasp
+from symgrasp.planners.conflicts import fewest_regrasps, height_gap, smallest_conflicts
+from symgrasp.planners.sequential import best_common_grasp, common_grasps, first_common_grasp
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
 from tests.conftest import load_small
@@ -61,7 +62,7 @@ def test_first_common_grasp_by_brute_force(maps):
         if all(m.feasible[roll, row].any() for m in maps)
     ]
     if not common:
-        with pytest.raises(NoPlanError, match="no height and roll"):
+        with pytest.raises(NoPlanError, match="no grasp"):
             first_common_grasp(maps)
         return
     found = first_common_grasp(maps)
@@ -75,15 +76,128 @@ def test_first_common_grasp_by_brute_force(maps):
         assert wrap(delta - (cell.column - found.grasp.column) * GRID.dtheta) == pytest.approx(0.0, abs=1e-9)
 
 
+@given(st.integers(1, 5).flatmap(random_maps))
+@settings(max_examples=100, deadline=None)
+def test_best_common_grasp_by_brute_force(maps):
+    """No other height, roll and choice of angles has a better worst margin."""
+    best = 0.0
+    for roll, row in product(range(2), range(5)):
+        radius = float(GRID.profile.radius(GRID.h[row]))
+        worst = np.inf
+        for m in maps:
+            margins = [m.margin((roll, row, j)) for j in range(12) if m.feasible[roll, row, j]]
+            worst = min(worst, max((min(a, b * radius) for a, b in margins), default=0.0))
+        best = max(best, worst)
+    if best == 0.0:
+        with pytest.raises(NoPlanError):
+            best_common_grasp(maps)
+        assert not common_grasps(maps)
+        return
+    found = best_common_grasp(maps)
+    reached = np.inf
+    for m, cell, delta in zip(maps, found.cells, found.deltas, strict=True):
+        assert m.feasible[cell]
+        assert m.shift(delta).feasible[found.grasp]
+        assert (cell.roll, cell.row) == (found.grasp.roll, found.grasp.row)
+        along, around = m.margin(cell)
+        reached = min(reached, along, around * float(GRID.profile.radius(GRID.h[cell.row])))
+    assert reached == pytest.approx(best)
+    assert common_grasps(maps)[0].margin == pytest.approx(best)
+
+
+@given(st.integers(1, 4).flatmap(random_maps))
+@settings(max_examples=100, deadline=None)
+def test_all_common_grasps_with_their_intervals(maps):
+    found = {(g.roll, g.row): g for g in common_grasps(maps)}
+    for roll, row in product(range(2), range(5)):
+        serves = all(m.feasible[roll, row].any() for m in maps)
+        assert ((roll, row) in found) == serves
+        if serves:
+            for m, runs in zip(maps, found[roll, row].intervals, strict=True):
+                covered = np.zeros(12, dtype=int)
+                for first, count in runs:
+                    covered[np.arange(first, first + count) % 12] += 1
+                assert np.array_equal(covered, m.feasible[roll, row].astype(int))
+
+
+@given(st.integers(2, 6).flatmap(random_maps))
+@settings(max_examples=150, deadline=None)
+def test_smallest_conflicts_by_trying_all_sets(maps):
+    masks = [m.feasible.any(axis=2) for m in maps]
+    for size in range(1, len(maps) + 1):
+        expected = [
+            s
+            for s in combinations(range(len(maps)), size)
+            if not np.logical_and.reduce([masks[k] for k in s]).any()
+        ]
+        if expected:
+            break
+    assert smallest_conflicts(maps) == expected
+
+
+@given(st.integers(2, 4).flatmap(random_maps))
+@settings(max_examples=100, deadline=None)
+def test_height_gap_by_trying_all_heights(maps):
+    gaps = []
+    for roll in range(2):
+        rows = [np.flatnonzero(m.feasible[roll].any(axis=1)) for m in maps]
+        gaps += [(max(c) - min(c)) * GRID.dh for c in product(*rows)]
+    gap = height_gap(maps)
+    assert (gap is None) == (not gaps)
+    if gaps:
+        assert gap == pytest.approx(min(gaps))
+
+
+@given(st.integers(1, 5).flatmap(random_maps), st.sets(st.integers(0, 4)))
+@settings(max_examples=150, deadline=None)
+def test_fewest_regrasps_by_trying_all_splits(maps, resting):
+    n = len(maps)
+    resting = sorted(k for k in resting if k < n)
+    masks = [m.feasible.any(axis=2) for m in maps]
+
+    def works(cuts, stops):
+        """Segments between cuts; stops[i] is where the object stands after segment i."""
+        bounds = [0, *cuts, n]
+        for i, (a, b) in enumerate(pairwise(bounds)):
+            members = (
+                [*range(a, b), *stops[i - 1 : i], *stops[i : i + 1]] if i else [*range(a, b), *stops[:1]]
+            )
+            if not np.logical_and.reduce([masks[k] for k in members]).any():
+                return False
+        return True
+
+    fewest = next(
+        (
+            count + 1
+            for count in range(n)
+            for cuts in combinations(range(1, n), count)
+            for stops in product(resting, repeat=count)
+            if works(cuts, list(stops))
+        ),
+        None,
+    )
+    found = fewest_regrasps(maps, resting)
+    assert (found is None) == (fewest is None)
+    if found:
+        assert len(found) == fewest
+        assert [s.first for s in found] == [0, *(s.last + 1 for s in found[:-1])]
+        assert found[-1].last == n - 1
+        assert all(s.set_down in resting for s in found[:-1])
+        assert found[-1].set_down is None
+
+
 def test_why_there_is_no_common_grasp():
     low, high = np.zeros((2, 5, 12), dtype=bool), np.zeros((2, 5, 12), dtype=bool)
     low[0, 0:2, 3] = True
     high[0, 4, 3] = True
+    both = low | high
     with pytest.raises(NoPlanError) as caught:
-        first_common_grasp([map_of(low, "pick"), map_of(high, "place")])
+        first_common_grasp([map_of(low, "pick"), map_of(both, "pour"), map_of(high, "place")])
     text = str(caught.value)
-    assert "pick allows 4.0 to 12.0 cm at roll 0° and nothing at roll 180°" in text
+    assert text.startswith("no grasp serves pick and place: they are 24.0 cm apart; ")
+    assert "pick allows 4.0 to 12.0 cm at roll 0°, nothing at roll 180°" in text
     assert "place allows 36.0 to 36.0 cm at roll 0°" in text
+    assert "pour" not in text
 
 
 def test_maps_must_share_a_grid():

@@ -1,4 +1,9 @@
-"""One grasp for a sequence of tasks: Algorithm 2 of the paper."""
+"""One grasp for a sequence of tasks: Algorithm 2 of the paper, and the best such grasp.
+
+Turning the object is free in every task, so a task cares only about the grasp's height and roll:
+at the right turn any angle at which its map is feasible there will do. All planners below rest on
+that, and so are linear in the number of tasks.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +15,10 @@ import numpy as np
 from symgrasp.errors import InputError, NoPlanError
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import ROLLS, wrap
+from symgrasp.planners.conflicts import explain_conflict
+from symgrasp.poses import Array
 
-__all__ = ["SequentialGrasp", "first_common_grasp"]
+__all__ = ["CommonGrasp", "SequentialGrasp", "best_common_grasp", "common_grasps", "first_common_grasp"]
 
 
 class SequentialGrasp(NamedTuple):
@@ -28,6 +35,23 @@ class SequentialGrasp(NamedTuple):
     deltas: tuple[float, ...]
 
 
+class CommonGrasp(NamedTuple):
+    """A height and roll at which every task is feasible, and where around the object.
+
+    Attributes:
+        roll: index of the roll.
+        row: index of the height.
+        intervals: for every task the feasible runs of columns, each (first, count); a run may
+            go on past the last column to the first.
+        margin: the worst task's best margin on the surface (m).
+    """
+
+    roll: int
+    row: int
+    intervals: tuple[tuple[tuple[int, int], ...], ...]
+    margin: float
+
+
 def first_common_grasp(maps: Sequence[FeasibilityMap]) -> SequentialGrasp:
     """Return the first grasp that is feasible in every task: Algorithm 2 as printed, roll by roll.
 
@@ -35,23 +59,60 @@ def first_common_grasp(maps: Sequence[FeasibilityMap]) -> SequentialGrasp:
         maps: the map of every task, all over the same grid.
 
     Raises:
-        NoPlanError: no height and roll is feasible in every task; says which heights each allows.
+        NoPlanError: no height and roll is feasible in every task; says why.
         InputError: there is no map, or the grids differ.
     """
     check_same_grid(maps)
-    dtheta = maps[0].manifold.dtheta
     for row in range(maps[0].manifold.heights):
         for roll in range(len(ROLLS)):
             columns = [_first(m.feasible[roll, row]) for m in maps]
-            if any(column is None for column in columns):
-                continue
-            found = [int(column) for column in columns if column is not None]
-            return SequentialGrasp(
-                Cell(roll, row, found[0]),
-                tuple(Cell(roll, row, column) for column in found),
-                tuple(float(wrap((column - found[0]) * dtheta)) for column in found),
-            )
-    raise NoPlanError("no height and roll is feasible in every task: " + "; ".join(map(_heights, maps)))
+            if None not in columns:
+                return _grasp(maps, roll, row, [c for c in columns if c is not None])
+    raise NoPlanError(explain_conflict(maps))
+
+
+def best_common_grasp(maps: Sequence[FeasibilityMap]) -> SequentialGrasp:
+    """Return the common grasp whose worst task has the largest margin on the surface.
+
+    Args:
+        maps: the map of every task, all over the same grid.
+
+    Raises:
+        NoPlanError: no height and roll is feasible in every task; says why.
+        InputError: there is no map, or the grids differ.
+    """
+    check_same_grid(maps)
+    margins = [surface_margin(m) for m in maps]
+    worst = np.min([m.max(axis=2) for m in margins], axis=0)
+    if worst.max() <= 0:
+        raise NoPlanError(explain_conflict(maps))
+    roll, row = (int(k) for k in np.unravel_index(worst.argmax(), worst.shape))
+    return _grasp(maps, roll, row, [int(m[roll, row].argmax()) for m in margins])
+
+
+def common_grasps(maps: Sequence[FeasibilityMap]) -> list[CommonGrasp]:
+    """List every height and roll that serves all tasks, best margin first.
+
+    Raises:
+        InputError: there is no map, or the grids differ.
+    """
+    check_same_grid(maps)
+    worst = np.min([surface_margin(m).max(axis=2) for m in maps], axis=0)
+    found = [
+        CommonGrasp(roll, row, tuple(_runs(m.feasible[roll, row]) for m in maps), float(worst[roll, row]))
+        for roll, row in np.argwhere(worst > 0).tolist()
+    ]
+    return sorted(found, key=lambda g: -g.margin)
+
+
+def surface_margin(m: FeasibilityMap) -> Array:
+    """Return (R, H, A) how far (m) the hand may be off on the surface, either way, 0 where infeasible.
+
+    Angles count by the arc that they cover at the cell's radius.
+    """
+    radius = m.manifold.profile.radius(m.manifold.h)
+    along, around = np.moveaxis(m.margins, -1, 0)
+    return np.minimum(along, around * radius[None, :, None])
 
 
 def check_same_grid(maps: Sequence[FeasibilityMap]) -> None:
@@ -74,19 +135,23 @@ def check_same_grid(maps: Sequence[FeasibilityMap]) -> None:
             raise InputError("planner", f"map of {m.task}, {m.arm}", m.reason.shape, "one grid for all maps")
 
 
+def _grasp(maps: Sequence[FeasibilityMap], roll: int, row: int, columns: Sequence[int]) -> SequentialGrasp:
+    dtheta = maps[0].manifold.dtheta
+    return SequentialGrasp(
+        Cell(roll, row, columns[0]),
+        tuple(Cell(roll, row, column) for column in columns),
+        tuple(float(wrap((column - columns[0]) * dtheta)) for column in columns),
+    )
+
+
 def _first(feasible: np.ndarray) -> int | None:
     return int(feasible.argmax()) if feasible.any() else None
 
 
-def _heights(m: FeasibilityMap) -> str:
-    """Say at which heights (cm) a task has a feasible cell, for each roll."""
-    parts = []
-    for roll, angle in enumerate(ROLLS):
-        rows = np.flatnonzero(m.feasible[roll].any(axis=1))
-        if not len(rows):
-            parts.append(f"nothing at roll {np.rad2deg(angle):.0f}°")
-            continue
-        runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
-        spans = (f"{100 * m.manifold.h[r[0]]:.1f} to {100 * m.manifold.h[r[-1]]:.1f} cm" for r in runs)
-        parts.append(f"{', '.join(spans)} at roll {np.rad2deg(angle):.0f}°")
-    return f"{m.task} allows " + " and ".join(parts)
+def _runs(feasible: np.ndarray) -> tuple[tuple[int, int], ...]:
+    """Return the runs (first, count) of a circular row of cells."""
+    if feasible.all():
+        return ((0, len(feasible)),)
+    starts = np.flatnonzero(feasible & ~np.roll(feasible, 1))
+    ends = np.flatnonzero(feasible & ~np.roll(feasible, -1))
+    return tuple((int(s), int(min((e - s) % len(feasible) for e in ends)) + 1) for s in starts)
