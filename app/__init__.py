@@ -1,0 +1,1 @@
+"""The web page of symgrasp: a session of its own for every browser, served by viser."""

@@ -1,0 +1,106 @@
+"""``python -m app [SCENE]``: serve the page."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import logging
+import socket
+import sys
+import threading
+from contextlib import redirect_stdout
+
+import viser
+
+from app.compute import Store
+from app.session import Session
+from symgrasp.errors import InputError, SymgraspError
+
+__all__ = ["main", "serve"]
+
+
+def serve(scene: str, host: str, port: int) -> None:
+    """Serve the page until interrupted; the address is printed once it listens.
+
+    Args:
+        scene: the scene to open with, a shipped name or a file.
+        host: address to listen on.
+        port: port to listen on; never another one.
+
+    Raises:
+        InputError: the scene is unusable or the port is not free.
+    """
+    _check_free(host, port)
+    store = Store(scene)
+    with redirect_stdout(io.StringIO()):  # viser's own banner
+        server = viser.ViserServer(host=host, port=port, verbose=False)
+    if server.get_port() != port:  # taken meanwhile: viser moves on to the next one without a word
+        server.stop()
+        raise _busy(port, "taken by another program")
+    server.scene.world_axes.visible = False
+    sessions: dict[int, Session] = {}
+    lock = threading.Lock()
+
+    @server.on_client_connect
+    def _(client: viser.ClientHandle) -> None:
+        session = Session(client, store)
+        with lock:
+            sessions[client.client_id] = session
+        if client.client_id not in server.get_clients():  # gone while its session was made
+            _close(client)
+
+    @server.on_client_disconnect
+    def _close(client: viser.ClientHandle) -> None:
+        with lock:
+            session = sessions.pop(client.client_id, None)
+        if session:
+            session.close()
+
+    print(f"symgrasp: http://{host}:{port}", flush=True)
+    try:
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        print("\nsymgrasp: stopped", flush=True)
+    finally:
+        for session in list(sessions.values()):
+            session.close()
+        server.stop()
+
+
+def _check_free(host: str, port: int) -> None:
+    if not 0 < port < 65536:
+        raise InputError("command line", "--port", port, "a port from 1 to 65535")
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except socket.gaierror as error:
+        raise InputError("command line", "--host", host, "an address of this machine") from error
+    with socket.socket(family, kind) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(address)
+        except OSError as error:
+            raise _busy(port, (error.strerror or str(error)).lower()) from error
+
+
+def _busy(port: int, reason: str) -> InputError:
+    return InputError("command line", "--port", port, f"a free port ({reason}); choose another with --port")
+
+
+def main() -> int:
+    """Run ``python -m app``; return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m app", description="Serve the page of symgrasp.")
+    parser.add_argument("scene", nargs="?", default="bottle_on_table", help="a shipped scene or a .yaml file")
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
+    parser.add_argument("--port", type=int, default=8080, help="port to listen on (default: %(default)s)")
+    args = parser.parse_args()
+    logging.basicConfig(level=logging.WARNING, format="symgrasp: %(message)s")
+    try:
+        serve(args.scene, args.host, args.port)
+    except SymgraspError as error:
+        print(f"symgrasp: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,178 @@
+"""What the page computes: scenes, maps and plans, with what can be used again kept."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+
+import numpy as np
+
+from app.meshes import link_visuals
+from app.state import MapRequest, MapResult, ObjectPose, PlanResult, moved
+from symgrasp.feasibility import FeasibilityMap, Progress, create_map
+from symgrasp.manifold import ROLLS
+from symgrasp.meshes import read_mesh
+from symgrasp.plan import Hold, Plan, plan_bimanual, plan_sequential
+from symgrasp.scene import Scene, shipped_scenes
+from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
+
+__all__ = ["Store", "Workbench"]
+
+MAPS_KEPT = 64
+"""Maps that the server remembers, newest first; a big one (96 x 192 cells) takes about 4 MB."""
+
+
+class Store:
+    """What all browsers share because it never changes: loaded scenes and computed maps.
+
+    Args:
+        first: the scene the page opens with, a shipped name or a file.
+
+    Raises:
+        InputError: that scene is unusable.
+    """
+
+    def __init__(self, first: str) -> None:
+        self._lock = threading.Lock()
+        self._scenes: dict[str, Scene] = {}
+        self._maps: OrderedDict[MapRequest, MapResult] = OrderedDict()
+        self.first = first
+        self.names = tuple(dict.fromkeys([first, *shipped_scenes()]))
+        self.scene(first)
+
+    def scene(self, name: str) -> Scene:
+        """Return a scene by one of `names`, loaded and checked once.
+
+        Raises:
+            InputError: it is unusable.
+        """
+        with self._lock:
+            known = self._scenes.get(name)
+        if known:
+            return known
+        scene = Scene.load(name)
+        check_tasks(scene)
+        _check_visuals(scene)
+        with self._lock:
+            return self._scenes.setdefault(name, scene)
+
+    def map(self, request: MapRequest) -> MapResult | None:
+        """Return a map that was computed before."""
+        with self._lock:
+            if request in self._maps:
+                self._maps.move_to_end(request)
+            return self._maps.get(request)
+
+    def keep(self, result: MapResult) -> None:
+        """Remember a map."""
+        with self._lock:
+            self._maps[result.request] = result
+            while len(self._maps) > MAPS_KEPT:
+                self._maps.popitem(last=False)
+
+
+class Workbench:
+    """Computes for one browser, in a physics world of its own; used by one thread at a time."""
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+        self._world: BulletWorld | None = None
+
+    def close(self) -> None:
+        """Free the physics world."""
+        if self._world:
+            self._world.close()
+            self._world = None
+
+    def world(self, scene: Scene) -> BulletWorld:
+        """Return a world with the scene's robots, obstacles and object; its tasks do not matter."""
+        old = self._world
+        if old and old.scene.robots is scene.robots and old.scene.obstacles is scene.obstacles:
+            return old
+        self.close()
+        self._world = BulletWorld(scene)
+        return self._world
+
+    def map(self, request: MapRequest, progress: Progress) -> MapResult:
+        """Return the map of a request, computed unless it is known."""
+        known = self.store.map(request)
+        if known:
+            return known
+        scene = request.moved_scene()
+        world = self.world(scene)
+        contacts = self._contacts(world, request)
+        the_map = create_map(scene, request.arm, request.task, world=world, progress=progress)
+        result = MapResult(request, the_map, contacts)
+        self.store.keep(result)
+        return result
+
+    def _contacts(self, world: BulletWorld, request: MapRequest) -> tuple[str, ...]:
+        """Say what the object is inside of, deepest first, each obstacle once."""
+        world.set_object(request.T_world_object)
+        deepest: dict[str, str] = {}
+        for c in world.object_contacts():
+            depth = c.depth - world.margin
+            if depth > RESTING_DEPTH:
+                deepest.setdefault(c.b.body, f"{c.a.body} is {1e3 * depth:.0f} mm inside {c.b.body}")
+        return tuple(deepest.values())
+
+    def sequential(
+        self, scene: Scene, poses: Mapping[str, ObjectPose], arm: str, progress: Progress
+    ) -> PlanResult:
+        """Find one grasp of an arm for all tasks it does alone."""
+        tasks = [task.name for task in scene.tasks.values() if task.arms == (arm,)]
+        maps = self._maps([MapRequest(scene, arm, task, poses.get(task)) for task in tasks], progress)
+        known = {task: result.map for (task, _), result in maps.items()}
+        return _shown(plan_sequential(moved(scene, poses), arm, known), scene, maps)
+
+    def bimanual(
+        self, scene: Scene, poses: Mapping[str, ObjectPose], task: str, progress: Progress
+    ) -> PlanResult:
+        """Place all arms of a task on the object."""
+        arms = scene.task(task).arms
+        if len(arms) < 2:  # says that one arm is not enough before anything is computed
+            plan_bimanual(scene, task)
+        requests = [MapRequest(scene, arm, task, poses.get(task)) for arm in arms]
+        share = len(arms) / (len(arms) + 1)
+        maps = self._maps(requests, lambda x: progress(x * share))
+        known = {arm: result.map for (_, arm), result in maps.items()}
+        plan = plan_bimanual(
+            moved(scene, poses), task, known, progress=lambda x: progress(share + x * (1 - share))
+        )
+        return _shown(plan, scene, maps)
+
+    def _maps(self, requests: list[MapRequest], progress: Progress) -> dict[tuple[str, str], MapResult]:
+        """Compute several maps; keyed by task and arm."""
+        maps = {}
+        for k, request in enumerate(requests):
+            part = lambda share, k=k: progress((k + share) / len(requests))  # noqa: E731
+            maps[request.task, request.arm] = self.map(request, part)
+        return maps
+
+
+def _check_visuals(scene: Scene) -> None:
+    """Read everything that is shown, so that what cannot be read is known now."""
+    for robot in scene.robots.values():
+        link_visuals(robot.model.path)
+    for o in scene.obstacles:
+        if o.kind == "urdf" and o.path:
+            link_visuals(o.path)
+        elif o.kind == "mesh" and o.path:
+            read_mesh(o.path, f"obstacle {o.name}")
+
+
+def _shown(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], MapResult]) -> PlanResult:
+    prints = {
+        (task.name, hold.arm): _print(scene, maps[task.name, hold.arm].map, hold)
+        for task in plan.tasks
+        for hold in task.holds
+    }
+    return PlanResult(plan, maps, prints)
+
+
+def _print(scene: Scene, m: FeasibilityMap, hold: Hold) -> np.ndarray:
+    """Return the cells (H, A) under the hand, in the object's frame."""
+    row, column = m.manifold.cell(hold.grasp.h, hold.grasp.theta)
+    roll = ROLLS.index(hold.grasp.roll)
+    return scene.arm(hold.arm).handprint(m.manifold, row, roll).on(m.manifold, column)

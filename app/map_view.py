@@ -1,0 +1,163 @@
+"""The unwrapped map as a picture with axes and a legend: small PNGs inside HTML, crisp at any size.
+
+The picture is drawn in the object's coordinates: h upwards, θ from -180° to 180°. It has four
+columns a degree, so a turn by a step of the page's slider rolls it by exactly one column.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+from PIL import Image
+
+from app.palette import REASONS, faded
+from app.state import PlanResult, RollChoice, State
+from symgrasp.feasibility import FeasibilityMap
+from symgrasp.manifold import Manifold, wrap
+from symgrasp.plan import PlanTask
+from symgrasp.reason import Reason
+
+__all__ = ["COLUMNS", "Mark", "legend_html", "map_html", "plan_html", "sample_columns", "to_png"]
+
+COLUMNS = 1440
+"""Columns of a picture: four a degree."""
+
+PRINT_SHADE = len(Reason)
+"""Palette index of a shaded cell; the one after it is clear."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A grasp drawn on a map: h (m), θ (rad), and what to call it."""
+
+    h: float
+    theta: float
+    label: str = ""
+
+
+def sample_columns(manifold: Manifold) -> np.ndarray:
+    """Return the column (COLUMNS,) of the grid that each column of the picture shows."""
+    theta = -np.pi + (np.arange(COLUMNS) + 0.5) * (2 * np.pi / COLUMNS)
+    turned = np.mod(theta - manifold.theta_start, 2 * np.pi)
+    return np.floor(turned / manifold.dtheta).astype(int) % manifold.angles
+
+
+def to_png(indices: np.ndarray, stale: bool = False) -> bytes:
+    """Return a palette PNG of (H, W) reasons, top row first; indices beyond them shade and clear."""
+    colors = faded(REASONS) if stale else REASONS
+    image = Image.fromarray(np.ascontiguousarray(indices, dtype=np.uint8), "P")
+    image.putpalette([*colors.ravel().tolist(), 0, 0, 0, 255, 255, 255])
+    buffer = io.BytesIO()
+    alpha = bytes([255] * len(Reason) + [110, 0])
+    image.save(buffer, "PNG", compress_level=3, transparency=alpha)
+    return buffer.getvalue()
+
+
+def map_html(
+    m: FeasibilityMap,
+    roll: RollChoice,
+    marks: Sequence[Mark] = (),
+    prints: Sequence[np.ndarray] = (),
+    *,
+    stale: bool = False,
+    height: int = 230,
+    name: str = "map",
+) -> str:
+    """Draw one map with its axes.
+
+    Args:
+        m: the map.
+        roll: which rolls to show.
+        marks: grasps to circle.
+        prints: cells (H, A) to shade, over the grid that begins at -π.
+        stale: wash the colours out.
+        height: of the picture (px).
+        name: alternative text of the picture.
+    """
+    grid = m.manifold
+    picture = roll.reason(m)[::-1, sample_columns(grid)]
+    layers = [_img(to_png(picture, stale), name)]
+    still = Manifold(grid.profile, grid.heights, grid.angles)
+    for cells in prints:
+        shaded = np.where(cells[::-1, sample_columns(still)], PRINT_SHADE, PRINT_SHADE + 1)
+        layers.append(_img(to_png(shaded), "handprint"))
+    layers += [_circle(mark, grid) for mark in marks]
+    return (
+        f'<div class="sg-map" style="height:{height + 48}px">'
+        f'<div class="sg-picture">{"".join(layers)}</div>{_h_axis(grid, height)}{THETA_AXIS}</div>'
+    )
+
+
+def legend_html(m: FeasibilityMap, roll: RollChoice) -> str:
+    """List the reasons that occur, with their colours and how many cells have them."""
+    shown = roll.reason(m)
+    values, counts = np.unique(shown, return_counts=True)
+    rows = []
+    for value, count in sorted(zip(values.tolist(), counts.tolist(), strict=True), reverse=True):
+        reason = Reason(value)
+        share = f"{100 * count / shown.size:.0f}" if 200 * count >= shown.size else "<1"
+        rows.append(
+            f'<div><i style="background:{reason.color}"></i><span>{escape(reason.label)}</span>'
+            f"<small>{count} · {escape(share)} %</small></div>"
+        )
+    return f'<div class="sg-legend">{"".join(rows)}</div>'
+
+
+def plan_html(plan: PlanResult, state: State) -> str:
+    """Draw the maps of a plan, each turned by its δ, with the grasp in all and the prints under it."""
+    blocks = []
+    for k, task in enumerate(plan.plan.tasks):
+        several = len(task.holds) > 1
+        prints = [plan.prints[task.name, hold.arm] for hold in task.holds] if several else []
+        for hold in task.holds:
+            m = plan.maps[task.name, hold.arm].map.shift(task.delta)
+            roll = RollChoice.ZERO if np.cos(hold.grasp.roll) > 0 else RollChoice.HALF_TURN
+            marks = [Mark(h.grasp.h, h.grasp.theta, h.arm if several else "") for h in task.holds]
+            now = " sg-now" if k == state.step and hold.arm == state.arm else ""
+            name = f"plan map {task.name} {hold.arm}"
+            blocks.append(f'<div class="sg sg-small{now}">{_plan_title(task, hold.arm, roll)}</div>')
+            blocks.append(map_html(m, roll, marks, prints, height=96, name=name))
+    return "".join(blocks)
+
+
+def _plan_title(task: PlanTask, arm: str, roll: RollChoice) -> str:
+    turn = f"object turned by {np.rad2deg(task.delta):.1f}°, " if len(task.holds) == 1 else ""
+    return f"{escape(task.name)} · {escape(arm)} · {turn}roll {roll.value}"
+
+
+def _img(png: bytes, name: str) -> str:
+    data = base64.b64encode(png).decode()
+    return f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">'
+
+
+def _circle(mark: Mark, grid: Manifold) -> str:
+    profile = grid.profile
+    left = 100 * (float(wrap(mark.theta)) + np.pi) / (2 * np.pi)
+    bottom = f"bottom:{100 * (mark.h - profile.h_min) / (profile.h_max - profile.h_min):.3f}%"
+    circle = f'<span class="sg-mark" style="left:{left:.3f}%;{bottom}"></span>'
+    if not mark.label:
+        return circle
+    side = f"right:{100 - left:.3f}%" if left > 75 else f"left:{left:.3f}%"
+    return circle + f'<span class="sg-label" style="{side};{bottom}">{escape(mark.label)}</span>'
+
+
+def _h_axis(grid: Manifold, height: int) -> str:
+    low, high = 100 * grid.profile.h_min, 100 * grid.profile.h_max
+    most = max(2, height / 28)
+    step = next(s for s in (0.5, 1, 2, 5, 10, 20, 50, 100, np.inf) if (high - low) / s <= most)
+    ticks = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step
+    labels = (f'<span style="bottom:{100 * (h - low) / (high - low):.2f}%">{h + 0.0:g}</span>' for h in ticks)
+    return f'<div class="sg-h">{"".join(labels)}<b>h (cm)</b></div>'
+
+
+def _theta_axis() -> str:
+    labels = (f'<span style="left:{(a + 180) / 3.6:.3f}%">{a}</span>' for a in range(-180, 181, 60))
+    return f'<div class="sg-theta">{"".join(labels)}<b>θ (°)</b></div>'
+
+
+THETA_AXIS = _theta_axis()

@@ -1,0 +1,107 @@
+"""What robots look like: the visual shapes of a URDF as one GLB for each link."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import trimesh
+import yourdfpy
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual import ColorVisuals, TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from symgrasp.errors import MeshError
+from symgrasp.robot import RobotModel
+
+__all__ = ["link_visuals"]
+
+Color = tuple[int, ...]
+
+PLAIN: Color = (200, 202, 206, 255)
+"""Colour of shapes that neither the URDF nor the mesh gives one."""
+
+WHITEST = 235
+"""Brightest channel shown: pure white has no shading left to tell its shape."""
+
+
+@lru_cache(maxsize=16)
+def link_visuals(path: Path) -> dict[str, bytes]:
+    """Return link name → GLB in the link frame, of every link that can be seen.
+
+    Args:
+        path: the URDF file.
+
+    Raises:
+        UrdfError: the URDF or one of its meshes is missing or unusable.
+        MeshError: a mesh cannot be read.
+    """
+    model = RobotModel(path)
+    urdf = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
+    materials = [*urdf.robot.materials, *(v.material for link in urdf.robot.links for v in link.visuals)]
+    named = {m.name: m.color.rgba for m in reversed(materials) if m is not None and m.color is not None}
+    glbs = {}
+    for link in urdf.robot.links:
+        scene = trimesh.Scene()
+        for visual in link.visuals:
+            _add_visual(scene, visual, model, link.name, named)
+        if scene.geometry:
+            glbs[link.name] = export_glb(scene, include_normals=True)
+    return glbs
+
+
+def _add_visual(
+    scene: trimesh.Scene,
+    visual: yourdfpy.Visual,
+    model: RobotModel,
+    link: str,
+    named: Mapping[str | None, np.ndarray],
+) -> None:
+    meshes = _shapes(visual, model, link)
+    own = [_own_color(mesh) for mesh in meshes]
+    given = named.get(visual.material.name) if visual.material is not None else None
+    # A mesh of several colours knows better than the one colour of the URDF; a mesh of one
+    # colour (often an exporter's grey) does not.
+    painted = len({color for color in own if color}) > 1
+    origin = np.eye(4) if visual.origin is None else visual.origin
+    for mesh, color in zip(meshes, own, strict=True):
+        if given is not None and not painted:
+            color = tuple(round(255 * c) for c in given)
+        paint = np.minimum(color or PLAIN, [WHITEST, WHITEST, WHITEST, 255]).astype(np.uint8)
+        material = PBRMaterial(baseColorFactor=paint, metallicFactor=0.0, roughnessFactor=0.55)
+        mesh.visual = TextureVisuals(material=material)
+        mesh.merge_vertices(merge_tex=True, merge_norm=False)
+        scene.add_geometry(mesh, transform=origin)
+
+
+def _own_color(mesh: trimesh.Trimesh) -> Color | None:
+    if isinstance(mesh.visual, TextureVisuals):
+        return tuple(int(c) for c in mesh.visual.material.main_color) if mesh.visual.defined else None
+    if isinstance(mesh.visual, ColorVisuals) and mesh.visual.defined:
+        return tuple(int(c) for c in mesh.visual.main_color)
+    return None
+
+
+def _shapes(visual: yourdfpy.Visual, model: RobotModel, link: str) -> list[trimesh.Trimesh]:
+    geometry = visual.geometry
+    assert geometry is not None  # the parser gives every visual one
+    if geometry.box is not None:
+        return [trimesh.creation.box(extents=geometry.box.size)]
+    if geometry.cylinder is not None:
+        return [trimesh.creation.cylinder(geometry.cylinder.radius, geometry.cylinder.length)]
+    if geometry.sphere is not None:
+        return [trimesh.creation.icosphere(subdivisions=3, radius=geometry.sphere.radius)]
+    assert geometry.mesh is not None
+    path = model.mesh_path(geometry.mesh.filename, link)
+    try:
+        loaded = trimesh.load_scene(str(path), process=False)
+        meshes = [m for m in loaded.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
+    except Exception as error:  # trimesh raises whatever its many parsers raise
+        raise MeshError(path, f"link {link}: visual", str(error), "a readable mesh") from error
+    if not meshes:
+        raise MeshError(path, f"link {link}: visual", "no triangles", "a mesh with triangles")
+    for mesh in meshes:
+        mesh.apply_scale(np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3))
+    return meshes

@@ -1,0 +1,38 @@
+"""Colours of the page as arrays: of the reasons, and of what is drawn over them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from symgrasp.reason import Reason
+
+__all__ = ["INK", "PICK", "REASONS", "faded", "rgb", "to_linear"]
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Return the channels of ``#rrggbb``."""
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+REASONS = np.array([rgb(reason.color) for reason in Reason], dtype=np.uint8)
+"""(reasons, 3) sRGB."""
+
+INK = "#1d2733"
+"""Lines and labels."""
+
+PICK = "#e6007e"
+"""The picked grasp; no reason has a colour near it."""
+
+FADED_TO = np.array([236, 238, 241])
+
+
+def faded(colors: np.ndarray) -> np.ndarray:
+    """Return sRGB colours (..., 3) washed out, for a map that is out of date."""
+    return np.round(0.3 * colors + 0.7 * FADED_TO).astype(np.uint8)
+
+
+def to_linear(colors: np.ndarray) -> np.ndarray:
+    """Return sRGB colours (..., 3) as linear ones, which is what batched meshes take."""
+    share = np.asarray(colors) / 255
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.round(255 * linear).astype(np.uint8)

@@ -1,0 +1,187 @@
+"""One browser: its state, the thread that draws it, and the worker that computes for it."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import re
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import viser
+
+from app.compute import Store, Workbench
+from app.controls import PANELS_WIDTH, Controls
+from app.state import MapRequest, State
+from app.view import SceneView
+from app.worker import Job, Worker
+from symgrasp.errors import SymgraspError
+from symgrasp.feasibility import Progress
+from symgrasp.scene import Scene
+
+__all__ = ["Session"]
+
+log = logging.getLogger(__name__)
+
+
+class Session:
+    """Everything one browser owns; ended by `close`.
+
+    Callbacks of widgets only change the state, which takes no time, so they never queue up. One
+    thread draws the newest state, skipping those in between; another computes.
+
+    Args:
+        client: the browser.
+        store: what all browsers share.
+    """
+
+    def __init__(self, client: viser.ClientHandle, store: Store) -> None:
+        self.client, self.store = client, store
+        self.state: State | None = None
+        self._tickets = itertools.count(1)
+        self._changed = threading.Condition()
+        self._drawn: State | None = None
+        self._write_inputs = self._move_gizmo = True
+        self._closed = False
+        self.bench = Workbench(store)
+        self.worker = Worker(f"worker {client.client_id}", self.bench.close)
+        self.controls = Controls(client, self, store.names)
+        self.view = SceneView(
+            client,
+            PANELS_WIDTH,
+            on_surface=lambda i, j: self.change(lambda s: s.choose_surface_cell(i, j)),
+            on_board=lambda i, j: self.change(lambda s: s.choose_cell(i, j)),
+            on_drag=lambda pose: self.change(lambda s: s.drag(pose), "gizmo"),
+        )
+        self._painter = threading.Thread(target=self._paint, name=f"painter {client.client_id}", daemon=True)
+        self._painter.start()
+        self.open_scene(store.first)
+
+    def close(self) -> None:
+        """End both threads and free the physics world; a second call does nothing."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self.worker.close()
+
+    # -- what widgets ask for ---------------------------------------------------------------
+
+    def change(self, change: Callable[[State], State], origin: str = "") -> None:
+        """Apply a change; see `app.controls.Actions`."""
+        with self._changed:
+            if self.state is None or self._closed:
+                return
+            try:
+                state = change(self.state)
+            except SymgraspError as error:
+                state = self.state.failed(str(error))
+            self._take(state, origin)
+
+    def open_scene(self, name: str) -> None:
+        """Load a scene on the worker and show it."""
+
+        def done(ticket: int, scene: Scene) -> None:
+            with self._changed:
+                if self.state is None or (self.state.busy and self.state.busy.ticket == ticket):
+                    self._take(State.of(scene, name), "")
+
+        self._submit(f"Loading {name}", lambda _: self.store.scene(name), done)
+
+    def plan(self, kind: str) -> None:
+        """Run a planner on the worker."""
+        state = self.state
+        if state is None:
+            return
+        scene, poses = state.scene, state.poses
+        if kind == "sequential":
+            run = lambda progress: self.bench.sequential(scene, poses, state.arm, progress)  # noqa: E731
+        else:
+            together = [t.name for t in scene.tasks.values() if len(t.arms) > 1]
+            task = together[0] if together and state.task not in together else state.task
+            run = lambda progress: self.bench.bimanual(scene, poses, task, progress)  # noqa: E731
+        self._submit("Planning", run, lambda t, plan: self.change(lambda s: s.plan_arrived(t, plan)))
+
+    def stop_or_retry(self) -> None:
+        """Stop the computation, the picture stays as it is; or begin again what was stopped."""
+        self.change(lambda s: s.stopped(s.busy.ticket) if s.busy else s.retry())
+
+    def download(self) -> None:
+        """Send the plan to the browser."""
+        if self.state and self.state.plan:
+            plan = self.state.plan.plan
+            name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
+            self.client.send_file_download(f"{name}.json", plan.to_json().encode(), save_immediately=True)
+
+    # -- computing --------------------------------------------------------------------------
+
+    def _take(self, state: State, origin: str) -> None:
+        """Make a state the current one, and compute what it lacks; the lock is held."""
+        if state is self.state:
+            return
+        if self.state is None or state.inputs != self.state.inputs:
+            self._write_inputs |= origin != "inputs"
+            self._move_gizmo |= origin != "gizmo"
+        self.state = state
+        self._changed.notify()
+        request = state.wanted
+        if request is None:
+            if state.is_obsolete:
+                self.state = replace(state, busy=None)
+            if self.state.busy is None:
+                self.worker.cancel()
+        elif known := self.store.map(request):
+            self.worker.cancel()
+            self.state = replace(state, busy=None, result=known)
+        else:
+            self._submit(
+                f"Computing the map of {request.task}",
+                lambda progress: self.bench.map(request, progress),
+                lambda ticket, result: self.change(lambda s: s.map_arrived(ticket, result)),
+                request,
+            )
+
+    def _submit(
+        self,
+        label: str,
+        run: Callable[[Progress], Any],
+        done: Callable[[int, Any], None],
+        request: MapRequest | None = None,
+    ) -> None:
+        """Give the worker something to do, in place of what it does now."""
+        ticket = next(self._tickets)
+        self.change(lambda s: s.started(ticket, label, request))
+        self.worker.submit(
+            Job(
+                run=run,
+                progress=lambda share: self.change(lambda s: s.progressed(ticket, share)),
+                done=lambda result: done(ticket, result),
+                failed=lambda problem: self._failed(ticket, problem),
+            )
+        )
+
+    def _failed(self, ticket: int, problem: str) -> None:
+        with self._changed:
+            self._write_inputs = True  # a scene that could not be loaded is still chosen in its widget
+        self.change(lambda s: s.stopped(ticket, problem))
+
+    # -- drawing ----------------------------------------------------------------------------
+
+    def _paint(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self.state is not self._drawn)
+                if self._closed:
+                    return
+                state, write_inputs, move_gizmo = self.state, self._write_inputs, self._move_gizmo
+                self._drawn, self._write_inputs, self._move_gizmo = state, False, False
+            assert state is not None
+            try:
+                self.controls.show(state, write_inputs=write_inputs)
+                self.view.show(state, move_gizmo=move_gizmo)
+            except Exception as error:  # one bad picture must not end the page
+                log.exception("a picture could not be drawn")
+                text = f"the picture could not be drawn: {type(error).__name__}: {error}"
+                if state.problem != text:
+                    self.change(lambda s, text=text: s.failed(text))

@@ -1,0 +1,429 @@
+"""What one browser shows, as plain data, and every change to it: no widgets, no threads, no I/O.
+
+The object stands at ``T_world_object = base · Rz(delta)``: the base pose is what a map is
+computed for, and δ, the turn about the object's own axis, only shifts that map (equation 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+
+from symgrasp.errors import InputError
+from symgrasp.feasibility import Cell, FeasibilityMap
+from symgrasp.manifold import wrap
+from symgrasp.plan import Plan, PlanTask
+from symgrasp.poses import Array, axis_frame, rotation_z, spin
+from symgrasp.scene import Scene, Task
+
+__all__ = ["Busy", "MapRequest", "MapResult", "ObjectPose", "Pick", "PlanResult", "RollChoice", "State"]
+
+GIZMO_NOISE = 1e-6
+"""Change of position (m) or axis below which the gizmo only turned: browsers send rounded numbers."""
+
+
+@dataclass(frozen=True)
+class ObjectPose:
+    """A pose as a person sets it: where the bottom stands, which way the axis leans, the spin.
+
+    Attributes:
+        x, y, z: origin of the object (m).
+        lean: angle (rad) between the axis and the world's z.
+        towards: azimuth (rad) that the axis leans towards.
+        spin: turn (rad) about the object's own axis.
+    """
+
+    x: float
+    y: float
+    z: float
+    lean: float = 0.0
+    towards: float = 0.0
+    spin: float = 0.0
+
+    @staticmethod
+    def of(pose: Array) -> ObjectPose:
+        """Take a pose (4, 4) apart."""
+        axis = pose[:3, 2]
+        lean = float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2]))
+        towards = float(np.arctan2(axis[1], axis[0])) if lean > 1e-9 else 0.0
+        x, y, z = pose[:3, 3].tolist()
+        return ObjectPose(x, y, z, lean, towards, spin(pose))
+
+    def matrix(self) -> Array:
+        """Return the pose (4, 4)."""
+        sine = np.sin(self.lean)
+        pose = np.eye(4)
+        pose[:3, 2] = [sine * np.cos(self.towards), sine * np.sin(self.towards), np.cos(self.lean)]
+        pose[:3, 3] = [self.x, self.y, self.z]
+        return axis_frame(pose) @ rotation_z(self.spin)
+
+
+class RollChoice(Enum):
+    """Which of the two rolls a map shows; the value is what the page calls it."""
+
+    EITHER = "either"
+    ZERO = "0°"
+    HALF_TURN = "180°"
+
+    def reason(self, m: FeasibilityMap) -> np.ndarray:
+        """Return the reasons (H, A) that are shown; of either roll the one that got furthest."""
+        if self is RollChoice.EITHER:
+            return m.reason.max(axis=0)
+        return m.reason[0 if self is RollChoice.ZERO else 1]
+
+    def roll(self, m: FeasibilityMap, row: int, column: int) -> int:
+        """Return the index of the roll that `reason` shows at a cell."""
+        if self is RollChoice.EITHER:
+            return int(m.reason[:, row, column].argmax())
+        return 0 if self is RollChoice.ZERO else 1
+
+
+@dataclass(frozen=True)
+class MapRequest:
+    """What a map is computed for; equal requests have equal maps.
+
+    Attributes:
+        scene: the scene as loaded.
+        arm, task: names in it.
+        pose: where the object was moved to, None where the scene puts it.
+    """
+
+    scene: Scene
+    arm: str
+    task: str
+    pose: ObjectPose | None = None
+
+    @property
+    def T_world_object(self) -> Array:
+        """The base pose (4, 4)."""
+        return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
+
+    def moved_scene(self) -> Scene:
+        """Return the scene with the task moved there."""
+        return moved(self.scene, {self.task: self.pose} if self.pose else {})
+
+
+def moved(scene: Scene, poses: Mapping[str, ObjectPose]) -> Scene:
+    """Return the scene with tasks moved to other poses."""
+    for name, pose in poses.items():
+        scene = scene.with_task(Task(name, scene.task(name).arms, pose.matrix()))
+    return scene
+
+
+@dataclass(frozen=True, eq=False)
+class MapResult:
+    """A computed map, and what the object is inside of at that pose (one phrase each)."""
+
+    request: MapRequest
+    map: FeasibilityMap
+    contacts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """A plan and what is needed to show it.
+
+    Attributes:
+        plan: the plan.
+        maps: for every (task, arm) the map it was made from, at δ = 0.
+        prints: for every (task, arm) the cells (H, A) under the hand.
+    """
+
+    plan: Plan
+    maps: Mapping[tuple[str, str], MapResult]
+    prints: Mapping[tuple[str, str], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A grasp that was picked, in the object's frame: h (m), θ (rad), and the roll unless open."""
+
+    h: float
+    theta: float
+    roll: int | None = None
+
+
+@dataclass(frozen=True)
+class Busy:
+    """A computation under way.
+
+    Attributes:
+        ticket: number of the computation; the last words of an earlier one do not count.
+        label: what is computed.
+        request: the map it computes, None for anything else.
+        share: how much of it is done.
+    """
+
+    ticket: int
+    label: str
+    request: MapRequest | None = None
+    share: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One browser's scene, pose, map, pick and plan; a change returns a new one.
+
+    Attributes:
+        scene: the scene as loaded.
+        scene_name: what it was chosen by.
+        task, arm: the names chosen.
+        roll: the rolls shown.
+        poses: task → base pose, of the tasks that were moved.
+        delta: turn (rad) of the object about its axis.
+        result: the newest map, maybe of an earlier request.
+        refused: the request whose computation was cancelled or failed: not tried again unasked.
+        pick: the grasp picked.
+        plan: the newest plan.
+        step: which of its tasks is shown; None once the person has moved on.
+        busy: what is being computed.
+        problem: one line about what went wrong last.
+        gizmo: whether the handles that drag the object are seen.
+        board: whether the map is laid out in the scene as well.
+    """
+
+    scene: Scene
+    scene_name: str
+    task: str
+    arm: str
+    roll: RollChoice = RollChoice.EITHER
+    poses: Mapping[str, ObjectPose] = field(default_factory=dict)
+    delta: float = 0.0
+    result: MapResult | None = None
+    refused: MapRequest | None = None
+    pick: Pick | None = None
+    plan: PlanResult | None = None
+    step: int | None = None
+    busy: Busy | None = None
+    problem: str = ""
+    gizmo: bool = False
+    board: bool = True
+
+    @staticmethod
+    def of(scene: Scene, name: str) -> State:
+        """Return the first state of a scene."""
+        task = scene.task()
+        return State(scene, name, task.name, task.arms[0])
+
+    # -- what follows from it ---------------------------------------------------------------
+
+    @cached_property
+    def request(self) -> MapRequest:
+        """The map that belongs to the task, arm and base pose."""
+        return MapRequest(self.scene, self.arm, self.task, self.poses.get(self.task))
+
+    @cached_property
+    def base(self) -> ObjectPose:
+        """The object's base pose."""
+        return ObjectPose.of(self.request.T_world_object)
+
+    @cached_property
+    def T_world_object(self) -> Array:
+        """Where the object stands (4, 4)."""
+        return self.request.T_world_object @ rotation_z(self.delta)
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the map shown is the one for the object's pose."""
+        return self.result is not None and self.result.request == self.request
+
+    @property
+    def wanted(self) -> MapRequest | None:
+        """The map to begin computing now; while a plan is made, its maps are."""
+        if self.is_current or self.refused == self.request:
+            return None
+        if self.busy and self.busy.request in (None, self.request):
+            return None
+        return self.request
+
+    @property
+    def is_obsolete(self) -> bool:
+        """Whether a map is being computed that nobody waits for any more."""
+        return bool(self.busy and self.busy.request and self.busy.request != self.request)
+
+    @property
+    def inputs(self) -> tuple[object, ...]:
+        """Everything that a widget or the gizmo shows and can change."""
+        return (
+            self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick, self.step,
+            self.gizmo, self.board,
+        )  # fmt: skip
+
+    @cached_property
+    def map(self) -> FeasibilityMap | None:
+        """The map over the object as it is turned; it may be of an earlier pose."""
+        return self.result.map.shift(self.delta) if self.result else None
+
+    @cached_property
+    def cell(self) -> Cell | None:
+        """The cell of `map` that holds the pick."""
+        if self.pick is None or self.map is None:
+            return None
+        row, column = self.map.manifold.cell(self.pick.h, self.pick.theta)
+        roll = self.roll.roll(self.map, row, column) if self.pick.roll is None else self.pick.roll
+        return Cell(roll, row, column)
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """What the object is inside of."""
+        return self.result.contacts if self.result and self.is_current else ()
+
+    @cached_property
+    def shown(self) -> PlanTask | None:
+        """The task of the plan that is shown."""
+        return self.plan.plan.tasks[self.step] if self.plan and self.step is not None else None
+
+    def moved_scene(self) -> Scene:
+        """Return the scene with all tasks where they were moved to."""
+        return moved(self.scene, self.poses)
+
+    # -- changes ----------------------------------------------------------------------------
+
+    def choose_task(self, name: str) -> State:
+        """Show another task, with its first arm unless the chosen one takes part."""
+        task = self.scene.task(name)
+        if name == self.task:
+            return self
+        arm = self.arm if self.arm in task.arms else task.arms[0]
+        return replace(self, task=name, arm=arm, delta=0.0, step=None, problem="")
+
+    def choose_arm(self, name: str) -> State:
+        """Show another arm's map; of a plan that is shown, that arm's grasp."""
+        state = replace(self, arm=self.scene.arm(name).name, problem="")
+        in_plan = self.shown and any(hold.arm == name for hold in self.shown.holds)
+        return state.show_step(self.step or 0) if in_plan else replace(state, step=None)
+
+    def choose_roll(self, roll: RollChoice) -> State:
+        """Show other rolls; a pick keeps its place and takes the roll shown."""
+        pick = replace(self.pick, roll=None) if self.pick else None
+        return replace(self, roll=roll, pick=pick)
+
+    def turn(self, delta: float) -> State:
+        """Turn the object to δ (rad) about its axis: nothing is recomputed."""
+        return replace(self, delta=float(_finite("rotation", delta)), step=None, problem="")
+
+    def move(self, **changes: float) -> State:
+        """Move the object: fields of `ObjectPose`, in m and rad. A plan for other poses is dropped."""
+        for name, value in changes.items():
+            _finite(name, value)
+        pose = replace(self.base, **changes)
+        if pose == self.base:
+            return self
+        return replace(self._without_plan(), poses={**self.poses, self.task: pose})
+
+    def drag(self, pose: Array) -> State:
+        """Take over the pose (4, 4) of the gizmo; a turn about the axis alone becomes δ."""
+        new = ObjectPose.of(pose)
+        delta = float(wrap(new.spin - self.base.spin))
+        shift = np.linalg.norm(pose[:3, 3] - self.T_world_object[:3, 3])
+        tilt = np.linalg.norm(pose[:3, 2] - self.T_world_object[:3, 2])
+        if max(shift, tilt) < GIZMO_NOISE:
+            return self.turn(delta)
+        state = self.move(x=new.x, y=new.y, z=new.z, lean=new.lean, towards=new.towards)
+        return replace(state, delta=delta)
+
+    def reset_pose(self) -> State:
+        """Put the object of this task back where the scene has it."""
+        poses = {name: pose for name, pose in self.poses.items() if name != self.task}
+        state = self if len(poses) == len(self.poses) else self._without_plan()
+        return replace(state, poses=poses, delta=0.0, step=None, problem="")
+
+    def _without_plan(self) -> State:
+        """Drop the plan, also one that is being made."""
+        busy = self.busy if self.busy and self.busy.request else None
+        return replace(self, plan=None, step=None, busy=busy, refused=None, problem="")
+
+    def choose(self, h: float, theta: float) -> State:
+        """Pick the grasp at height h (m) and angle θ (rad) in the object's frame."""
+        profile = self.scene.profile
+        if not profile.h_min <= _finite("h", h) <= profile.h_max:
+            expected = f"{100 * profile.h_min:g} to {100 * profile.h_max:g} cm"
+            raise InputError("grasp", "h (cm)", round(100 * h, 3), expected)
+        theta = float(wrap(_finite("θ", theta)))
+        return replace(self, pick=Pick(float(h), theta), step=None, problem="")
+
+    def choose_cell(self, row: int, column: int) -> State:
+        """Pick the centre of a cell of the map as it is shown."""
+        if self.map is None:
+            return self
+        manifold = self.map.manifold
+        return self.choose(float(manifold.h[row]), float(manifold.theta[column]))
+
+    def choose_surface_cell(self, row: int, column: int) -> State:
+        """Pick a cell as it lies on the object's surface, whose colours do not turn with the object."""
+        if self.result is None:
+            return self
+        _, turned = self.result.map.manifold.shift(self.delta)
+        return self.choose_cell(row, (column - turned) % self.result.map.manifold.angles)
+
+    def clear_pick(self) -> State:
+        """Let go: the arms park."""
+        return replace(self, pick=None, step=None)
+
+    def started(self, ticket: int, label: str, request: MapRequest | None = None) -> State:
+        """A computation began; it replaces the one before."""
+        problem = self.problem if request else ""
+        return replace(self, busy=Busy(ticket, label, request), problem=problem)
+
+    def progressed(self, ticket: int, share: float) -> State:
+        """The computation is this far."""
+        if self.busy is None or self.busy.ticket != ticket:
+            return self
+        return replace(self, busy=replace(self.busy, share=share))
+
+    def map_arrived(self, ticket: int, result: MapResult) -> State:
+        """Take a map, unless it is for an earlier request."""
+        busy = None if self.busy and self.busy.ticket == ticket else self.busy
+        if result.request != self.request:
+            return replace(self, busy=busy)
+        return replace(self, busy=busy, result=result, refused=None)
+
+    def stopped(self, ticket: int, problem: str = "") -> State:
+        """The computation was cancelled or failed: do not begin it again by itself."""
+        if self.busy is None or self.busy.ticket != ticket:
+            return self
+        refused = None if self.is_current else self.request
+        return replace(self, busy=None, refused=refused, problem=problem)
+
+    def failed(self, problem: str) -> State:
+        """Something that was asked for cannot be done; nothing else changes."""
+        return replace(self, problem=problem)
+
+    def retry(self) -> State:
+        """Compute the map after all."""
+        return replace(self, refused=None, problem="")
+
+    def plan_arrived(self, ticket: int, plan: PlanResult) -> State:
+        """Take a plan and show its first task, unless nobody waits for it any more."""
+        if self.busy is None or self.busy.ticket != ticket:
+            return self
+        return replace(self, plan=plan, busy=None, problem="").show_step(0)
+
+    def show_step(self, step: int) -> State:
+        """Show a task of the plan: the object turned by δᵢ and the grasp on its map."""
+        if self.plan is None:
+            return self
+        step = int(np.clip(step, 0, len(self.plan.plan.tasks) - 1))
+        task = self.plan.plan.tasks[step]
+        hold = next((h for h in task.holds if h.arm == self.arm), task.holds[0])
+        pick = Pick(hold.grasp.h, hold.grasp.theta, 0 if np.cos(hold.grasp.roll) > 0 else 1)
+        return replace(
+            self,
+            step=step,
+            task=task.name,
+            arm=hold.arm,
+            delta=task.delta,
+            pick=pick,
+            result=self.plan.maps[task.name, hold.arm],
+            problem="",
+        )
+
+
+def _finite(name: str, value: float) -> float:
+    if not np.isfinite(value):
+        raise InputError("page", name, value, "a finite number")
+    return value
