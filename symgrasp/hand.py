@@ -1,4 +1,4 @@
-"""Parallel hands as data, how they fit a profile, and the prints they leave on the manifold.
+"""Parallel hands as data, and how they fit a profile.
 
 The tool frame of a hand, between the finger tips:
 
@@ -11,17 +11,14 @@ The tool frame of a hand, between the finger tips:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
-from symgrasp.manifold import ROLLS, Manifold, grasp_to_tool, wrap
-from symgrasp.poses import Array
 from symgrasp.profile import Profile
 
-__all__ = ["HANDS", "Hand", "Handprint", "handprint"]
+__all__ = ["HANDS", "Hand"]
 
 
 @dataclass(frozen=True)
@@ -93,107 +90,3 @@ HANDS: Mapping[str, Hand] = {
     ),
 }
 """The hands that a scene may name."""
-
-
-@dataclass(frozen=True, eq=False)
-class Handprint:
-    """The cells that a hand covers when it grasps row ``row`` at column 0.
-
-    Every point of the hand's bodies is projected onto (h, θ). Rows go on with the same height
-    beyond both ends of the object, so that hands that reach past an end are told apart as well.
-    Off the axis (h, θ) fixes the direction of a point seen from the axis, and a point on the
-    axis covers every angle; so hands whose prints share no cell do not touch.
-
-    Attributes:
-        cells: (rows, angles) bool, read-only; true where any point of the hand projects to.
-        first_row: the manifold's row (possibly negative) that ``cells[0]`` lies on.
-    """
-
-    cells: np.ndarray
-    first_row: int
-
-    def overlap(self, other: Handprint, columns: int) -> int:
-        """Return how many cells this print at column 0 shares with another at ``columns``."""
-        first = max(self.first_row, other.first_row)
-        last = min(self.first_row + len(self.cells), other.first_row + len(other.cells))
-        if first >= last:
-            return 0
-        mine = self.cells[first - self.first_row : last - self.first_row]
-        theirs = other.cells[first - other.first_row : last - other.first_row]
-        return int(np.count_nonzero(mine & np.roll(theirs, columns, axis=1)))
-
-    def on(self, manifold: Manifold, column: int) -> np.ndarray:
-        """Return the covered cells (heights, angles) of the object itself, at a column."""
-        covered = np.zeros((manifold.heights, manifold.angles), dtype=bool)
-        first, last = max(self.first_row, 0), min(self.first_row + len(self.cells), manifold.heights)
-        if first < last:
-            covered[first:last] = self.cells[first - self.first_row : last - self.first_row]
-        return np.roll(covered, column, axis=1)
-
-
-def handprint(bodies: Sequence[Array], manifold: Manifold, row: int, roll: int, standoff: float) -> Handprint:
-    """Project the bodies of a hand that grasps ``row`` at column 0 onto the manifold.
-
-    Exact for each convex body and row, then rounded up to whole cells: the slice of a convex
-    body between two heights is convex, so seen from the axis it covers one interval of angles,
-    which its corners bound.
-
-    Args:
-        bodies: vertices (n, 3) of each convex body in the tool frame, at the right opening.
-        manifold: the grid.
-        row: height index of the grasp.
-        roll: index into `ROLLS`.
-        standoff: distance (m) of the tool frame from the axis.
-    """
-    T_object_tool = grasp_to_tool(np.eye(4), manifold.h[row], 0.0, ROLLS[roll], standoff)
-    placed = [points @ T_object_tool[:3, :3].T + T_object_tool[:3, 3] for points in bodies]
-    lowest = min(points[:, 2].min() for points in placed)
-    highest = max(points[:, 2].max() for points in placed)
-    to_row = lambda h: int(np.floor((h - manifold.profile.h_min) / manifold.dh))  # noqa: E731
-    # A hair is added on both sides so that rounding never loses a touched cell.
-    first, last = to_row(lowest - 1e-9), to_row(highest + 1e-9)
-    cells = np.zeros((last - first + 1, manifold.angles), dtype=bool)
-    for points in placed:
-        edges = _edges(points)
-        for k in range(len(cells)):
-            bottom = manifold.profile.h_min + (first + k) * manifold.dh
-            corners = _slab_corners(points, edges, bottom - 1e-9, bottom + manifold.dh + 1e-9)
-            if len(corners):
-                cells[k] |= _covered_columns(corners, manifold)
-    cells.setflags(write=False)
-    return Handprint(cells, first)
-
-
-def _edges(points: Array) -> np.ndarray:
-    """Return the index pairs (m, 2) of the edges of the convex hull's triangles."""
-    triangles = ConvexHull(points).simplices
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    return np.unique(np.sort(pairs, axis=1), axis=0)
-
-
-def _slab_corners(points: Array, edges: np.ndarray, bottom: float, top: float) -> Array:
-    """Return the xy corners (n, 2) of a convex body cut to ``bottom <= z <= top``."""
-    inside = (points[:, 2] >= bottom) & (points[:, 2] <= top)
-    corners = [points[inside, :2]]
-    a, b = points[edges[:, 0]], points[edges[:, 1]]
-    for level in (bottom, top):
-        crosses = (a[:, 2] - level) * (b[:, 2] - level) < 0
-        s = (level - a[crosses, 2]) / (b[crosses, 2] - a[crosses, 2])
-        corners.append(a[crosses, :2] + s[:, None] * (b[crosses, :2] - a[crosses, :2]))
-    return np.concatenate(corners)
-
-
-def _covered_columns(corners: Array, manifold: Manifold) -> np.ndarray:
-    """Return the columns (angles,) covered by the convex hull of xy points, grasp at column 0."""
-    distance = np.hypot(corners[:, 0], corners[:, 1])
-    angles = np.arctan2(corners[:, 1], corners[:, 0])
-    relative = wrap(angles - angles[0])
-    low, high = relative.min() - 1e-9, relative.max() + 1e-9
-    # A convex region spans half a turn or more exactly when it holds the axis.
-    if distance.min() < 1e-9 or high - low >= np.pi:
-        return np.ones(manifold.angles, dtype=bool)
-    columns = np.zeros(manifold.angles, dtype=bool)
-    first = int(np.floor((angles[0] + low) / manifold.dtheta + 0.5))
-    last = int(np.floor((angles[0] + high) / manifold.dtheta + 0.5))
-    columns[np.arange(first, last + 1) % manifold.angles] = True
-    return columns

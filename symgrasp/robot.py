@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from symgrasp.errors import InputError, UrdfError, one_of
 from symgrasp.files import resolve
-from symgrasp.hand import Hand, Handprint, handprint
+from symgrasp.hand import Hand
+from symgrasp.handprint import Handprint, handprint
 from symgrasp.manifold import Manifold
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, from_rotation, inverse, rotation_about

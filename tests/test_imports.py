@@ -11,7 +11,7 @@ import symgrasp
 
 ROOT = Path(symgrasp.__file__).parent
 ORDER = [
-    "errors", "files", "poses", "meshes", "profile", "manifold", "hand", "robot", "ik", "scene",
+    "errors", "files", "poses", "meshes", "profile", "manifold", "hand", "handprint", "robot", "ik", "scene",
     "reason", "pictures", "world", "feasibility", "engine", "planners", "plan", "cli", "__main__",
 ]  # fmt: skip
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility import Cell, FeasibilityMap, Progress
-from symgrasp.hand import Handprint
+from symgrasp.handprint import Handprint
 from symgrasp.planners.sequential import check_same_grid
 from symgrasp.robot import Arm
 
