@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,17 +14,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symgrasp import pictures
+from symgrasp.candidates import Candidate, Judge
 from symgrasp.errors import MapError, ProfileError
 from symgrasp.files import write_atomically
 from symgrasp.hand import Hand
-from symgrasp.ik import ClosedFormIK, Solutions
+from symgrasp.ik import ClosedFormIK
 from symgrasp.manifold import ROLLS, Manifold
-from symgrasp.poses import Array, inverse, rotation_z, translation
+from symgrasp.poses import Array, inverse, rotation_z
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm
 from symgrasp.scene import Scene
-from symgrasp.world import BulletWorld, Collision
+from symgrasp.world import BulletWorld
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,12 +36,6 @@ Progress = Callable[[float], None]
 """Told the finished share (0 to 1) of a long computation; may raise `Cancelled` to stop it."""
 
 FORMAT_VERSION = 1
-
-RETREAT_STEP = 0.01
-"""Largest step (m) between the poses that are checked along a retreat."""
-
-RETREAT_TURN = 0.5
-"""Largest change of a joint (rad) in one such step; more is another branch, not a motion."""
 
 
 class Cell(NamedTuple):
@@ -319,7 +314,7 @@ def create_map(
 
     with nullcontext(world) if world else BulletWorld(scene) as W:
         W.set_object(the_task.T_world_object)
-        judge = _Judge(W, the_arm, ik, scene.settings.approach)
+        judge = Judge(W, the_arm, ik, scene.settings.approach)
         for row, h in enumerate(grid.h):
             stage = fit(the_arm.hand, grid.profile, h)
             for roll, column in np.ndindex(len(ROLLS), grid.angles):
@@ -327,8 +322,8 @@ def create_map(
                 if stage is not None:
                     draft.reason[cell] = stage
                     continue
-                judge.opening = draft.opening[row]
-                draft.record(cell, *judge.verdict(T_base_tool[cell]))
+                candidates = judge.candidates(T_base_tool[cell], draft.opening[row])
+                draft.record(cell, *_verdict(candidates))
             if progress:
                 progress((row + 1) / grid.heights)
         for name in scene.robots:
@@ -345,55 +340,25 @@ def fit(hand: Hand, profile: Profile, h: float) -> Reason | None:
     return None
 
 
-class _Judge:
-    """Lines 5 to 9 of Algorithm 1: try every redundancy sample and branch of one tool pose."""
+def _verdict(candidates: Iterable[Candidate]) -> tuple[Reason, Candidate | None]:
+    """Return the furthest stage of the candidates of a cell, and the one that reached it.
 
-    def __init__(self, world: BulletWorld, arm: Arm, ik: ClosedFormIK, approach: float) -> None:
-        self.world, self.arm, self.ik = world, arm, ik
-        self.opening = 0.0
-        steps = int(np.ceil(approach / RETREAT_STEP - 1e-9))
-        self.retreat = [translation([0, 0, -approach * (k + 1) / steps]) for k in range(steps)]
+    The first feasible one ends the search; of those that collide at the same stage, the one that
+    came closest to being free counts.
+    """
+    reached, best = Reason.UNREACHABLE, None
+    for candidate in candidates:
+        if candidate.fate == Reason.FEASIBLE:
+            return candidate.fate, candidate
+        if candidate.fate > reached or (candidate.fate == reached and _shallower(candidate, best)):
+            reached, best = candidate.fate, candidate
+    return reached, best
 
-    def verdict(self, T_base_tool: Array) -> tuple[Reason, Collision | None, tuple[Solutions, int] | None]:
-        """Return the furthest stage, the shallowest collision at it, and the witness if free."""
-        reached, closest = Reason.UNREACHABLE, None
-        solutions = self.ik.solve(T_base_tool)
-        for k, q in enumerate(solutions.q):
-            stage, collision = Reason.JOINT_LIMITS, None
-            if solutions.inside[k]:
-                stage, collision = self._try(T_base_tool, q, int(solutions.sample[k]))
-                if stage == Reason.FEASIBLE:
-                    return stage, None, (solutions, k)
-            shallower = collision and (closest is None or collision.depth < closest.depth)
-            if stage > reached or (stage == reached and shallower):
-                reached, closest = stage, collision
-        return reached, closest, None
 
-    def _try(self, T_base_tool: Array, q: Array, sample: int) -> tuple[Reason, Collision | None]:
-        self.world.set_arm(self.arm, q, self.opening)
-        collision = self.world.first_collision(self.arm)
-        if collision:
-            return collision.reason, collision
-        for step in self.retreat:
-            follow = self._follow(T_base_tool @ step, q, sample)
-            if follow is None:
-                return Reason.APPROACH_BLOCKED, None
-            q = follow
-            self.world.set_arm(self.arm, q, self.opening)
-            collision = self.world.first_collision(self.arm)
-            if collision:
-                return Reason.APPROACH_BLOCKED, collision
-        return Reason.FEASIBLE, None
-
-    def _follow(self, T_base_tool: Array, q: Array, sample: int) -> Array | None:
-        """Return the configuration at the same φ that continues q to the next pose, if any does."""
-        solutions = self.ik.solve_sample(T_base_tool, sample)
-        candidates = solutions.q[solutions.inside]
-        if not len(candidates):
-            return None
-        turn = np.abs(candidates - q).max(axis=1)
-        nearest = int(turn.argmin())
-        return candidates[nearest] if turn[nearest] <= RETREAT_TURN else None
+def _shallower(candidate: Candidate, other: Candidate | None) -> bool:
+    if candidate.collision is None:
+        return False
+    return other is None or other.collision is None or candidate.collision.depth < other.collision.depth
 
 
 class _Draft:
@@ -411,21 +376,17 @@ class _Draft:
         self.depth = np.full(shape, np.nan)
         self.bodies: dict[str, int] = {}
 
-    def record(
-        self,
-        cell: Cell,
-        reason: Reason,
-        collision: Collision | None,
-        witness: tuple[Solutions, int] | None,
-    ) -> None:
+    def record(self, cell: Cell, reason: Reason, candidate: Candidate | None) -> None:
         self.reason[cell] = reason
-        if collision:
-            self.pair[cell] = [self._body(str(collision.a)), self._body(str(collision.b))]
-            self.depth[cell] = collision.depth
-        if witness:
-            solutions, k = witness
-            self.q[cell] = solutions.q[k]
-            self.sample[cell], self.branch[cell] = solutions.sample[k], solutions.branch[k]
+        if candidate is None:
+            return
+        if reason == Reason.FEASIBLE:
+            self.q[cell] = candidate.q
+            self.sample[cell], self.branch[cell] = candidate.sample, candidate.branch
+        elif candidate.collision:
+            pair = (candidate.collision.a, candidate.collision.b)
+            self.pair[cell] = [self._body(str(body)) for body in pair]
+            self.depth[cell] = candidate.collision.depth
 
     def _body(self, name: str) -> int:
         return self.bodies.setdefault(name, len(self.bodies))

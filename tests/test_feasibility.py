@@ -165,7 +165,7 @@ def test_an_approach_follows_one_branch(bottle_map, monkeypatch):
     """No step of the retreat may jump: with no room for the joints to move, everything is blocked."""
     scene = load_small("bottle_on_table", 12, 24, 8).with_settings(approach=0.05)
     assert create_map(scene).feasible.any()
-    monkeypatch.setattr("symgrasp.feasibility.RETREAT_TURN", 1e-6)
+    monkeypatch.setattr("symgrasp.candidates.RETREAT_TURN", 1e-6)
     blocked = create_map(scene)
     assert not blocked.feasible.any()
     assert (blocked.reason[bottle_map.feasible] == Reason.APPROACH_BLOCKED).all()

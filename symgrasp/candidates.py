@@ -1,0 +1,105 @@
+"""The candidate configurations of one tool pose, and the fate of each in PyBullet.
+
+Lines 5 to 9 of Algorithm 1: every redundancy sample, every branch of the closed form, inside the
+limits, free of collision, and free along the straight retreat where the scene asks for one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.ik import ClosedFormIK
+from symgrasp.poses import Array, translation
+from symgrasp.reason import Reason
+from symgrasp.robot import Arm
+from symgrasp.world import BulletWorld, Collision
+
+__all__ = ["Candidate", "Judge"]
+
+RETREAT_STEP = 0.01
+"""Largest step (m) between the poses that are checked along a retreat."""
+
+RETREAT_TURN = 0.5
+"""Largest change of a joint (rad) in one such step; more is another branch, not a motion."""
+
+
+class Candidate(NamedTuple):
+    """A configuration that reaches the tool pose.
+
+    Attributes:
+        q: (n,) joint values.
+        phi: redundancy value (rad).
+        sample: its index.
+        branch: branch of the closed form.
+        fate: the stage at which it failed, or FEASIBLE.
+        collision: the deepest collision of that stage, None where it is not a collision.
+    """
+
+    q: Array
+    phi: float
+    sample: int
+    branch: int
+    fate: Reason
+    collision: Collision | None
+
+
+class Judge:
+    """Decides the candidates of an arm in a world, whose object must be in place.
+
+    Args:
+        world: where collisions are asked.
+        arm: the arm.
+        ik: its inverse kinematics.
+        approach: length (m) of the straight retreat against the approach that must be free too.
+    """
+
+    def __init__(self, world: BulletWorld, arm: Arm, ik: ClosedFormIK, approach: float) -> None:
+        self.world, self.arm, self.ik = world, arm, ik
+        steps = int(np.ceil(approach / RETREAT_STEP - 1e-9))
+        self._retreat = [translation([0, 0, -approach * (k + 1) / steps]) for k in range(steps)]
+
+    def candidates(self, T_base_tool: Array, opening: float) -> Iterator[Candidate]:
+        """Yield the candidates of a tool pose (4, 4), by φ, then by branch, each decided as it is asked for.
+
+        Args:
+            T_base_tool: tool pose in the frame of the robot's base.
+            opening: opening (m) of the hand.
+        """
+        solutions = self.ik.solve(T_base_tool)
+        for k, q in enumerate(solutions.q):
+            sample, branch = int(solutions.sample[k]), int(solutions.branch[k])
+            fate, collision = Reason.JOINT_LIMITS, None
+            if solutions.inside[k]:
+                fate, collision = self._try(T_base_tool, q, sample, opening)
+            yield Candidate(q, float(self.ik.phi[sample]), sample, branch, fate, collision)
+
+    def _try(
+        self, T_base_tool: Array, q: Array, sample: int, opening: float
+    ) -> tuple[Reason, Collision | None]:
+        self.world.set_arm(self.arm, q, opening)
+        collision = self.world.first_collision(self.arm)
+        if collision:
+            return collision.reason, collision
+        for step in self._retreat:
+            follow = self._follow(T_base_tool @ step, q, sample)
+            if follow is None:
+                return Reason.APPROACH_BLOCKED, None
+            q = follow
+            self.world.set_arm(self.arm, q, opening)
+            collision = self.world.first_collision(self.arm)
+            if collision:
+                return Reason.APPROACH_BLOCKED, collision
+        return Reason.FEASIBLE, None
+
+    def _follow(self, T_base_tool: Array, q: Array, sample: int) -> Array | None:
+        """Return the configuration at the same φ that continues q to the next pose, if any does."""
+        solutions = self.ik.solve_sample(T_base_tool, sample)
+        choices = solutions.q[solutions.inside]
+        if not len(choices):
+            return None
+        turn = np.abs(choices - q).max(axis=1)
+        nearest = int(turn.argmin())
+        return choices[nearest] if turn[nearest] <= RETREAT_TURN else None

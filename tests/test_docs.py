@@ -1,0 +1,76 @@
+"""What the README shows works."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from symgrasp.cli import main
+from symgrasp.scene import Scene
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+COMMANDS = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
+RUN = [c for c in COMMANDS if c.startswith("symgrasp ") and not c.startswith("symgrasp app")]
+
+
+@pytest.mark.parametrize("command", RUN)
+def test_the_commands_run(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command)[1:]) == 0
+    assert capsys.readouterr().out
+    if "--out" in command:
+        assert [p.name for p in tmp_path.iterdir()] == [shlex.split(command)[-1]]
+
+
+def test_there_are_commands():
+    assert len(RUN) >= 5
+
+
+def test_the_make_targets_exist():
+    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
+    named = {c.split()[1] for c in COMMANDS if c.startswith("make ")}
+    assert named >= {"app", "test"}
+    assert named <= set(targets)
+
+
+def test_the_python_example_runs(tmp_path):
+    (code,) = blocks("python")
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "plan.json").exists()
+
+
+def test_the_scene_example_loads():
+    (text,) = blocks("yaml")
+    scene = Scene.parse(text, "README.md")
+    assert list(scene.tasks) == ["pick", "pour"]
+
+
+def test_the_pictures_are_there():
+    pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
+    assert pictures
+    missing = [p for p in pictures if not (ROOT / p).is_file()]
+    assert not missing
+
+
+def test_the_first_screen():
+    """A sentence, the picture of the page, the two commands."""
+    lines = [line for line in README.splitlines() if line]
+    assert lines[0] == "# symgrasp"
+    assert lines[1].endswith(".")
+    assert lines[2].startswith("![")
+    assert lines[4].startswith("make app")
+    assert lines[5].startswith("make test")
