@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from app.meshes import link_visuals
-from app.state import MapRequest, MapResult, ObjectPose, PlanResult, moved
+from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
 from symgrasp.feasibility import FeasibilityMap, Progress, create_map
 from symgrasp.manifold import ROLLS
 from symgrasp.meshes import read_mesh

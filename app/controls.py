@@ -12,7 +12,8 @@ import viser
 
 from app.map_view import Mark, legend_html, map_html, plan_html
 from app.readout import grasp_html, map_title, notes_html, plan_line, status_html
-from app.state import RollChoice, State
+from app.state import Pick, State
+from app.values import RollChoice
 
 __all__ = ["PANELS_WIDTH", "Actions", "Controls"]
 
@@ -139,15 +140,15 @@ class Controls:
     def _build_plan(self) -> None:
         gui = self.gui
         with gui.add_folder("Plan"):
-            one = gui.add_button(
+            self.sequential = gui.add_button(
                 "One grasp for all tasks", icon=viser.Icon.ROUTE, hint="Sequential planner (Algorithm 2)"
             )
-            one.on_click(lambda _: self.actions.plan("sequential"))
-            both = gui.add_button(
+            self.sequential.on_click(lambda _: self.actions.plan("sequential"))
+            self.bimanual = gui.add_button(
                 "All arms together", icon=viser.Icon.USERS, hint="Bimanual planner (Algorithm 3)"
             )
-            both.on_click(lambda _: self.actions.plan("bimanual"))
-            self.plan_text = gui.add_html("", visible=False)
+            self.bimanual.on_click(lambda _: self.actions.plan("bimanual"))
+            self.plan_text = gui.add_html("")
             self.step = gui.add_slider("Plan step", 1, 2, 1, 1, visible=False)
             self._on(self.step, lambda s, v: s.show_step(int(v) - 1))
             self.download = gui.add_button("Download plan (JSON)", icon=viser.Icon.DOWNLOAD, visible=False)
@@ -213,9 +214,9 @@ class Controls:
         self.scene.value = state.scene_name
         self.task.value, self.arm.value, self.roll.value = state.task, state.arm, state.roll.value
         self.gizmo.value, self.board.value = state.gizmo, state.board
-        if state.pick:
-            self.h.value = round(100 * state.pick.h, 2)
-            self.theta.value = round(float(np.rad2deg(state.pick.theta)), 2)
+        pick = state.pick or Pick(state.scene.profile.h_min, 0.0)
+        self.h.value = round(100 * pick.h, 2)
+        self.theta.value = round(float(np.rad2deg(pick.theta)), 2)
         if state.step is not None:
             self.step.value = state.step + 1
 
@@ -245,7 +246,9 @@ class Controls:
         plan = state.plan
         self._set("plan", self.plan_text, plan_line(state))
         self._set("plan_maps", self.plan_maps, plan_html(plan, state) if plan else "")
-        self.plan_text.visible = self.download.visible = plan is not None
+        self.download.visible = plan is not None
+        self.sequential.disabled = not state.can_plan("sequential")
+        self.bimanual.disabled = not state.can_plan("bimanual")
         self.step.visible = plan is not None and len(plan.plan.tasks) > 1
         if plan and self.step.visible:
             self.step.max = len(plan.plan.tasks)

@@ -16,7 +16,8 @@ import numpy as np
 from PIL import Image
 
 from app.palette import REASONS, faded
-from app.state import PlanResult, RollChoice, State
+from app.state import State
+from app.values import PlanResult, RollChoice
 from symgrasp.feasibility import FeasibilityMap
 from symgrasp.manifold import Manifold, wrap
 from symgrasp.plan import PlanTask

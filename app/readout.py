@@ -82,7 +82,9 @@ def notes_html(state: State) -> str:
 def plan_line(state: State) -> str:
     """Sum the plan up in a line."""
     if state.plan is None:
-        return ""
+        if state.can_plan("bimanual"):
+            return ""
+        return '<div class="sg sg-faint">Every task of this scene is for one arm.</div>'
     plan = state.plan.plan
     first = plan.tasks[0].holds
     if plan.kind == "sequential":

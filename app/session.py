@@ -14,7 +14,8 @@ import viser
 
 from app.compute import Store, Workbench
 from app.controls import PANELS_WIDTH, Controls
-from app.state import MapRequest, State
+from app.state import State
+from app.values import MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
 from symgrasp.errors import SymgraspError

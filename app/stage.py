@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +15,59 @@ from symgrasp.poses import Array, quat_wxyz
 from symgrasp.robot import RobotModel
 from symgrasp.scene import Obstacle, Scene
 
-__all__ = ["FIELD_OF_VIEW", "add_floor", "add_links", "add_obstacle", "camera_position", "place", "viewpoint"]
+__all__ = [
+    "FIELD_OF_VIEW",
+    "Viewpoint",
+    "add_floor",
+    "add_lights",
+    "add_links",
+    "add_obstacle",
+    "place",
+    "stand_around",
+    "viewpoint",
+]
 
-OBSTACLE = (171, 166, 158)
+OBSTACLES = ((202, 199, 193), (164, 173, 184), (190, 172, 150), (170, 180, 160))
+"""Colours of the obstacles in turn, paler than those of the map."""
+
 FLOOR_GAP = 0.002
 
 FIELD_OF_VIEW = np.deg2rad(42)
-VIEW_WIDTH = 1.3
-"""Width (m) that is seen where the camera looks at."""
 VIEW_HEIGHT = np.deg2rad(24)
+VIEW_WIDTH = 1.3
+"""Smallest width (m) that is seen where the camera looks at."""
+
 AZIMUTHS = np.deg2rad([65, -65, 40, -40, 90, -90, 115, -115])
-"""Directions to look from, against that from robot to object; the first with a free view is taken."""
+"""Directions to look from, against that from robot to object, the better ones first."""
+
+AROUND = 0.3
+"""Several robots whose middle is nearer (m) to the object than this stand around it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Viewpoint:
+    """How a scene is looked at.
+
+    Attributes:
+        look_at: the point (3,) in the middle of the picture.
+        direction: from there towards the camera (3,), horizontal, of length 1.
+        width: how much (m) is seen there from left to right.
+    """
+
+    look_at: Array
+    direction: Array
+    width: float
+
+    @property
+    def right(self) -> Array:
+        """Direction (3,) that points right in the picture."""
+        return np.cross([0.0, 0.0, 1.0], self.direction)
+
+    def camera(self, aspect: float) -> Array:
+        """Return where the camera stands (3,), for a picture of this width by height."""
+        distance = self.width / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.58, 1.1))
+        rise = np.array([0.0, 0.0, np.sin(VIEW_HEIGHT)])
+        return self.look_at + distance * (np.cos(VIEW_HEIGHT) * self.direction + rise)
 
 
 def place(node: viser.SceneNodeHandle, pose: Array) -> None:
@@ -42,11 +85,11 @@ def add_links(client: viser.ClientHandle, root: str, path: Path) -> dict[str, vi
     }
 
 
-def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle) -> None:
-    """Add an obstacle."""
+def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int) -> None:
+    """Add an obstacle, the index-th of its scene."""
     scene = client.scene
     look: dict[str, Any] = {
-        "color": OBSTACLE,
+        "color": OBSTACLES[index % len(OBSTACLES)],
         "cast_shadow": False,
         "receive_shadow": False,
         "wxyz": quat_wxyz(o.T_world_obstacle),
@@ -90,38 +133,52 @@ def add_floor(client: viser.ClientHandle, name: str, scene: Scene) -> None:
     )
 
 
-def viewpoint(scene: Scene, T_world_object: Array) -> tuple[Array, Array]:
-    """Return where to look at and the horizontal direction (3,) to look from.
+def add_lights(client: viser.ClientHandle, name: str, view: Viewpoint) -> None:
+    """Light the scene evenly, so that colours are those of the legend, with just enough shade for shape."""
+    scene = client.scene
+    scene.configure_default_lights(enabled=False)
+    scene.configure_environment_map(None)
+    scene.add_light_ambient(f"{name}/ambient", intensity=1.5)
+    key = view.direction - 0.7 * view.right + np.array([0.0, 0.0, 1.0])
+    fill = view.direction + 1.5 * view.right + np.array([0.0, 0.0, 0.3])
+    scene.add_light_directional(f"{name}/key", intensity=1.8, position=tuple(key))
+    scene.add_light_directional(f"{name}/fill", intensity=0.5, position=tuple(fill))
 
-    Robots and object are seen from the side; of several such directions the first from which no
-    box or cylinder hides the object.
+
+def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
+    """Choose how to look at a scene: robots and object side by side, the object in plain sight.
+
+    Of the directions in question the one is taken from which boxes and cylinders hide the least of
+    the object and its axis is foreshortened least.
     """
     bases = np.array([robot.T_world_base[:3, 3] for robot in scene.robots.values()])
     axis = np.array([[0.0, 0.0, h, 1.0] for h in np.linspace(scene.profile.h_min, scene.profile.h_max, 5)])
     points = (axis @ T_world_object.T)[:, :3]
-    middle = bases.mean(axis=0)
-    ahead = (points[2] - middle) * [1.0, 1.0, 0.0]
-    if len(bases) > 1 and np.linalg.norm(ahead) < 0.3:  # robots around the object
+    ahead = (points[2] - bases.mean(axis=0)) * [1.0, 1.0, 0.0]
+    look_at = 0.8 * points[2] + 0.2 * (bases.mean(axis=0) + np.array([0.0, 0.0, 0.5]))
+    if stand_around(scene, T_world_object):
         ahead = (bases[-1] - bases[0]) * [1.0, 1.0, 0.0]
     start = np.arctan2(ahead[1], ahead[0]) if np.linalg.norm(ahead) > 1e-6 else 0.0
-    look_at = 0.8 * points[2] + 0.2 * (middle + np.array([0.0, 0.0, 0.5]))
-    directions = [np.array([np.cos(start + a), np.sin(start + a), 0.0]) for a in AZIMUTHS]
-    eyes = [camera_position(look_at, d) for d in directions]
-    hidden = [sum(_hides(o, p, eye) for o in scene.obstacles for p in points) for eye in eyes]
-    return look_at, directions[int(np.argmin(hidden))]
+
+    def view(azimuth: float) -> Viewpoint:
+        direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        right = np.cross([0.0, 0.0, 1.0], direction)
+        reach = np.abs((bases - look_at) @ right).max() + 0.2
+        return Viewpoint(look_at, direction, float(max(VIEW_WIDTH, 2 * reach)))
+
+    def badness(view: Viewpoint) -> float:
+        eye = view.camera(aspect=1.0)
+        hidden = sum(_hides(o, point, eye) for o in scene.obstacles for point in points)
+        return hidden + 2 * abs(float(T_world_object[:3, 2] @ view.direction))
+
+    return min((view(start + a) for a in AZIMUTHS), key=badness)
 
 
-def camera_position(look_at: Array, direction: Array, aspect: float = 1.0) -> Array:
-    """Return where the camera stands that looks from a horizontal direction.
-
-    Args:
-        look_at: the point in the middle of the picture.
-        direction: from there towards the camera, horizontally.
-        aspect: width by height of the picture.
-    """
-    distance = VIEW_WIDTH / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.58, 1.1))
-    rise = np.array([0.0, 0.0, np.sin(VIEW_HEIGHT)])
-    return look_at + distance * (np.cos(VIEW_HEIGHT) * direction + rise)
+def stand_around(scene: Scene, T_world_object: Array) -> bool:
+    """Whether several robots stand around the object."""
+    bases = np.array([robot.T_world_base[:3, 3] for robot in scene.robots.values()])
+    middle = T_world_object @ [0.0, 0.0, (scene.profile.h_min + scene.profile.h_max) / 2, 1.0]
+    return len(bases) > 1 and bool(np.linalg.norm((middle[:3] - bases.mean(axis=0))[:2]) < AROUND)
 
 
 def _hides(o: Obstacle, point: Array, eye: Array) -> bool:

@@ -8,134 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from functools import cached_property
 
 import numpy as np
 
+from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.errors import InputError
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import wrap
-from symgrasp.plan import Plan, PlanTask
-from symgrasp.poses import Array, axis_frame, rotation_z, spin
-from symgrasp.scene import Scene, Task
+from symgrasp.plan import PlanTask
+from symgrasp.poses import Array, rotation_z
+from symgrasp.scene import Scene
 
-__all__ = ["Busy", "MapRequest", "MapResult", "ObjectPose", "Pick", "PlanResult", "RollChoice", "State"]
+__all__ = ["Busy", "Pick", "State"]
 
 GIZMO_NOISE = 1e-6
 """Change of position (m) or axis below which the gizmo only turned: browsers send rounded numbers."""
-
-
-@dataclass(frozen=True)
-class ObjectPose:
-    """A pose as a person sets it: where the bottom stands, which way the axis leans, the spin.
-
-    Attributes:
-        x, y, z: origin of the object (m).
-        lean: angle (rad) between the axis and the world's z.
-        towards: azimuth (rad) that the axis leans towards.
-        spin: turn (rad) about the object's own axis.
-    """
-
-    x: float
-    y: float
-    z: float
-    lean: float = 0.0
-    towards: float = 0.0
-    spin: float = 0.0
-
-    @staticmethod
-    def of(pose: Array) -> ObjectPose:
-        """Take a pose (4, 4) apart."""
-        axis = pose[:3, 2]
-        lean = float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2]))
-        towards = float(np.arctan2(axis[1], axis[0])) if lean > 1e-9 else 0.0
-        x, y, z = pose[:3, 3].tolist()
-        return ObjectPose(x, y, z, lean, towards, spin(pose))
-
-    def matrix(self) -> Array:
-        """Return the pose (4, 4)."""
-        sine = np.sin(self.lean)
-        pose = np.eye(4)
-        pose[:3, 2] = [sine * np.cos(self.towards), sine * np.sin(self.towards), np.cos(self.lean)]
-        pose[:3, 3] = [self.x, self.y, self.z]
-        return axis_frame(pose) @ rotation_z(self.spin)
-
-
-class RollChoice(Enum):
-    """Which of the two rolls a map shows; the value is what the page calls it."""
-
-    EITHER = "either"
-    ZERO = "0°"
-    HALF_TURN = "180°"
-
-    def reason(self, m: FeasibilityMap) -> np.ndarray:
-        """Return the reasons (H, A) that are shown; of either roll the one that got furthest."""
-        if self is RollChoice.EITHER:
-            return m.reason.max(axis=0)
-        return m.reason[0 if self is RollChoice.ZERO else 1]
-
-    def roll(self, m: FeasibilityMap, row: int, column: int) -> int:
-        """Return the index of the roll that `reason` shows at a cell."""
-        if self is RollChoice.EITHER:
-            return int(m.reason[:, row, column].argmax())
-        return 0 if self is RollChoice.ZERO else 1
-
-
-@dataclass(frozen=True)
-class MapRequest:
-    """What a map is computed for; equal requests have equal maps.
-
-    Attributes:
-        scene: the scene as loaded.
-        arm, task: names in it.
-        pose: where the object was moved to, None where the scene puts it.
-    """
-
-    scene: Scene
-    arm: str
-    task: str
-    pose: ObjectPose | None = None
-
-    @property
-    def T_world_object(self) -> Array:
-        """The base pose (4, 4)."""
-        return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
-
-    def moved_scene(self) -> Scene:
-        """Return the scene with the task moved there."""
-        return moved(self.scene, {self.task: self.pose} if self.pose else {})
-
-
-def moved(scene: Scene, poses: Mapping[str, ObjectPose]) -> Scene:
-    """Return the scene with tasks moved to other poses."""
-    for name, pose in poses.items():
-        scene = scene.with_task(Task(name, scene.task(name).arms, pose.matrix()))
-    return scene
-
-
-@dataclass(frozen=True, eq=False)
-class MapResult:
-    """A computed map, and what the object is inside of at that pose (one phrase each)."""
-
-    request: MapRequest
-    map: FeasibilityMap
-    contacts: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class PlanResult:
-    """A plan and what is needed to show it.
-
-    Attributes:
-        plan: the plan.
-        maps: for every (task, arm) the map it was made from, at δ = 0.
-        prints: for every (task, arm) the cells (H, A) under the hand.
-    """
-
-    plan: Plan
-    maps: Mapping[tuple[str, str], MapResult]
-    prints: Mapping[tuple[str, str], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -276,6 +164,13 @@ class State:
     def shown(self) -> PlanTask | None:
         """The task of the plan that is shown."""
         return self.plan.plan.tasks[self.step] if self.plan and self.step is not None else None
+
+    def can_plan(self, kind: str) -> bool:
+        """Whether there are tasks for the sequential planner with this arm, or for the bimanual one."""
+        tasks = self.scene.tasks.values()
+        if kind == "sequential":
+            return any(task.arms == (self.arm,) for task in tasks)
+        return any(len(task.arms) > 1 for task in tasks)
 
     def moved_scene(self) -> Scene:
         """Return the scene with all tasks where they were moved to."""

@@ -1,4 +1,4 @@
-"""The map in 3D: one coloured quad for every cell, wrapped round the object or laid out flat."""
+"""The map in 3D: one coloured quad for every cell, round the object and laid out flat."""
 
 from __future__ import annotations
 

@@ -1,0 +1,128 @@
+"""The values that a page's state is made of: object poses, map requests, and what was computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from symgrasp.feasibility import FeasibilityMap
+from symgrasp.plan import Plan
+from symgrasp.poses import Array, axis_frame, rotation_z, spin
+from symgrasp.scene import Scene, Task
+
+__all__ = ["MapRequest", "MapResult", "ObjectPose", "PlanResult", "RollChoice", "moved"]
+
+
+@dataclass(frozen=True)
+class ObjectPose:
+    """A pose as a person sets it: where the bottom stands, which way the axis leans, the spin.
+
+    Attributes:
+        x, y, z: origin of the object (m).
+        lean: angle (rad) between the axis and the world's z.
+        towards: azimuth (rad) that the axis leans towards.
+        spin: turn (rad) about the object's own axis.
+    """
+
+    x: float
+    y: float
+    z: float
+    lean: float = 0.0
+    towards: float = 0.0
+    spin: float = 0.0
+
+    @staticmethod
+    def of(pose: Array) -> ObjectPose:
+        """Take a pose (4, 4) apart."""
+        axis = pose[:3, 2]
+        lean = float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2]))
+        towards = float(np.arctan2(axis[1], axis[0])) if lean > 1e-9 else 0.0
+        x, y, z = pose[:3, 3].tolist()
+        return ObjectPose(x, y, z, lean, towards, spin(pose))
+
+    def matrix(self) -> Array:
+        """Return the pose (4, 4)."""
+        sine = np.sin(self.lean)
+        pose = np.eye(4)
+        pose[:3, 2] = [sine * np.cos(self.towards), sine * np.sin(self.towards), np.cos(self.lean)]
+        pose[:3, 3] = [self.x, self.y, self.z]
+        return axis_frame(pose) @ rotation_z(self.spin)
+
+
+class RollChoice(Enum):
+    """Which of the two rolls a map shows; the value is what the page calls it."""
+
+    EITHER = "either"
+    ZERO = "0°"
+    HALF_TURN = "180°"
+
+    def reason(self, m: FeasibilityMap) -> np.ndarray:
+        """Return the reasons (H, A) that are shown; of either roll the one that got furthest."""
+        if self is RollChoice.EITHER:
+            return m.reason.max(axis=0)
+        return m.reason[0 if self is RollChoice.ZERO else 1]
+
+    def roll(self, m: FeasibilityMap, row: int, column: int) -> int:
+        """Return the index of the roll that `reason` shows at a cell."""
+        if self is RollChoice.EITHER:
+            return int(m.reason[:, row, column].argmax())
+        return 0 if self is RollChoice.ZERO else 1
+
+
+@dataclass(frozen=True)
+class MapRequest:
+    """What a map is computed for; equal requests have equal maps.
+
+    Attributes:
+        scene: the scene as loaded.
+        arm, task: names in it.
+        pose: where the object was moved to, None where the scene puts it.
+    """
+
+    scene: Scene
+    arm: str
+    task: str
+    pose: ObjectPose | None = None
+
+    @property
+    def T_world_object(self) -> Array:
+        """The base pose (4, 4)."""
+        return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
+
+    def moved_scene(self) -> Scene:
+        """Return the scene with the task moved there."""
+        return moved(self.scene, {self.task: self.pose} if self.pose else {})
+
+
+def moved(scene: Scene, poses: Mapping[str, ObjectPose]) -> Scene:
+    """Return the scene with tasks moved to other poses."""
+    for name, pose in poses.items():
+        scene = scene.with_task(Task(name, scene.task(name).arms, pose.matrix()))
+    return scene
+
+
+@dataclass(frozen=True, eq=False)
+class MapResult:
+    """A computed map, and what the object is inside of at that pose (one phrase each)."""
+
+    request: MapRequest
+    map: FeasibilityMap
+    contacts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """A plan and what is needed to show it.
+
+    Attributes:
+        plan: the plan.
+        maps: for every (task, arm) the map it was made from, at δ = 0.
+        prints: for every (task, arm) the cells (H, A) under the hand.
+    """
+
+    plan: Plan
+    maps: Mapping[tuple[str, str], MapResult]
+    prints: Mapping[tuple[str, str], np.ndarray]
