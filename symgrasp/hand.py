@@ -11,14 +11,21 @@ The tool frame of a hand, between the finger tips:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
+from symgrasp.assembly import Frame
+from symgrasp.errors import InputError
 from symgrasp.profile import Profile
 
-__all__ = ["HANDS", "Hand"]
+__all__ = ["HANDS", "Hand", "JointTable"]
+
+JointTable = float | Sequence[tuple[float, float]]
+"""How a joint follows the opening: its value for each metre of opening, or, where that is not in
+proportion, knots ``(opening, value)`` between which it is linear."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +36,7 @@ class Hand:
         name: what scenes call it.
         links: all links of the hand that have a body.
         touch_links: those that may touch the object (and nothing else): the fingers.
-        joints: joint name → joint value for each metre of opening; mimic joints follow.
+        joints: the joints that open it → how they follow the opening; mimic joints follow them.
         min_opening: smallest distance between the finger pads.
         max_opening: largest distance between the finger pads.
         finger_depth: how deep an object may reach between the fingers, from the tool frame
@@ -37,18 +44,48 @@ class Hand:
         pad_width: extent of the finger pads along the object's axis (the tool's x).
         clearance: gap to leave on each side of the object.
         radius_tolerance: largest change of the radius under the pads that still holds.
+        palm_width: extent of the palm along the object's axis; 0 leaves the palm's room to the
+            check for collisions.
+        palm_depth: from the tool frame to a face of the palm that wide.
+        tool: where the tool frame is, for arms that do not name a link of their own.
+        urdf: the hand's own URDF, for hands that do not come with the robot.
+
+    Raises:
+        InputError: the numbers do not describe a hand.
     """
 
     name: str
     links: tuple[str, ...]
     touch_links: tuple[str, ...]
-    joints: Mapping[str, float] = field(hash=False)
+    joints: Mapping[str, JointTable] = field(hash=False)
     min_opening: float
     max_opening: float
     finger_depth: float
     pad_width: float
     clearance: float = 0.005
     radius_tolerance: float = 0.003
+    palm_width: float = 0.0
+    palm_depth: float = 0.0
+    tool: Frame | None = None
+    urdf: str | None = None
+
+    def __post_init__(self) -> None:
+        where = f"hand {self.name}"
+        if self.max_opening <= self.min_opening:
+            raise InputError(where, "max_opening", self.max_opening, f"more than {self.min_opening:g}")
+        if self.palm_width and self.palm_depth < self.finger_depth:
+            least = f"at least the finger depth, {self.finger_depth:g}, where the palm has a width"
+            raise InputError(where, "palm_depth", self.palm_depth, least)
+        for joint, table in self.joints.items():
+            if isinstance(table, float | int):
+                continue
+            at = [opening for opening, _ in table]
+            if len(at) < 2 or any(b <= a for a, b in pairwise(at)):
+                expected = "a number, or two or more [opening, value] with growing openings"
+                raise InputError(where, f"joints.{joint}", table, expected)
+            if at[0] > self.min_opening + 1e-9 or at[-1] < self.max_opening - 1e-9:
+                expected = f"knots from {self.min_opening:g} to {self.max_opening:g} m"
+                raise InputError(where, f"joints.{joint}", table, expected)
 
     def opening(self, radius: float) -> float:
         """Return how far (m) the fingers stand open around a radius (m)."""
@@ -56,7 +93,7 @@ class Hand:
 
     def joint_values(self, opening: float) -> dict[str, float]:
         """Return the values of the hand's joints at an opening (m)."""
-        return {name: ratio * opening for name, ratio in self.joints.items()}
+        return {name: _value(table, opening) for name, table in self.joints.items()}
 
     def standoff(self, radius: float) -> float:
         """Return the distance d (m) of the tool frame from the axis that keeps the palm outside."""
@@ -66,6 +103,13 @@ class Hand:
         """Whether the fingers go around a radius (m)."""
         return self.min_opening <= 2 * radius <= self.max_opening
 
+    def palm_has_room(self, profile: Profile, h: float) -> bool:
+        """Whether the object leaves the palm its place around height h (m)."""
+        if not self.palm_width:
+            return True
+        _, largest = profile.radius_span(h - self.palm_width / 2, h + self.palm_width / 2)
+        return largest <= self.standoff(float(profile.radius(h))) + self.palm_depth
+
     def pads_rest(self, profile: Profile, h: float) -> bool:
         """Whether the pads rest on the surface around height h (m): not over an end, not on a step."""
         low, high = h - self.pad_width / 2, h + self.pad_width / 2
@@ -73,6 +117,23 @@ class Hand:
             return False
         smallest, largest = profile.radius_span(low, high)
         return largest - smallest <= self.radius_tolerance
+
+    def prefixed(self, prefix: str) -> Hand:
+        """Return the hand as it is on a robot where all its links and joints have a prefix."""
+        return replace(
+            self,
+            links=tuple(prefix + link for link in self.links),
+            touch_links=tuple(prefix + link for link in self.touch_links),
+            joints={prefix + joint: table for joint, table in self.joints.items()},
+            tool=self.tool and replace(self.tool, link=prefix + self.tool.link),
+        )
+
+
+def _value(table: JointTable, opening: float) -> float:
+    if isinstance(table, float | int):
+        return table * opening
+    at, values = np.transpose(table)
+    return float(np.interp(opening, at, values))
 
 
 HANDS: Mapping[str, Hand] = {
@@ -87,6 +148,7 @@ HANDS: Mapping[str, Hand] = {
         max_opening=0.08,
         finger_depth=0.035,
         pad_width=0.0175,
+        tool=Frame("panda_grasptarget"),
     ),
 }
 """The hands that a scene may name."""

@@ -21,6 +21,7 @@ __all__ = [
     "quat_wxyz",
     "rotation_about",
     "rotation_z",
+    "rpy",
     "spin",
     "translation",
     "wxyz_to_xyzw",
@@ -69,6 +70,11 @@ def from_position_quat(position: ArrayLike, quat: ArrayLike) -> Array:
 def from_position_rpy(position: ArrayLike, rpy: ArrayLike) -> Array:
     """Assemble a pose from a position (3,) and URDF roll, pitch, yaw (3,) in radians."""
     return from_rotation(Rotation.from_euler("xyz", np.asarray(rpy, dtype=float)).as_matrix(), position)
+
+
+def rpy(pose: ArrayLike) -> Array:
+    """Return the URDF roll, pitch, yaw (3,) in radians of a pose (4, 4)."""
+    return Rotation.from_matrix(np.asarray(pose, dtype=float)[:3, :3]).as_euler("xyz")
 
 
 def quat_wxyz(pose: ArrayLike) -> Array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ import trimesh
 import yourdfpy
 from numpy.typing import ArrayLike
 
+from symgrasp.assembly import Mount, assemble
 from symgrasp.errors import InputError, UrdfError, one_of
 from symgrasp.files import resolve
 from symgrasp.hand import Hand
@@ -58,13 +60,15 @@ class RobotModel:
 
     Args:
         path: the URDF file.
+        mounts: hands and frames that the file does not have.
 
     Raises:
-        UrdfError: the file is missing, not a URDF, uses an unknown joint type, or refers to a
-            mesh that does not exist.
+        UrdfError: a file is missing, not a URDF, uses an unknown joint type, or refers to a
+            mesh that does not exist; or a mount does not fit.
 
     Attributes:
         path: the URDF file.
+        urdf: the URDF with all that is mounted, every mesh as an absolute path.
         name: the robot's name in it.
         link_names: all links; the first is the root.
         joints: all joints, parents before children.
@@ -73,31 +77,22 @@ class RobotModel:
         upper: their upper limits (n,).
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, mounts: Sequence[Mount] = ()) -> None:
         self.path = Path(path)
+        self.urdf = assemble(self.path, mounts)
         try:
-            ET.parse(path)  # the loader below would only print what is wrong
-            urdf = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
+            urdf = yourdfpy.URDF.load(io.BytesIO(self.urdf), build_scene_graph=False, load_meshes=False)
             self.name = str(urdf.robot.name)
             root = _root_link(urdf)
-        except OSError as error:
-            raise UrdfError(path, "urdf", str(path), "a readable URDF file") from error
         except Exception as error:  # the parser raises whatever its XML library raises
             raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
         self._collisions = {link.name: list(link.collisions) for link in urdf.robot.links}
         self._hulls: dict[str, tuple[Array, ...]] = {}
-        self._check_files(urdf)
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
         self.joints, self.link_names = self._build_tree(urdf, root)
         by_name = {joint.name: joint for joint in self.joints}
         self.lower = np.array([by_name[name].lower for name in self.joint_names])
         self.upper = np.array([by_name[name].upper for name in self.joint_names])
-
-    def _check_files(self, urdf: yourdfpy.URDF) -> None:
-        for link in urdf.robot.links:
-            for shape in (*link.collisions, *link.visuals):
-                if shape.geometry is not None and shape.geometry.mesh is not None:
-                    self.mesh_path(shape.geometry.mesh.filename, link.name)
 
     def mesh_path(self, reference: str, link: str = "mesh") -> Path:
         """Return the file behind a mesh reference of this URDF.
@@ -235,13 +230,11 @@ class RobotModel:
         return bool(self._collisions[link])
 
     def collision_urdf(self) -> bytes:
-        """Return the URDF without what is only seen, and with every mesh as an absolute path."""
-        root = ET.parse(self.path).getroot()
+        """Return the URDF without what is only seen."""
+        root = ET.fromstring(self.urdf)
         for link in root.iter("link"):
             for visual in link.findall("visual"):
                 link.remove(visual)
-        for mesh in root.iter("mesh"):
-            mesh.set("filename", str(self.mesh_path(mesh.get("filename", "")).resolve()))
         return ET.tostring(root)
 
 

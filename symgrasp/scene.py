@@ -17,9 +17,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
 
-from symgrasp.errors import SceneError, one_of
+from symgrasp.assembly import Frame, Mount
+from symgrasp.errors import InputError, SceneError, one_of
 from symgrasp.files import SCENES_DIR, resolve
 from symgrasp.hand import HANDS, Hand
 from symgrasp.manifold import Manifold
@@ -68,44 +69,75 @@ class PoseFile(_Strict):
         return PoseFile(position=tuple(pose[:3, 3].tolist()), quat_wxyz=tuple(quat_wxyz(pose).tolist()))
 
 
+class FrameFile(_Strict):
+    """A frame fixed to a link."""
+
+    link: str
+    pose: PoseFile = PoseFile()
+
+    def frame(self) -> Frame:
+        """Return it as the library has it."""
+        pose = self.pose.matrix()
+        return Frame(self.link, tuple(pose[:3, 3].tolist()), tuple(quat_wxyz(pose).tolist()))
+
+
 class HandFile(_Strict):
     """A hand described inline; the fields of `symgrasp.hand.Hand`."""
 
     name: Name
     links: Annotated[tuple[str, ...], Field(min_length=1)]
     touch_links: tuple[str, ...]
-    joints: dict[str, Number]
+    joints: dict[str, Number | list[tuple[NotNegative, Number]]]
     min_opening: NotNegative
     max_opening: Positive
     finger_depth: NotNegative
     pad_width: NotNegative
     clearance: NotNegative = 0.005
     radius_tolerance: NotNegative = 0.003
+    palm_width: NotNegative = 0.0
+    palm_depth: NotNegative = 0.0
+    tool: FrameFile | None = None
+    urdf: str | None = None
+
+
+NamedOrInline = Annotated[
+    Annotated[str, Tag("named hand")] | Annotated[HandFile, Tag("inline hand")],
+    Discriminator(lambda hand: "named hand" if isinstance(hand, str) else "inline hand"),
+]
+
+
+class MountFile(FrameFile):
+    """Where a hand with a URDF of its own is fixed on the robot."""
+
+    prefix: str = ""
+    """put before the names of the hand's links and joints, to tell two equal hands apart"""
 
 
 class ArmFile(_Strict):
-    """An arm of a robot that has several."""
+    """An arm of a robot that has several; the tool is the hand's own unless given."""
 
     name: Name
-    tool: str
-    hand: str | HandFile
+    tool: str | None = None
+    hand: NamedOrInline
+    mount: MountFile | None = None
 
 
 class RobotFile(_Strict):
-    """A robot: one arm (tool and hand) or several (arms)."""
+    """A robot: one arm (hand, and tool where the hand has none) or several (arms)."""
 
     name: Name
     urdf: str
     base: PoseFile = PoseFile()
     tool: str | None = None
-    hand: str | HandFile | None = None
+    hand: NamedOrInline | None = None
+    mount: MountFile | None = None
     arms: Annotated[tuple[ArmFile, ...], Field(min_length=1)] | None = None
     home: tuple[Number, ...] | dict[str, Number] | None = None
 
     @model_validator(mode="after")
     def _tool_or_arms(self) -> RobotFile:
-        single = self.tool is not None and self.hand is not None
-        if single == (self.arms is not None) or (self.tool is None) != (self.hand is None):
+        single = self.hand is not None
+        if single == (self.arms is not None) or (not single and (self.tool or self.mount)):
             raise ValueError("either tool and hand, or arms")
         return self
 
@@ -113,8 +145,8 @@ class RobotFile(_Strict):
         """Return the arms; a single arm bears the robot's name."""
         if self.arms is not None:
             return self.arms
-        assert self.tool is not None and self.hand is not None
-        return (ArmFile(name=self.name, tool=self.tool, hand=self.hand),)
+        assert self.hand is not None
+        return (ArmFile(name=self.name, tool=self.tool, hand=self.hand, mount=self.mount),)
 
 
 class ObjectFile(_Strict):
@@ -407,7 +439,7 @@ class _Builder:
 
     def __init__(self, file: SceneFile, source: str, folder: Path) -> None:
         self.file, self.source, self.folder = file, source, folder
-        self._models: dict[Path, RobotModel] = {}
+        self._models: dict[tuple[Path, tuple[Mount, ...]], RobotModel] = {}
 
     def scene(self) -> Scene:
         file = self._absolute()
@@ -443,10 +475,7 @@ class _Builder:
 
     def _absolute(self) -> SceneFile:
         """Check every file reference; make the relative ones absolute so the content can travel."""
-        robots = tuple(
-            r.model_copy(update={"urdf": self._reference(f"robots[{i}].urdf", r.urdf, "URDF")})
-            for i, r in enumerate(self.file.robots)
-        )
+        robots = tuple(self._absolute_robot(f"robots[{i}]", r) for i, r in enumerate(self.file.robots))
         obstacles = []
         for i, o in enumerate(self.file.obstacles):
             kind = "mesh" if o.mesh is not None else "urdf"
@@ -456,6 +485,21 @@ class _Builder:
                 o = o.model_copy(update={kind: reference})
             obstacles.append(o)
         return self.file.model_copy(update={"robots": robots, "obstacles": tuple(obstacles)})
+
+    def _absolute_robot(self, field: str, robot: RobotFile) -> RobotFile:
+        update: dict[str, Any] = {"urdf": self._reference(f"{field}.urdf", robot.urdf, "URDF")}
+        if robot.hand is not None:
+            update["hand"] = self._absolute_hand(f"{field}.hand", robot.hand)
+        if robot.arms is not None:
+            hands = [self._absolute_hand(f"{field}.arms[{k}].hand", a.hand) for k, a in enumerate(robot.arms)]
+            arms = zip(robot.arms, hands, strict=True)
+            update["arms"] = tuple(a.model_copy(update={"hand": hand}) for a, hand in arms)
+        return robot.model_copy(update=update)
+
+    def _absolute_hand(self, field: str, hand: str | HandFile) -> str | HandFile:
+        if isinstance(hand, str) or hand.urdf is None:
+            return hand
+        return hand.model_copy(update={"urdf": self._reference(f"{field}.urdf", hand.urdf, "URDF")})
 
     def _reference(self, field: str, reference: str, kind: str) -> str:
         path = resolve(reference, self.folder)
@@ -470,33 +514,71 @@ class _Builder:
         return path
 
     def _robot(self, i: int, entry: RobotFile) -> tuple[Robot, list[Arm]]:
-        path = self._path(entry.urdf)
-        if path not in self._models:
-            self._models[path] = RobotModel(path)
-        model = self._models[path]
+        field = f"robots[{i}]"
+        fields = [field] if entry.arms is None else [f"{field}.arms[{k}]" for k in range(len(entry.arms))]
         files = entry.arm_files()
-        chains = [self._chain(i, k, entry, model) for k in range(len(files))]
+        hands = [self._hand(f, a) for f, a in zip(fields, files, strict=True)]
+        mounts, tools = [], []
+        for f, a, hand in zip(fields, files, hands, strict=True):
+            mounts += self._mount(f, a, hand, entry)
+            tools.append(self._tool(f, a, hand))
+            if a.tool is None and hand.tool is not None and not hand.tool.is_link:
+                mounts.append(Mount(hand.tool, None, tools[-1]))
+        model = self._model(self._path(entry.urdf), tuple(mounts))
+        chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
         shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
-        hands = [self._hand(i, a.hand) for a in files]
         home = self._home(i, entry, model, chains, shared, hands)
         robot = Robot(entry.name, model, entry.base.matrix(), home)
-        return robot, [Arm(a.name, robot, a.tool, h, shared) for a, h in zip(files, hands, strict=True)]
+        parts = zip(files, tools, hands, strict=True)
+        return robot, [Arm(a.name, robot, tool, hand, shared) for a, tool, hand in parts]
 
-    def _chain(self, i: int, k: int, entry: RobotFile, model: RobotModel) -> list[str]:
-        tool = entry.arm_files()[k].tool
-        if tool not in model.link_names:
-            field = f"robots[{i}].tool" if entry.arms is None else f"robots[{i}].arms[{k}].tool"
+    def _model(self, path: Path, mounts: tuple[Mount, ...]) -> RobotModel:
+        if (path, mounts) not in self._models:
+            self._models[path, mounts] = RobotModel(path, mounts)
+        return self._models[path, mounts]
+
+    def _mount(self, field: str, arm: ArmFile, hand: Hand, robot: RobotFile) -> list[Mount]:
+        """Return what puts the arm's hand on the robot: nothing where the robot comes with it."""
+        if arm.mount is None:
+            return []
+        if hand.urdf is None:
+            raise SceneError(self.source, f"{field}.mount", hand.name, "a hand with a urdf of its own")
+        bare = self._model(self._path(robot.urdf), ())
+        if arm.mount.link not in bare.link_names:
+            expected = f"a link of {bare.path.name}: " + one_of(bare.link_names, arm.mount.link)
+            raise SceneError(self.source, f"{field}.mount.link", arm.mount.link, expected)
+        return [Mount(arm.mount.frame(), self._path(hand.urdf), arm.mount.prefix)]
+
+    def _tool(self, field: str, arm: ArmFile, hand: Hand) -> str:
+        """Return the name of the link that is the arm's tool frame."""
+        if arm.tool is not None:
+            return arm.tool
+        if hand.tool is None:
             raise SceneError(
-                self.source, field, tool, f"a link of {model.path.name}: " + one_of(model.link_names, tool)
+                self.source, f"{field}.tool", None, f"a link; hand {hand.name} names none itself"
             )
+        return hand.tool.link if hand.tool.is_link else f"{arm.name}_tool"
+
+    def _chain(self, field: str, tool: str, model: RobotModel) -> list[str]:
+        if tool not in model.link_names:
+            expected = f"a link of {model.path.name}: " + one_of(model.link_names, tool)
+            raise SceneError(self.source, f"{field}.tool", tool, expected)
         return [j.name for j in model.chain(tool) if j.source >= 0 and j.kind != "prismatic"]
 
-    def _hand(self, i: int, hand: str | HandFile) -> Hand:
-        if isinstance(hand, HandFile):
-            return Hand(**hand.model_dump())
-        if hand not in HANDS:
-            raise SceneError(self.source, f"robots[{i}].hand", hand, one_of(HANDS, hand))
-        return HANDS[hand]
+    def _hand(self, field: str, arm: ArmFile) -> Hand:
+        if isinstance(arm.hand, str):
+            if arm.hand not in HANDS:
+                raise SceneError(self.source, f"{field}.hand", arm.hand, one_of(HANDS, arm.hand))
+            hand = HANDS[arm.hand]
+        else:
+            tool = arm.hand.tool
+            fields = {**dict(arm.hand), "tool": tool and tool.frame()}
+            try:
+                hand = Hand(**fields)
+            except InputError as error:
+                where = f"{field}.hand.{error.field}"
+                raise SceneError(self.source, where, error.value, error.expected) from None
+        return hand.prefixed(arm.mount.prefix) if arm.mount else hand
 
     def _home(
         self,

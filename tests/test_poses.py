@@ -25,6 +25,11 @@ def test_quaternion_round_trip_and_order(T):
     np.testing.assert_array_equal(poses.xyzw_to_wxyz(poses.wxyz_to_xyzw(quat)), quat)
 
 
+@given(random_poses())
+def test_roll_pitch_yaw_round_trip(T):
+    np.testing.assert_allclose(poses.from_position_rpy(T[:3, 3], poses.rpy(T)), T, atol=1e-9)
+
+
 @given(random_poses(), angles)
 def test_axis_frame_and_spin_rebuild_the_pose(T, delta):
     frame = poses.axis_frame(T)

@@ -105,7 +105,7 @@ BAD = [
     (robot({"urdf": "package://no_such_package/a.urdf"}), SceneError, "robots[0].urdf", "existing URDF"),
     (robot({"tool": "panda_grasp"}), SceneError, "robots[0].tool", "did you mean 'panda_grasptarget'"),
     (robot({"hand": "frank"}), SceneError, "robots[0].hand", "did you mean 'franka'"),
-    (robot({"tool": None}), SceneError, "robots[0]", "either tool and hand, or arms"),
+    (robot({"hand": None}), SceneError, "robots[0]", "either tool and hand, or arms"),
     (robot({"home": [1, 2]}), SceneError, "robots[0].home", "7 values, for panda_joint1"),
     (robot({"home": [9, 0, 0, 0, 0, 0, 0]}), SceneError, "robots[0].home", "panda_joint1 within"),
     (robot({"home": {"joint1": 0}}), SceneError, "robots[0].home", "'panda_joint1'"),
