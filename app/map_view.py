@@ -28,8 +28,8 @@ __all__ = ["COLUMNS", "Mark", "legend_html", "map_html", "plan_html", "sample_co
 COLUMNS = 1440
 """Columns of a picture: four a degree."""
 
-PRINT_SHADE = len(Reason)
-"""Palette index of a shaded cell; the one after it is clear."""
+SHADE = 110
+"""Alpha of the cells under a hand."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +48,13 @@ def sample_columns(manifold: Manifold) -> np.ndarray:
     return np.floor(turned / manifold.dtheta).astype(int) % manifold.angles
 
 
-def to_png(indices: np.ndarray, stale: bool = False) -> bytes:
-    """Return a palette PNG of (H, W) reasons, top row first; indices beyond them shade and clear."""
-    colors = faded(REASONS) if stale else REASONS
+def to_png(indices: np.ndarray, colors: np.ndarray, alpha: Sequence[int] | None = None) -> bytes:
+    """Return a palette PNG of indices (H, W), top row first, into sRGB colours (n, 3) and alphas (n,)."""
     image = Image.fromarray(np.ascontiguousarray(indices, dtype=np.uint8), "P")
-    image.putpalette([*colors.ravel().tolist(), 0, 0, 0, 255, 255, 255])
+    image.putpalette(colors.ravel().tolist())
     buffer = io.BytesIO()
-    alpha = bytes([255] * len(Reason) + [110, 0])
-    image.save(buffer, "PNG", compress_level=3, transparency=alpha)
+    options = {"transparency": bytes(alpha)} if alpha else {}
+    image.save(buffer, "PNG", compress_level=3, **options)
     return buffer.getvalue()
 
 
@@ -82,11 +81,11 @@ def map_html(
     """
     grid = m.manifold
     picture = roll.reason(m)[::-1, sample_columns(grid)]
-    layers = [_img(to_png(picture, stale), name)]
+    layers = [_img(to_png(picture, faded(REASONS) if stale else REASONS), name)]
     still = Manifold(grid.profile, grid.heights, grid.angles)
     for cells in prints:
-        shaded = np.where(cells[::-1, sample_columns(still)], PRINT_SHADE, PRINT_SHADE + 1)
-        layers.append(_img(to_png(shaded), "handprint"))
+        shaded = to_png(cells[::-1, sample_columns(still)], np.zeros((2, 3), dtype=int), (0, SHADE))
+        layers.append(_img(shaded, "handprint"))
     layers += [_circle(mark, grid) for mark in marks]
     return (
         f'<div class="sg-map" style="height:{height + 48}px">'

@@ -107,7 +107,7 @@ class State:
     @cached_property
     def base(self) -> ObjectPose:
         """The object's base pose."""
-        return ObjectPose.of(self.request.T_world_object)
+        return self.request.pose or ObjectPose.of(self.request.T_world_object)
 
     @cached_property
     def T_world_object(self) -> Array:

@@ -1,0 +1,109 @@
+"""What the page computes, and what it keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app import compute
+from app.compute import Store, Workbench
+from app.state import State
+from app.values import MapRequest, MapResult
+from symgrasp.errors import Cancelled, SymgraspError
+from symgrasp.feasibility import create_map
+from tests.app.test_state import small_map
+from tests.conftest import SHIPPED, load_small, write_scene
+
+
+@pytest.fixture(scope="module")
+def store() -> Store:
+    return Store("bottle_on_table")
+
+
+@pytest.fixture
+def bench(store):
+    bench = Workbench(store)
+    yield bench
+    bench.close()
+
+
+def quiet(share: float) -> None:
+    """Progress that nobody watches."""
+
+
+def test_the_map_is_that_of_the_library(bench):
+    request = State.of(load_small("bottle_on_table"), "").move(x=0.5).request
+    result = bench.map(request, quiet)
+    assert np.array_equal(result.map.reason, create_map(request.moved_scene(), "panda", "pick").reason)
+    assert np.allclose(result.map.T_world_object, request.T_world_object)
+
+
+def test_a_known_map_is_not_computed_again(bench, monkeypatch):
+    request = State.of(load_small("soda_can"), "").request
+    first = bench.map(request, quiet)
+    monkeypatch.setattr(compute, "create_map", None)
+    assert bench.map(request, quiet) is first
+    assert Workbench(bench.store).map(request, quiet) is first
+
+
+def test_only_so_many_maps_are_kept(monkeypatch):
+    monkeypatch.setattr(compute, "MAPS_KEPT", 3)
+    store = Store("bottle_on_table")
+    base = small_map("bottle_on_table", "pick", "panda")
+    states = [State.of(load_small("bottle_on_table"), "").move(x=x).request for x in (0.1, 0.2, 0.3, 0.4)]
+    for request in states:
+        store.keep(MapResult(request, base.map))
+    assert [store.map(r) is None for r in states] == [True, False, False, False]
+
+
+def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(bench):
+    bottle = load_small("bottle_on_table")
+    world = bench.world(bottle)
+    assert bench.world(State.of(bottle, "").move(x=0.5).moved_scene()) is world
+    assert bench.world(load_small("soda_can")) is not world
+
+
+def test_progress_may_stop_it(bench):
+    def stop(share: float) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        bench.map(State.of(load_small("bottle_on_table"), "").move(x=0.51).request, stop)
+
+
+def test_what_the_object_is_inside_of_is_named_with_the_depth(bench):
+    state = State.of(load_small("bottle_on_table"), "").move(z=-0.03)
+    assert bench.map(state.request, quiet).contacts == ("bottle is 30 mm inside table",)
+    beside = State.of(load_small("bottle_on_table"), "").move(x=0.62, y=-0.26)
+    (contact,) = bench.map(beside.request, quiet).contacts
+    assert contact.startswith("bottle is ")
+    assert contact.endswith(" mm inside parcel")
+    assert bench.map(State.of(load_small("bottle_on_table"), "").request, quiet).contacts == ()
+
+
+def test_plans_follow_the_objects_that_were_moved(bench):
+    scene = load_small("pick_pour_place")
+    state = State.of(scene, "").move(y=-0.3)
+    result = bench.sequential(scene, state.poses, "panda", quiet)
+    assert result.plan.tasks[0].object_pose.position[1] == pytest.approx(-0.3)
+    assert result.maps["pick", "panda"].request == state.request
+    assert result.maps["pour", "panda"].request == MapRequest(scene, "panda", "pour")
+
+
+def test_one_arm_is_not_enough_for_the_bimanual_planner(bench):
+    with pytest.raises(SymgraspError, match="two or more arms"):
+        bench.bimanual(load_small("bottle_on_table"), {}, "pick", quiet)
+
+
+def test_a_scene_is_loaded_once_and_checked(store, tmp_path, content):
+    assert store.scene("soda_can") is store.scene("soda_can")
+    content["tasks"][0]["pose"]["position"][2] = -0.02
+    with pytest.raises(SymgraspError, match=r"bottle is 20\.0 mm inside table"):
+        Store(str(write_scene(tmp_path, content)))
+
+
+def test_the_first_scene_is_offered_even_if_it_is_a_file(tmp_path, content):
+    path = str(write_scene(tmp_path, content))
+    names = Store(path).names
+    assert names[0] == path
+    assert set(names[1:]) == set(SHIPPED)
