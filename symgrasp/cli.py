@@ -8,7 +8,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from symgrasp.errors import InputError, NoPlanError, SymgraspError, one_of
 from symgrasp.files import write_atomically
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 DEFAULT_SCENE = "bottle_on_table"
+METHODS = {"sequential": ("best", "first", "regrasp"), "bimanual": ("exact", "hill_climb")}
 MAP_ENDINGS = (".npz", ".png", ".json")
 
 # The heavy imports (PyBullet, viser) stand inside the commands that need them: `--help`,
@@ -75,14 +76,16 @@ def _parser() -> argparse.ArgumentParser:
     map_.add_argument("--out", metavar="FILE", type=Path, help="write the map: .npz, .png or .json")
 
     plan = add("plan", _plan, "Plan grasps and write the plan as JSON.")
-    plan.add_argument("kind", choices=("sequential", "bimanual"), help="which planner")
+    plan.add_argument("kind", choices=tuple(METHODS), help="which planner")
     add_scene(plan)
     plan.add_argument("--out", metavar="FILE", type=Path, required=True, help="the plan file to write")
     plan.add_argument("--arm", metavar="NAME", help="sequential: the arm (default: the first task's)")
-    methods = ("first", "best", "regrasp")
-    plan.add_argument("--method", choices=methods, default="best", help="sequential: default %(default)s")
+    text = "; ".join(
+        f"{kind}: {methods[0]} (default), {', '.join(methods[1:])}" for kind, methods in METHODS.items()
+    )
+    plan.add_argument("--method", metavar="METHOD", help=f"{text}; the first is the default")
     plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
-    plan.add_argument("--seed", type=int, default=0, help="bimanual: seed (default: %(default)s)")
+    plan.add_argument("--seed", type=int, default=0, help="hill_climb: seed (default: %(default)s)")
 
     schema = add("schema", _schema, "Print the JSON Schema of a file format.")
     schema.add_argument("format", choices=("scene", "plan"))
@@ -136,12 +139,16 @@ def _plan(args: argparse.Namespace) -> int:
     from symgrasp.plan import plan_bimanual, plan_sequential
 
     _check_folder(args.out)
+    methods = METHODS[args.kind]
+    method: Any = args.method or methods[0]
+    if method not in methods:
+        raise InputError("command line", "--method", method, one_of(methods, method))
     scene = _checked(args.scene)
     progress = _progress(f"{args.kind} plan")
     if args.kind == "sequential":
-        plan = plan_sequential(scene, args.arm, method=args.method, progress=progress)
+        plan = plan_sequential(scene, args.arm, method=method, progress=progress)
     else:
-        plan = plan_bimanual(scene, args.task, seed=args.seed, progress=progress)
+        plan = plan_bimanual(scene, args.task, method=method, seed=args.seed, progress=progress)
     plan.save(args.out)
     for task in plan.tasks:
         print(f"{task.name}: turn the object by {_deg(task.delta):.1f}°")

@@ -19,9 +19,11 @@ from symgrasp.files import write_atomically
 from symgrasp.manifold import ROLLS, grasp_to_tool
 from symgrasp.planners.bimanual import Climb, hill_climb
 from symgrasp.planners.conflicts import explain_conflict, fewest_regrasps
+from symgrasp.planners.gaps import PrintGaps
+from symgrasp.planners.placement import best_placements
+from symgrasp.planners.postures import Posture, Postures, witnesses
 from symgrasp.planners.sequential import SequentialGrasp, best_common_grasp, first_common_grasp
 from symgrasp.poses import Array, quat_wxyz, rotation_z
-from symgrasp.robot import Arm
 from symgrasp.scene import Scene, Task, describe
 from symgrasp.world import BulletWorld
 
@@ -30,6 +32,7 @@ __all__ = ["Plan", "plan_bimanual", "plan_schema", "plan_sequential"]
 CLEARANCE_LIMIT = 0.1
 """Clearances are measured up to this distance (m)."""
 
+BimanualMethod = Literal["exact", "hill_climb"]
 SequentialMethod = Literal["first", "best", "regrasp"]
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -197,7 +200,8 @@ def plan_sequential(
         entries = []
         for visits, found in _sequence(chosen, method, resting):
             for k, cell, delta in zip(visits, found.cells, found.deltas, strict=True):
-                hold = (the_arm, chosen[k], cell, found.grasp.column)
+                (posture,) = witnesses([the_arm], [chosen[k]], [cell])
+                hold = (posture, chosen[k], cell, found.grasp.column)
                 entries.append(_task_entry(world, tasks[k], delta, [hold]))
     return _plan(scene, "sequential", Planner(algorithm=method), entries)
 
@@ -231,22 +235,26 @@ def plan_bimanual(
     scene: Scene,
     task: str | None = None,
     maps: Mapping[str, FeasibilityMap] | None = None,
+    method: BimanualMethod = "exact",
     seed: int = 0,
     limits: Climb | None = None,
     progress: Progress | None = None,
 ) -> Plan:
-    """Place all arms of a task on the object so that they do not meet (Algorithm 3).
+    """Place all arms of a task on the object so that they do not meet.
 
     Args:
         scene: the scene.
         task: a task that several arms do together; the first such task if None.
         maps: arm → map of that task; computed where missing.
-        seed: of the random choices.
-        limits: how long to search.
+        method: ``exact`` finds the placement with the largest gap and margins for which the whole
+            robots are free, or proves that there is none on this grid; ``hill_climb`` is
+            Algorithm 3.
+        seed: of the random choices of the hill climbing.
+        limits: how long to climb.
         progress: told the finished share; may raise `Cancelled`.
 
     Raises:
-        NoPlanError: no placement was found.
+        NoPlanError: no placement exists, or the hill climbing found none.
         SceneError: no task needs several arms.
     """
     together = [t for t in scene.tasks.values() if len(t.arms) > 1]
@@ -254,7 +262,6 @@ def plan_bimanual(
     if len(the_task.arms) < 2:
         expected = "two or more arms; one arm alone is for the sequential planner"
         raise SceneError(scene.source, f"task {the_task.name}: arms", list(the_task.arms), expected)
-    limits = limits or Climb()
     arms = [scene.arm(name) for name in the_task.arms]
     with BulletWorld(scene) as world:
         known = dict(maps or {})
@@ -263,15 +270,52 @@ def plan_bimanual(
                 step = _part(progress, k, len(arms) + 1)
                 known[arm.name] = create_map(scene, arm.name, the_task.name, world=world, progress=step)
         chosen = [known[arm.name] for arm in arms]
-
-        def bodies_free(cells: Sequence[Cell]) -> bool:
-            _pose(world, the_task.T_world_object, zip(arms, chosen, cells, strict=True))
-            return not world.collisions(arms)
-
+        postures = Postures(world, arms, chosen)
         last = _part(progress, len(arms), len(arms) + 1)
-        found = hill_climb(chosen, arms, bodies_free, seed, limits, last)
-        holds = [(a, m, c, c.column) for a, m, c in zip(arms, chosen, found.cells, strict=True)]
+        if method == "exact":
+            cells, found, planner = _place(chosen, postures, last)
+        else:
+            cells, found, planner = _climb(chosen, postures, seed, limits or Climb(), last)
+        holds = [(p, m, c, c.column) for p, m, c in zip(found, chosen, cells, strict=True)]
         entry = _task_entry(world, the_task, 0.0, holds)
+    return _plan(scene, "bimanual", planner, [entry])
+
+
+def _place(
+    maps: Sequence[FeasibilityMap], postures: Postures, progress: Progress | None
+) -> tuple[tuple[Cell, ...], list[Posture], Planner]:
+    gaps = PrintGaps(postures.arms, maps[0].manifold)
+    placements = 0
+    for placement in best_placements(maps, gaps):
+        placements += 1
+        if progress:
+            progress(0.0)  # how many there are is not known beforehand
+        found = postures.find(placement.cells)
+        if found:
+            if progress:
+                progress(1.0)
+            statistics = {"placements": placements, "body_checks": postures.body_checks}
+            return placement.cells, found, Planner(algorithm="exact", statistics=statistics)
+    empty = [m.arm for m in maps if not m.feasible.any()]
+    if empty:
+        raise NoPlanError(f"{' and '.join(empty)} has no feasible cell in task {maps[0].task}")
+    if not placements:
+        raise NoPlanError(
+            "no placement exists on this grid: the handprints share a cell wherever the arms can hold"
+        )
+    raise NoPlanError(
+        f"no placement exists on this grid: the handprints are apart in {placements}, "
+        "but the arms meet in every configuration of each"
+    )
+
+
+def _climb(
+    maps: Sequence[FeasibilityMap], postures: Postures, seed: int, limits: Climb, progress: Progress | None
+) -> tuple[tuple[Cell, ...], list[Posture], Planner]:
+    def bodies_free(cells: Sequence[Cell]) -> bool:
+        return postures.find(cells, every=False) is not None
+
+    found = hill_climb(maps, postures.arms, bodies_free, seed, limits, progress)
     planner = Planner(
         algorithm="hill_climb",
         seed=seed,
@@ -283,7 +327,7 @@ def plan_bimanual(
             "body_checks": found.body_checks,
         },
     )
-    return _plan(scene, "bimanual", planner, [entry])
+    return found.cells, postures.witnesses(found.cells), planner
 
 
 def _part(progress: Progress | None, k: int, n: int) -> Progress | None:
@@ -291,26 +335,16 @@ def _part(progress: Progress | None, k: int, n: int) -> Progress | None:
     return (lambda share: progress((k + share) / n)) if progress else None
 
 
-def _pose(world: BulletWorld, T_world_object: Array, holds: Any) -> None:
-    """Put every arm at the witness of its cell, and every other robot at home."""
-    world.set_object(T_world_object)
-    postures = []
-    for arm, m, cell in holds:
-        witness = m.witness(cell)
-        postures.append((arm, witness.q, witness.opening))
-    world.set_arms(postures)
-
-
 def _task_entry(
-    world: BulletWorld, task: Task, delta: float, holds: Sequence[tuple[Arm, FeasibilityMap, Cell, int]]
+    world: BulletWorld, task: Task, delta: float, holds: Sequence[tuple[Posture, FeasibilityMap, Cell, int]]
 ) -> PlanTask:
-    """Write one task; each hold is an arm, its map, the cell on it, and the column of the grasp itself."""
+    """Write one task; each hold is a posture, the arm's map, the cell on it, and the grasp's own column."""
     turned = task.T_world_object @ rotation_z(delta)
-    _pose(world, turned, [(arm, m, cell) for arm, m, cell, _ in holds])
+    world.set_object(turned)
+    world.set_arms(posture for posture, *_ in holds)
     entries = []
-    for arm, m, cell, column in holds:
-        witness, margin = m.witness(cell), m.margin(cell)
-        assert witness is not None  # planners choose feasible cells
+    for (arm, q, opening), m, cell, column in holds:
+        margin = m.margin(cell)
         h, theta, roll = float(m.manifold.h[cell.row]), float(m.manifold.theta[column]), ROLLS[cell.roll]
         standoff = arm.hand.standoff(float(m.manifold.profile.radius(h)))
         entries.append(
@@ -319,9 +353,9 @@ def _task_entry(
                 robot=arm.robot.name,
                 grasp=Grasp(h=h, theta=theta, roll=roll),
                 tool_pose=Pose.of(grasp_to_tool(turned, h, theta, roll, standoff)),
-                joints=dict(zip(arm.joint_names, witness.q.tolist(), strict=True)),
-                hand_joints=arm.hand.joint_values(witness.opening),
-                opening=witness.opening,
+                joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
+                hand_joints=arm.hand.joint_values(opening),
+                opening=opening,
                 clearance=world.clearance(arm, CLEARANCE_LIMIT),
                 margin_along=margin.along,
                 margin_around=margin.around,

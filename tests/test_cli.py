@@ -73,6 +73,10 @@ def test_schemas_are_schemas(name, capsys):
         (["map", "soda_can", "--arm", "left"], "expected one of 'panda'"),
         (["map", "soda_can", "--out", "map.gif"], "'.npz'"),
         (["map", "soda_can", "--out", "no/such/folder/map.npz"], "existing folder"),
+        (
+            ["plan", "sequential", "soda_can", "--out", "p.json", "--method", "exact"],
+            "'best', 'first', 'regrasp'",
+        ),
         (["plan", "bimanual", "soda_can", "--out", "p.json"], "two or more arms"),
         (["plan", "sequential", "log_two_robots", "--out", "p.json"], "does alone"),
     ],

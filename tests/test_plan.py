@@ -14,6 +14,8 @@ from symgrasp.errors import NoPlanError, PlanError, SceneError
 from symgrasp.feasibility import create_map
 from symgrasp.manifold import grasp_to_tool
 from symgrasp.plan import Plan, plan_bimanual, plan_schema, plan_sequential
+from symgrasp.planners.gaps import PrintGaps
+from symgrasp.planners.postures import Postures
 from symgrasp.poses import from_position_quat, pose_error, rotation_z
 from symgrasp.reason import Reason
 from symgrasp.scene import Scene, scene_schema
@@ -105,10 +107,57 @@ def test_json_is_valid_and_exact(make, tmp_path):
         np.testing.assert_allclose(again, pose.array(), atol=1e-12)
 
 
+def test_hill_climbing_and_the_exact_search():
+    """Both end apart; the exact one with the larger gap, and without chance."""
+    scene = load_small("log_two_robots", 20, 24, 6)
+    climbed = plan_bimanual(scene, method="hill_climb")
+    assert climbed.planner.statistics["body_checks"] >= 1
+    assert bimanual().planner.seed is None
+    arms = list(scene.arms.values())
+    gaps = PrintGaps(arms, scene.manifold)
+
+    def gap(plan):
+        (a, b), grid = plan.tasks[0].holds, scene.manifold
+        cells = [grid.cell(x.grasp.h, x.grasp.theta) for x in (a, b)]
+        rolls = [0 if x.grasp.roll == 0 else 1 for x in (a, b)]
+        shift = (cells[1][1] - cells[0][1]) % grid.angles
+        return gaps.around(0, rolls[0], cells[0][0], 1)[rolls[1], cells[1][0], shift]
+
+    assert gap(bimanual()) >= gap(climbed) >= 0
+
+
+def test_arms_that_always_meet(monkeypatch):
+    """Prints apart but bodies never: every combination is tried, and that is said."""
+    scene = load_small("log_two_robots", 4, 4, 1)
+    monkeypatch.setattr(Postures, "_together", lambda self, postures: False)
+    with pytest.raises(NoPlanError, match=r"no placement exists on this grid: .* the arms meet"):
+        plan_bimanual(scene)
+
+
+def test_other_configurations_than_the_witnesses_are_tried(monkeypatch):
+    scene = load_small("log_two_robots", 20, 24, 6)
+    together = Postures._together
+    first = plan_bimanual(scene)
+    refused = [[hold.joints[n] for n in hold.joints] for hold in first.tasks[0].holds]
+
+    def refuse_the_witnesses(self, postures):
+        same = [np.array_equal(p.q, q) for p, q in zip(postures, refused, strict=True)]
+        return not all(same) and together(self, postures)
+
+    monkeypatch.setattr(Postures, "_together", refuse_the_witnesses)
+    second = plan_bimanual(scene)
+    assert second.planner.statistics["placements"] == 1
+    for a, b in zip(first.tasks[0].holds, second.tasks[0].holds, strict=True):
+        assert a.grasp == b.grasp
+    assert first.tasks[0].holds != second.tasks[0].holds
+
+
 def test_the_same_seed_gives_the_same_bytes():
     scene = load_small("log_two_robots", 20, 24, 6)
     assert plan_bimanual(scene).to_json() == bimanual().to_json()
-    assert plan_bimanual(scene, seed=1).tasks != bimanual().tasks
+    climbed = [plan_bimanual(scene, method="hill_climb", seed=seed) for seed in (3, 3, 4)]
+    assert climbed[0].to_json() == climbed[1].to_json()
+    assert climbed[0].tasks != climbed[2].tasks
 
 
 def test_the_scene_in_the_plan_is_the_scene():

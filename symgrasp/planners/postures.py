@@ -1,0 +1,94 @@
+"""Arm configurations that hold an object together without the robots meeting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import product
+from typing import NamedTuple
+
+from symgrasp.candidates import Judge
+from symgrasp.feasibility import Cell, FeasibilityMap
+from symgrasp.ik import ClosedFormIK
+from symgrasp.poses import Array, inverse
+from symgrasp.reason import Reason
+from symgrasp.robot import Arm
+from symgrasp.world import BulletWorld
+
+__all__ = ["Posture", "Postures", "witnesses"]
+
+
+class Posture(NamedTuple):
+    """An arm at joint values (n,) with its hand open by ``opening`` (m)."""
+
+    arm: Arm
+    q: Array
+    opening: float
+
+
+def witnesses(arms: Sequence[Arm], maps: Sequence[FeasibilityMap], cells: Sequence[Cell]) -> list[Posture]:
+    """Return every arm at the witness of its cell, which must be feasible."""
+    postures = []
+    for arm, m, cell in zip(arms, maps, cells, strict=True):
+        witness = m.witness(cell)
+        assert witness is not None  # planners choose feasible cells
+        postures.append(Posture(arm, witness.q, witness.opening))
+    return postures
+
+
+class Postures:
+    """Finds configurations in which several arms hold their cells and nothing collides.
+
+    Args:
+        world: a world of the scene; the object is placed by `find`.
+        arms: the arms.
+        maps: one map an arm, in the same order, of one task.
+    """
+
+    def __init__(self, world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap]) -> None:
+        self.world, self.arms, self.maps = world, arms, maps
+        self.body_checks = 0
+        settings = world.scene.settings
+        self._judges = [
+            Judge(world, arm, ClosedFormIK(arm, settings.redundancy), settings.approach) for arm in arms
+        ]
+        self._tools = [
+            inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
+            for arm, m in zip(arms, maps, strict=True)
+        ]
+        self._free = cache(self._feasible)
+
+    def witnesses(self, cells: Sequence[Cell]) -> list[Posture]:
+        """Return every arm at the witness of its cell."""
+        return witnesses(self.arms, self.maps, cells)
+
+    def find(self, cells: Sequence[Cell], *, every: bool = True) -> list[Posture] | None:
+        """Return postures, one an arm, that are free together, or None if there are none.
+
+        Args:
+            cells: a feasible cell for every arm.
+            every: try all combinations of feasible configurations, not the witnesses alone.
+        """
+        if self._together(self.witnesses(cells)):
+            return self.witnesses(cells)
+        if every:
+            for postures in product(*(self._free(k, cell) for k, cell in enumerate(cells))):
+                if self._together(postures):
+                    return list(postures)
+        return None
+
+    def _together(self, postures: Sequence[Posture]) -> bool:
+        self.body_checks += 1
+        self.world.set_object(self.maps[0].T_world_object)
+        self.world.set_arms(postures)
+        return not self.world.collisions(self.arms)
+
+    def _feasible(self, k: int, cell: Cell) -> list[Posture]:
+        """Return every feasible configuration of an arm at a cell, the other robots at home."""
+        arm, m = self.arms[k], self.maps[k]
+        for robot in self.world.scene.robots:
+            self.world.park(robot)
+        self.world.set_object(m.T_world_object)
+        opening = float(m.opening[cell.row])
+        candidates = self._judges[k].candidates(self._tools[k][cell], opening)
+        return [Posture(arm, c.q, opening) for c in candidates if c.fate == Reason.FEASIBLE]
