@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import ProfileError
+from symgrasp.measure import measure_mesh
 from symgrasp.poses import Array
 
 __all__ = ["COLLISION_FACETS", "Profile"]
@@ -27,9 +29,15 @@ class Profile:
             radii not negative and not all zero.
         source: what to call this profile in error messages.
 
+    Attributes:
+        T_mesh_object: for a profile measured from a mesh, the pose (4, 4) of the object frame in
+            the mesh; otherwise None.
+
     Raises:
         ProfileError: the points are not such an array.
     """
+
+    T_mesh_object: Array | None = None
 
     def __init__(self, points: ArrayLike, source: str = "profile") -> None:
         try:
@@ -56,6 +64,23 @@ class Profile:
             raise ProfileError(source, "profile", points, "a radius above zero somewhere")
         array.setflags(write=False)
         self._points = array
+
+    @classmethod
+    def from_mesh(cls, path: str | Path, scale: float = 1.0) -> Profile:
+        """Measure the object of revolution that a mesh shows, in any orientation and place.
+
+        Args:
+            path: an STL, OBJ, PLY, OFF or GLB file.
+            scale: metres in one unit of the file.
+
+        Raises:
+            MeshError: the file is unusable, or what it shows is no object of revolution; see
+                `symgrasp.measure.measure_mesh`, which also tells how symmetric it is.
+        """
+        measurement = measure_mesh(path, scale=scale)
+        profile = cls(measurement.points, str(path))
+        profile.T_mesh_object = measurement.T_mesh_object
+        return profile
 
     def __repr__(self) -> str:
         return f"Profile({self._points.tolist()})"

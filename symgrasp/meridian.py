@@ -1,0 +1,142 @@
+"""Cutting a mesh by half-planes through an axis, and the outlines seen from outside.
+
+A half-plane that ends in the axis and stands at angle θ cuts a mesh in line segments of (h, r).
+Seen from the side, their envelope over h is the outer radius; seen from an end, their envelope
+over r is the height of that end. Both are exact for the triangles, so nothing is lost to rays
+that slip through between them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.poses import Array
+
+__all__ = ["Cuts", "column_angles", "cut", "envelope"]
+
+
+class Cuts(NamedTuple):
+    """The segments of a mesh cut by half-planes.
+
+    Attributes:
+        column: (n,) index of the half-plane.
+        h: (n, 2) heights of both ends.
+        r: (n, 2) distances of both ends from the axis.
+        rho: (n, 2) the radius interpolated between the corners of the triangle. Corners lie on
+            the true surface and chords inside it, so this undoes the facets of a mesh.
+    """
+
+    column: np.ndarray
+    h: Array
+    r: Array
+    rho: Array
+
+
+def column_angles(columns: int) -> Array:
+    """Return the angles (columns,) (rad) of half-planes at equal distances all around."""
+    return (np.arange(columns) + 0.5) * (2 * np.pi / columns)
+
+
+def cut(vertices: Array, faces: np.ndarray, columns: int) -> Cuts:
+    """Cut triangles by the half-planes at `column_angles`.
+
+    Args:
+        vertices: (n, 3), z being the axis.
+        faces: (m, 3) vertex indices.
+        columns: number of half-planes.
+    """
+    face, column = _met(vertices, faces, columns)
+    corners = vertices[faces[face]]
+    angle = column_angles(columns)[column][:, None]
+    side = corners[..., 1] * np.cos(angle) - corners[..., 0] * np.sin(angle)
+    along = corners[..., 0] * np.cos(angle) + corners[..., 1] * np.sin(angle)
+    rho = np.hypot(vertices[:, 0], vertices[:, 1])[faces[face]]
+    crossing, ends = _crossings(side, np.stack([along, corners[..., 2], rho], axis=-1))
+    outside = (ends[..., 0] >= 0).any(axis=1)
+    ends = _beyond_axis(ends[outside])
+    return Cuts(column[crossing][outside], ends[..., 1], ends[..., 0], ends[..., 2])
+
+
+def _met(vertices: Array, faces: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return (face, column) of all triangles and half-planes that may meet, and few others."""
+    angle = np.arctan2(vertices[:, 1], vertices[:, 0])[faces]
+    relative = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi
+    low, high = relative.min(axis=1), relative.max(axis=1)
+    step = 2 * np.pi / columns
+    first = np.ceil((angle[:, 0] + low) / step - 0.5 - 1e-6).astype(int)
+    last = np.floor((angle[:, 0] + high) / step - 0.5 + 1e-6).astype(int)
+    # Corners on more than half a circle: the axis runs through the triangle.
+    count = np.where(high - low >= np.pi, columns, last - first + 1)
+    face = np.repeat(np.arange(len(faces)), count)
+    offset = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
+    return face, (first[face] + offset) % columns
+
+
+def _crossings(side: Array, values: Array) -> tuple[np.ndarray, Array]:
+    """Interpolate the values (n, 3, v) of corners where a triangle crosses ``side == 0``.
+
+    Returns:
+        Which triangles cross, and the values (m, 2, v) at both ends of the crossing.
+    """
+    above = side >= 0
+    count = above.sum(axis=1)
+    crossing = np.flatnonzero((count == 1) | (count == 2))
+    side, values, above, count = side[crossing], values[crossing], above[crossing], count[crossing]
+    # The corner that lies alone on its side, then the two others.
+    alone = np.argmax(above == (count == 1)[:, None], axis=1)
+    row = np.arange(len(crossing))
+    ends = np.empty((len(crossing), 2, values.shape[2]))
+    for k in (0, 1):
+        other = (alone + 1 + k) % 3
+        s = (side[row, alone] / (side[row, alone] - side[row, other]))[:, None]
+        ends[:, k] = values[row, alone] + s * (values[row, other] - values[row, alone])
+    return crossing, ends
+
+
+def _beyond_axis(ends: Array) -> Array:
+    """Cut segments (m, 2, v) off where their first value, the distance along, is negative."""
+    for k in (0, 1):
+        behind = ends[:, k, 0] < 0
+        inner, outer = ends[behind, k], ends[behind, 1 - k]
+        s = inner[:, :1] / (inner[:, :1] - outer[:, :1])
+        ends[behind, k] = inner + s * (outer - inner)
+        ends[behind, k, 0] = 0.0
+    return ends
+
+
+def envelope(
+    column: np.ndarray, x: Array, y: Array, levels: Array, columns: int, companion: Array | None = None
+) -> tuple[Array, Array]:
+    """Return the largest y of segments at given x, for every column.
+
+    Args:
+        column: (n,) column of each segment.
+        x: (n, 2) of both ends.
+        y: (n, 2) of both ends.
+        levels: (k,) values of x, increasing.
+        columns: number of columns.
+        companion: (n, 2) a second value of both ends, y itself if not given.
+
+    Returns:
+        y (k, columns), -inf where there is no segment, and the companion at the same point (NaN).
+    """
+    companion = y if companion is None else companion
+    first = np.searchsorted(levels, x.min(axis=1), side="left")
+    count = np.searchsorted(levels, x.max(axis=1), side="right") - first
+    segment = np.repeat(np.arange(len(x)), count)
+    level = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + first[segment]
+    start, run = x[segment, 0], x[segment, 1] - x[segment, 0]
+    # A segment at one x shows its larger end.
+    upright = np.where(y[segment, 1] > y[segment, 0], 1.0, 0.0)
+    s = np.where(run == 0, upright, (levels[level] - start) / np.where(run == 0, 1.0, run))
+    found = y[segment, 0] + s * (y[segment, 1] - y[segment, 0])
+    second = companion[segment, 0] + s * (companion[segment, 1] - companion[segment, 0])
+    cell = level * columns + column[segment]
+    largest = np.full(len(levels) * columns, -np.inf)
+    np.maximum.at(largest, cell, found)
+    beside = np.full(len(levels) * columns, np.nan)
+    winner = found >= largest[cell]
+    beside[cell[winner]] = second[winner]
+    return largest.reshape(len(levels), columns), beside.reshape(len(levels), columns)
