@@ -333,7 +333,7 @@ def create_map(
 
 def fit(hand: Hand, profile: Profile, h: float) -> Reason | None:
     """Return why a hand cannot hold a profile at height h whatever the arm does, or None."""
-    if not hand.spans(float(profile.radius(h))):
+    if not (hand.spans(float(profile.radius(h))) and hand.palm_has_room(profile, h)):
         return Reason.HAND_TOO_SMALL
     if not hand.pads_rest(profile, h):
         return Reason.SURFACE_TOO_STEEP

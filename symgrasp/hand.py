@@ -136,9 +136,11 @@ def _value(table: JointTable, opening: float) -> float:
     return float(np.interp(opening, at, values))
 
 
+PR2_TABLE = ((0.0, 0.05533), (0.0507, 0.33394), (0.0853, 0.53087), (0.0886, 0.548))
+
 HANDS: Mapping[str, Hand] = {
-    # Franka hand of pybullet_data: the pads' middle is 0.105 m and the palm 0.066 m from the
-    # flange, the pads are 17.5 mm wide, each finger travels 40 mm.
+    # Each as measured by `symgrasp hand`; where the maker states a length, that one is taken.
+    # Franka hand, as on the Panda of pybullet_data.
     "franka": Hand(
         name="franka",
         links=("panda_hand", "panda_leftfinger", "panda_rightfinger"),
@@ -148,7 +150,40 @@ HANDS: Mapping[str, Hand] = {
         max_opening=0.08,
         finger_depth=0.035,
         pad_width=0.0175,
+        palm_width=0.0364,
+        palm_depth=0.044,
         tool=Frame("panda_grasptarget"),
+    ),
+    # Schunk WSG 50-110 with its force-measuring fingers; the meshes are those of pybullet_data.
+    "wsg50": Hand(
+        name="wsg50",
+        links=("wsg50_base", "wsg50_left_finger", "wsg50_right_finger"),
+        touch_links=("wsg50_left_finger", "wsg50_right_finger"),
+        joints={"wsg50_joint": 0.5},
+        min_opening=0.0,
+        max_opening=0.11,
+        finger_depth=0.067,
+        pad_width=0.0203,
+        palm_width=0.05,
+        palm_depth=0.076,
+        tool=Frame("wsg50_tool"),
+        urdf="package://static_scenes/hands/wsg50.urdf",
+    ),
+    # PR2 gripper of pybullet_data, whose fingers turn: the pads are parallel only when closed.
+    # The opening is that of their narrow end, and the pads meet 6 mm beside the gripper's axis.
+    "pr2": Hand(
+        name="pr2",
+        links=("gripper_pole", "left_gripper", "right_gripper", "left_tip", "right_tip"),
+        touch_links=("left_gripper", "right_gripper", "left_tip", "right_tip"),
+        joints=dict.fromkeys(("left_gripper_joint", "right_gripper_joint"), PR2_TABLE),
+        min_opening=0.0,
+        max_opening=0.0886,
+        finger_depth=0.0201,
+        pad_width=0.02,
+        palm_width=0.0162,
+        palm_depth=0.1078,
+        tool=Frame("gripper_pole", (0.3028, 0.0059, 0.0), (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)),
+        urdf="package://pybullet_data/pr2_gripper.urdf",
     ),
 }
 """The hands that a scene may name."""

@@ -73,8 +73,13 @@ def from_position_rpy(position: ArrayLike, rpy: ArrayLike) -> Array:
 
 
 def rpy(pose: ArrayLike) -> Array:
-    """Return the URDF roll, pitch, yaw (3,) in radians of a pose (4, 4)."""
-    return Rotation.from_matrix(np.asarray(pose, dtype=float)[:3, :3]).as_euler("xyz")
+    """Return the URDF roll, pitch, yaw (3,) in radians of a pose (4, 4); no yaw at a pitch of ±π/2."""
+    R = np.asarray(pose, dtype=float)[:3, :3]
+    level = np.hypot(R[0, 0], R[1, 0])
+    pitch = np.arctan2(-R[2, 0], level)
+    if level < 1e-9:
+        return np.array([np.arctan2(-R[1, 2], R[1, 1]), pitch, 0.0])
+    return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
 
 
 def quat_wxyz(pose: ArrayLike) -> Array:

@@ -11,8 +11,9 @@ import symgrasp
 
 ROOT = Path(symgrasp.__file__).parent
 ORDER = [
-    "errors", "files", "poses", "meshes", "profile", "manifold", "assembly", "hand", "handprint", "robot", "ik", "scene",
-    "reason", "pictures", "world", "candidates", "feasibility", "engine", "planners", "plan", "cli", "__main__",
+    "errors", "files", "poses", "meshes", "profile", "manifold", "assembly", "hand", "handprint", "robot",
+    "measure_hand", "ik", "scene", "reason", "pictures", "world", "candidates", "feasibility", "engine",
+    "planners", "plan", "verify", "cli", "__main__",
 ]  # fmt: skip
 
 
