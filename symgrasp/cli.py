@@ -7,11 +7,13 @@ import json
 import math
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from textwrap import indent
 from typing import TYPE_CHECKING, Any
 
 from symgrasp.errors import InputError, NoPlanError, SymgraspError, one_of
-from symgrasp.files import write_atomically
+from symgrasp.files import resolve, write_atomically
 from symgrasp.scene import Scene, scene_schema, shipped_scenes
 
 if TYPE_CHECKING:
@@ -87,6 +89,11 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
     plan.add_argument("--seed", type=int, default=0, help="hill_climb: seed (default: %(default)s)")
 
+    hand = add("hand", _hand, "Measure a parallel hand in a URDF; print it as a scene file takes it.")
+    hand.add_argument("urdf", metavar="URDF", help="a file, or package://<python package>/<path>")
+    text = "a link between the finger tips: the tool frame (needed where a robot has several hands)"
+    hand.add_argument("--tool", metavar="LINK", nargs="+", default=[None], help=text)
+
     schema = add("schema", _schema, "Print the JSON Schema of a file format.")
     schema.add_argument("format", choices=("scene", "plan"))
     return parser
@@ -159,6 +166,21 @@ def _plan(args: argparse.Namespace) -> int:
                 f"roll {_deg(grasp.roll):.0f}°, {1e3 * hold.clearance:.1f} mm clear"
             )
     print(f"written to {args.out}")
+    return 0
+
+
+def _hand(args: argparse.Namespace) -> int:
+    from symgrasp.measure_hand import hand_yaml, measure_hand
+    from symgrasp.robot import RobotModel
+
+    path = resolve(args.urdf, Path())
+    if path is None:
+        raise InputError("command line", "URDF", args.urdf, "an existing URDF file")
+    model = RobotModel(path)
+    for hand in [measure_hand(model, tool) for tool in args.tool]:
+        if hand.urdf and args.urdf.startswith("package://"):
+            hand = replace(hand, urdf=args.urdf)
+        print(indent(hand_yaml(hand), "    "))
     return 0
 
 

@@ -17,7 +17,7 @@ from symgrasp import pictures
 from symgrasp.candidates import Candidate, Judge
 from symgrasp.errors import MapError, ProfileError
 from symgrasp.files import write_atomically
-from symgrasp.hand import Hand
+from symgrasp.fit import fit
 from symgrasp.ik import ClosedFormIK
 from symgrasp.manifold import ROLLS, Manifold
 from symgrasp.poses import Array, inverse, rotation_z
@@ -329,15 +329,6 @@ def create_map(
         for name in scene.robots:
             W.park(name)
     return draft.finish(scene.name, the_task.name, the_task.T_world_object)
-
-
-def fit(hand: Hand, profile: Profile, h: float) -> Reason | None:
-    """Return why a hand cannot hold a profile at height h whatever the arm does, or None."""
-    if not (hand.spans(float(profile.radius(h))) and hand.palm_has_room(profile, h)):
-        return Reason.HAND_TOO_SMALL
-    if not hand.pads_rest(profile, h):
-        return Reason.SURFACE_TOO_STEEP
-    return None
 
 
 def _verdict(candidates: Iterable[Candidate]) -> tuple[Reason, Candidate | None]:

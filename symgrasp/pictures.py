@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_map", "to_png"]
+__all__ = ["draw_map", "draw_openings", "to_png"]
 
 
 def draw_map(reason: np.ndarray, heights: tuple[float, float], theta_start: float, title: str) -> Figure:
@@ -45,6 +47,53 @@ def draw_map(reason: np.ndarray, heights: tuple[float, float], theta_start: floa
     ]
     figure.legend(handles=patches, loc="outside right center", frameon=False)
     figure.suptitle(title)
+    return figure
+
+
+def draw_openings(
+    h: Array, diameter: Array, names: Sequence[str], openings: Array, reason: np.ndarray
+) -> Figure:
+    """Draw the object's diameter and the hands' openings over the height, and a strip of reasons a hand.
+
+    Args:
+        h: (n,) heights (m), evenly spaced.
+        diameter: (n,) of the object (m).
+        names: of the m hands.
+        openings: (m, n) openings (m).
+        reason: (m, n) of `Reason`; `Reason.FEASIBLE` where the hand fits.
+    """
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    figure = Figure(figsize=(9, 4.2), layout="constrained")
+    wide, strips = figure.subplots(1, 2, sharey=True, width_ratios=(3, 0.35 * len(names) + 0.4))
+    wide.fill_betweenx(100 * h, 0, 1e3 * diameter, color="#dcdcdc", label="object")
+    wide.plot(1e3 * diameter, 100 * h, color="#3b3b3b")
+    for k, name in enumerate(names):
+        (line,) = wide.plot(1e3 * openings[k], 100 * h, linewidth=1, linestyle=":")
+        held = np.where(reason[k] == Reason.FEASIBLE, 1e3 * openings[k], np.nan)
+        # Hands often open equally far; the thinner line lies on the thicker one.
+        width = 3 * (len(names) - k)
+        wide.plot(held, 100 * h, linewidth=width, color=line.get_color(), label=f"{name} holds")
+    wide.set(xlabel="opening (mm)", ylabel="h (cm)", xlim=(0, None))
+    wide.legend(frameon=False)
+    strips.imshow(
+        reason.T,
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
+        extent=(-0.5, len(names) - 0.5, 100 * h[0], 100 * h[-1]),
+        cmap=ListedColormap([r.color for r in Reason]),
+        norm=BoundaryNorm(np.arange(len(Reason) + 1) - 0.5, len(Reason)),
+    )
+    for k in range(1, len(names)):
+        strips.axvline(k - 0.5, color="white", linewidth=3)
+    strips.set_xticks(range(len(names)), names, rotation=90)
+    seen = [r for r in reversed(Reason) if (reason == r).any()]
+    labels = {Reason.FEASIBLE: "fits"}
+    patches = [Patch(color=r.color, label=labels.get(r, r.label)) for r in seen]
+    figure.legend(handles=patches, loc="outside right center", frameon=False)
     return figure
 
 
