@@ -89,6 +89,9 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
     plan.add_argument("--seed", type=int, default=0, help="hill_climb: seed (default: %(default)s)")
 
+    verify = add("verify", _verify, "Check a plan: 0 it holds, 1 it does not, 2 it cannot be read.")
+    verify.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
+
     hand = add("hand", _hand, "Measure a parallel hand in a URDF; print it as a scene file takes it.")
     hand.add_argument("urdf", metavar="URDF", help="a file, or package://<python package>/<path>")
     text = "a link between the finger tips: the tool frame (needed where a robot has several hands)"
@@ -167,6 +170,18 @@ def _plan(args: argparse.Namespace) -> int:
             )
     print(f"written to {args.out}")
     return 0
+
+
+def _verify(args: argparse.Namespace) -> int:
+    from symgrasp.plan import Plan
+    from symgrasp.verify import verify
+
+    report = verify(Plan.load(args.plan))
+    for failure in report.failures:
+        print(failure)
+    verdict = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
+    print(f"{report.checks} statements checked: {verdict}")
+    return 0 if report.holds else 1
 
 
 def _hand(args: argparse.Namespace) -> int:
