@@ -12,8 +12,8 @@ import symgrasp
 ROOT = Path(symgrasp.__file__).parent
 ORDER = [
     "errors", "files", "poses", "meshes", "profile", "manifold", "assembly", "hand", "handprint", "robot",
-    "measure_hand", "ik", "scene", "reason", "pictures", "fit", "world", "candidates", "feasibility", "engine",
-    "planners", "plan", "verify", "cli", "__main__",
+    "gripper", "measure_hand", "ik", "scene", "reason", "pictures", "fit", "world", "candidates",
+    "feasibility", "engine", "planners", "plan", "verify", "cli", "__main__",
 ]  # fmt: skip
 
 
