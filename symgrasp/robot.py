@@ -229,6 +229,13 @@ class RobotModel:
         """Whether a link has a collision shape."""
         return bool(self._collisions[link])
 
+    def __eq__(self, other: object) -> bool:
+        """Models of the same URDF are equal, so what is found out about one serves the other."""
+        return isinstance(other, RobotModel) and self.urdf == other.urdf
+
+    def __hash__(self) -> int:
+        return hash(self.urdf)
+
     def collision_urdf(self) -> bytes:
         """Return the URDF without what is only seen."""
         root = ET.fromstring(self.urdf)
