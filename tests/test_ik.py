@@ -88,7 +88,7 @@ def test_ssik_agrees_on_reachability(arm):
         theirs = [np.asarray(s.q) for s in other.solve(T)]
         ours = ik.solve(T)
         for q in theirs:
-            mine = ik.solve_at(T, q[ik.locked])
+            mine = ik.solve_at(T, float(q[ik.locked]))
             assert distance(mine.q[mine.inside], q).min(initial=np.inf) < 1e-4
         for q in ours.q[ours.inside]:
             np.testing.assert_allclose(other.fk(q), T, atol=1e-6)

@@ -45,8 +45,9 @@ def test_contact_by_the_paper_s_formula_in_batches():
 def test_cell_of_a_centre_is_that_cell(heights, columns, data):
     m = Manifold(BOTTLE, heights, columns)
     i, j = data.draw(st.integers(0, heights - 1)), data.draw(st.integers(0, columns - 1))
-    assert m.cell(m.h[i], m.theta[j]) == (i, j)
-    assert m.cell(m.h[i], m.theta[j] + 2 * np.pi) == (i, j)
+    h, theta = float(m.h[i]), float(m.theta[j])
+    assert m.cell(h, theta) == (i, j)
+    assert m.cell(h, theta + 2 * np.pi) == (i, j)
 
 
 def test_cells_at_the_edges():

@@ -124,6 +124,7 @@ def test_all_common_grasps_with_their_intervals(maps):
 @settings(max_examples=150, deadline=None)
 def test_smallest_conflicts_by_trying_all_sets(maps):
     masks = [m.feasible.any(axis=2) for m in maps]
+    expected = []
     for size in range(1, len(maps) + 1):
         expected = [
             s

@@ -199,10 +199,12 @@ def test_clients_are_given_back():
     """More worlds one after the other than PyBullet has clients, also when building one fails."""
     scene = load_small("soda_can")
     broken = replace(scene, tasks={})
+    highest = pybullet.connect(pybullet.DIRECT)
+    pybullet.disconnect(highest)
     for _ in range(1100):
         client = pybullet.connect(pybullet.DIRECT)
         pybullet.disconnect(client)
-    highest = client
+        assert client <= highest
     for _ in range(20):
         with pytest.raises(StopIteration):
             BulletWorld(broken)
