@@ -130,17 +130,17 @@ def axis_frame(pose: ArrayLike) -> Array:
     """Return the pose (4, 4) with the same origin and z axis whose spin about z is fixed.
 
     It depends on origin and axis alone, so every turn of an object about its axis of symmetry
-    has bit for bit the same axis frame. The rotation is the shortest one that takes the
-    world's z to the axis (a half turn about x where the axis points straight down).
+    has bit for bit the same axis frame. For an axis that points up the rotation is the shortest
+    one from the world's z; for one that points down it is the same for the opposite axis, after
+    a half turn about x, which keeps it well conditioned everywhere.
     """
     pose = np.asarray(pose, dtype=float)
-    x, y, z = pose[:3, 2] + 0.0  # + 0.0 turns -0.0 into 0.0
-    if z < -1.0 + 1e-12:
-        rotation = np.diag([1.0, -1.0, -1.0])
-    else:
-        s = 1.0 / (1.0 + z)
-        rotation = np.array([[1 - x * x * s, -x * y * s, x], [-x * y * s, 1 - y * y * s, y], [-x, -y, z]])
-    return from_rotation(rotation, pose[:3, 3])
+    axis = pose[:3, 2] + 0.0  # + 0.0 turns -0.0 into 0.0
+    up = axis[2] >= 0.0
+    x, y, z = axis if up else -axis
+    s = 1.0 / (1.0 + z)
+    rotation = np.array([[1 - x * x * s, -x * y * s, x], [-x * y * s, 1 - y * y * s, y], [-x, -y, z]])
+    return from_rotation(rotation if up else rotation @ np.diag([1.0, -1.0, -1.0]), pose[:3, 3])
 
 
 def spin(pose: ArrayLike) -> float:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from hypothesis import settings
 
 from symgrasp.files import SCENES_DIR
 from symgrasp.scene import Scene, shipped_scenes
+
+# CI asks the same questions every time; on a desk every run asks new ones.
+settings.register_profile("ci", derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 SHIPPED = list(shipped_scenes())
 

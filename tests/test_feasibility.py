@@ -79,7 +79,7 @@ def test_the_map_by_brute_force():
         with BulletWorld(scene) as world:
             world.set_object(task.T_world_object)
             for roll, i, j in np.ndindex(m.reason.shape):
-                h, theta = m.manifold.h[i], m.manifold.theta[j]
+                h, theta = float(m.manifold.h[i]), float(m.manifold.theta[j])
                 radius = float(scene.profile.radius(h))
                 free, reached, depths = False, Reason.UNREACHABLE, {}
                 if not arm.hand.pads_rest(scene.profile, h):

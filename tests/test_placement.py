@@ -71,7 +71,7 @@ def score(cells, maps) -> float:
         worst = min(
             worst, table[cells[b].roll, cells[b].row, (cells[b].column - cells[a].column) % grid.angles]
         )
-    return worst
+    return float(worst)
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([(2, 0.1), (2, 0.3), (3, 0.06)]))

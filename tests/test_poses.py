@@ -38,9 +38,11 @@ def test_axis_frame_and_spin_rebuild_the_pose(T, delta):
     assert np.array_equal(poses.axis_frame(T @ poses.rotation_z(delta)), frame)
 
 
-@pytest.mark.parametrize("axis", [(0, 0, -1.0), (0, 0, 1.0), (1.0, 0, 0)])
+@pytest.mark.parametrize("axis", [(0, 0, -1.0), (0, 0, 1.0), (1.0, 0, 0), (1e-7, 0, -1), (1e-4, -1e-5, -1)])
 def test_axis_frame_at_the_poles(axis):
+    axis = np.array(axis) / np.linalg.norm(axis)
     T = poses.from_rotation(Rotation.align_vectors([axis], [[0, 0, 1]])[0].as_matrix(), [1, 2, 3])
+    np.testing.assert_allclose(poses.axis_frame(T) @ poses.rotation_z(poses.spin(T)), T, atol=1e-12)
     frame = poses.axis_frame(T)
     np.testing.assert_allclose(frame[:3, 2], axis, atol=1e-12)
     np.testing.assert_allclose(np.linalg.det(frame[:3, :3]), 1.0)
