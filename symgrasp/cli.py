@@ -94,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
 
     hand = add("hand", _hand, "Measure a parallel hand in a URDF; print it as a scene file takes it.")
     hand.add_argument("urdf", metavar="URDF", help="a file, or package://<python package>/<path>")
-    text = "a link between the finger tips: the tool frame (needed where a robot has several hands)"
+    text = "a link fixed to the palm, best the tool frame (needed where a robot has several hands)"
     hand.add_argument("--tool", metavar="LINK", nargs="+", default=[None], help=text)
 
     schema = add("schema", _schema, "Print the JSON Schema of a file format.")

@@ -19,7 +19,7 @@ PAD_DEPTH = 0.001
 """What is no further back (m) than this from a finger's innermost point belongs to its pad."""
 
 SLICE = 0.002
-"""Pads and palm are measured in slices this thick (m) to either side."""
+"""Pads are measured in a slice this thick (m) to either side of the tool frame."""
 
 SNAP = np.cos(np.deg2rad(15))
 """Directions closer than this to an axis of the palm are meant to be that axis."""

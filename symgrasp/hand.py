@@ -150,7 +150,7 @@ HANDS: Mapping[str, Hand] = {
         max_opening=0.08,
         finger_depth=0.035,
         pad_width=0.0175,
-        palm_width=0.0364,
+        palm_width=0.0354,
         palm_depth=0.044,
         tool=Frame("panda_grasptarget"),
     ),

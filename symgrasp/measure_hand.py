@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from symgrasp.assembly import Frame
 from symgrasp.errors import UrdfError
-from symgrasp.gripper import SLICE, Gripper, find_anatomy, find_gripper, snap, solid_links
+from symgrasp.gripper import Gripper, find_anatomy, find_gripper, snap, solid_links
 from symgrasp.hand import Hand, JointTable
 from symgrasp.handprint import hull_edges, slab_corners
 from symgrasp.outline import simplify
@@ -32,6 +32,9 @@ PALM_ROOM = 0.004
 PALM_SKIN = 0.005
 """The palm is measured this far (m) behind its foremost point, because fronts are rounded."""
 
+THIN = 1e-6
+"""Thickness (m) of what stands for a plane cut."""
+
 WIDE = 0.8
 """Objects may reach as deep as the open fingers keep this share of their opening; what is narrower
 behind is the root of the fingers."""
@@ -45,8 +48,8 @@ def measure_hand(model: RobotModel, tool: str | None = None) -> Hand:
 
     Args:
         model: the hand's URDF, or that of a robot with the hand on it.
-        tool: a link between the finger tips, needed where a robot has several hands. Its origin
-            becomes that of the tool frame; the axes are measured.
+        tool: a link fixed to the palm, needed where a robot has several hands. Where it lies
+            before the palm, its origin becomes that of the tool frame; the axes are measured.
 
     Raises:
         UrdfError: there is no such link, or nothing that opens and closes like a parallel hand.
@@ -124,7 +127,9 @@ def _tool_pose(gripper: Gripper, palm: Sequence[str], tool: str | None) -> Array
         links = model.forward(model.default_values())
         T = inverse(links[model.link_index(motion.base)]) @ links[model.link_index(tool)]
         y = -y if y @ T[:3, 1] < 0 else y
-        return from_rotation(np.column_stack([np.cross(y, z), y, z]), T[:3, 3])
+        T = from_rotation(np.column_stack([np.cross(y, z), y, z]), T[:3, 3])
+        if all(points[:, 2].max() < 0 for points in motion.bodies(palm, 1.0, T)):
+            return T
     T = from_rotation(np.column_stack([np.cross(y, z), y, z]))
     reach = min(np.concatenate(motion.bodies(fingers, t, T))[:, 2].max() for t in (0.0, 1.0))
     T[:3, 3] = (reach - TIP) * z
@@ -144,7 +149,7 @@ def _palm_face(bodies: Sequence[Array]) -> tuple[float, float, float]:
     face = front - PALM_SKIN
     width = 0.0
     for points in bodies:
-        corners = slab_corners(points, hull_edges(points), face - SLICE, face)
+        corners = slab_corners(points, hull_edges(points), face, face + THIN)
         width = max(width, _width_at_middle(corners))
     return width, -face, -front
 
