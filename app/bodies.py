@@ -16,7 +16,7 @@ from symgrasp.profile import Profile
 from symgrasp.robot import Robot
 from symgrasp.scene import Scene
 
-__all__ = ["FlatMap", "ObjectView", "RobotView"]
+__all__ = ["FLAT_SIZE", "FlatMap", "ObjectView", "RobotView", "board_position"]
 
 OBJECT = (222, 226, 230)
 SEAM_LIFT = 0.0012
@@ -102,7 +102,7 @@ class FlatMap:
         width, height = FLAT_SIZE
         axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
         self.frame = add.add_frame(root, show_axes=False)
-        place(self.frame, from_rotation(axes, _board_position(state, view)))
+        place(self.frame, from_rotation(axes, board_position(state, view)))
         add.add_box(
             f"{root}/back", dimensions=(width + 0.012, height + 0.012, 0.004), position=(0, 0, -0.004),
             color=(255, 255, 255), cast_shadow=False, receive_shadow=False,
@@ -123,7 +123,7 @@ class FlatMap:
             self.cells.node.position = (rest * FLAT_SIZE[0], 0.0, 0.0)
 
 
-def _board_position(state: State, view: Viewpoint) -> Array:
+def board_position(state: State, view: Viewpoint) -> Array:
     """Return where the flat map is in nobody's way: beyond the object, or over it."""
     profile, pose = state.scene.profile, state.T_world_object
     centre = (pose @ [0.0, 0.0, (profile.h_min + profile.h_max) / 2, 1.0])[:3]

@@ -65,7 +65,7 @@ def status_html(state: State) -> str:
     thing = escape(state.scene.file.object.name)
     doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %" if state.busy else "Ready."
     if not state.busy and not state.is_current:
-        doing = "Stopped: the map is of an earlier pose."
+        doing = "Stopped: no map for this pose yet."
     return (
         f'<div class="sg">Drag <b>Rotation</b>: the {thing} turns and its map slides along, with nothing '
         "computed anew. Then click a green cell to see the grasp.</div>"

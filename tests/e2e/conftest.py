@@ -1,0 +1,89 @@
+"""A real server, a real browser."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from tests.e2e.page import GraspPage
+
+FLAGS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+HOW_TO_GET_IT = "the browser tests need Chromium: apt-get install chromium"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if "/e2e/" in str(item.path):
+            item.add_marker(pytest.mark.browser)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail(HOW_TO_GET_IT)
+        pytest.skip(HOW_TO_GET_IT)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def start_server(browser: Browser) -> Iterator[Callable[[str], str]]:
+    """Start servers for scenes, one a scene; gives their addresses."""
+    running: dict[str, tuple[subprocess.Popen[str], str]] = {}
+
+    def start(scene: str) -> str:
+        if scene not in running:
+            with socket.socket() as probe:
+                probe.bind(("127.0.0.1", 0))
+                port = probe.getsockname()[1]
+            command = [sys.executable, "-m", "app", scene, "--port", str(port)]
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+            assert process.stdout
+            line = process.stdout.readline()
+            running[scene] = process, line.removeprefix("symgrasp: ").strip()
+            assert line == f"symgrasp: http://127.0.0.1:{port}\n"
+        return running[scene][1]
+
+    yield start
+    for process, _ in running.values():
+        process.terminate()
+        process.wait()
+
+
+@pytest.fixture
+def open_page(browser: Browser, start_server: Callable[[str], str]) -> Iterator[Callable[..., GraspPage]]:
+    """Open a browser of its own on the server of a scene, and choose another scene in it."""
+    contexts = []
+
+    def open_(
+        server: str = "bottle_on_table", scene: str | None = None, wait_for_map: bool = True
+    ) -> GraspPage:
+        context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
+        contexts.append(context)
+        page = GraspPage(context.new_page(), start_server(server), wait_for_map)
+        if scene:
+            page.choose("Scene", scene)
+            page.expect_title(scene)
+        return page
+
+    yield open_
+    for context in contexts:
+        context.close()

@@ -1,0 +1,169 @@
+"""The page as a person uses it: what is seen, and what can be done."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+from playwright.sync_api import ConsoleMessage, Locator, Page, expect
+
+from app.controls import PANELS_WIDTH
+from app.palette import rgb
+from app.stage import FIELD_OF_VIEW, viewpoint
+from symgrasp.reason import Reason
+from symgrasp.scene import Scene
+
+WAIT = 30_000
+"""Longest wait (ms) for anything: the machine may be busy."""
+
+expect.set_options(timeout=WAIT)
+
+HARMLESS = ("THREE.Clock", "ReadPixels", "KHR_parallel_shader_compile", "GPU stall")
+
+
+class GraspPage:
+    """One browser on the page.
+
+    Args:
+        page: an empty page of the browser.
+        address: the server.
+        wait_for_map: whether to wait until the first map is there.
+    """
+
+    def __init__(self, page: Page, address: str, wait_for_map: bool = True) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        page.set_default_timeout(WAIT)
+        page.on("console", self._note)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.goto(address)
+        if wait_for_map:
+            self.map.wait_for()
+
+    def _note(self, message: ConsoleMessage) -> None:
+        if message.type == "error" and not any(text in message.text for text in HARMLESS):
+            self.complaints.append(message.text)
+
+    # -- what is seen -----------------------------------------------------------------------
+
+    @property
+    def map(self) -> Locator:
+        return self.page.locator("img[alt='map']")
+
+    @property
+    def alerts(self) -> Locator:
+        return self.page.get_by_role("alert").filter(visible=True).and_(self.page.locator(".sg-note"))
+
+    def text(self, text: str) -> Locator:
+        return self.page.get_by_text(text)
+
+    def expect_title(self, text: str) -> None:
+        """Wait for the map of that scene, task or arm, up to date."""
+        title = self.page.locator(".sg-title")
+        expect(title).to_contain_text(text)
+        expect(title).not_to_contain_text("earlier")
+        expect(self.text("Ready.")).to_be_visible()
+
+    def picture(self, alt: str = "map") -> np.ndarray:
+        """Decode a picture that is shown: (H, W, 3)."""
+        return decode(self.page.locator(f"img[alt='{alt}']").get_attribute("src") or "")
+
+    def wait_for_picture(self, right: Callable[[np.ndarray], bool]) -> np.ndarray:
+        """Wait until the map's picture is right."""
+        while True:
+            source = self.map.get_attribute("src") or ""
+            picture = decode(source)
+            if right(picture):
+                return picture
+            self.page.wait_for_function(
+                "old => document.querySelector(\"img[alt='map']\")?.src !== old", arg=source, timeout=WAIT
+            )
+
+    def view(self) -> np.ndarray:
+        """Return the 3D view between the panels: (H, W, 3)."""
+        png = self.page.locator("canvas").first.screenshot()
+        return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+
+    def wait_for_view(self, right: Callable[[np.ndarray], bool]) -> np.ndarray:
+        """Wait until the 3D view is right, looking again at later frames."""
+        for _ in range(100):
+            view = self.view()
+            if right(view):
+                return view
+            self.page.evaluate("() => new Promise(done => requestAnimationFrame(done))")
+        raise AssertionError("the 3D view never became right")
+
+    def settled_view(self) -> np.ndarray:
+        """Wait until the map's colours are in the 3D view and nothing in it moves any more."""
+        seen: list[np.ndarray] = []
+
+        def still(view: np.ndarray) -> bool:
+            seen.append(view)
+            green = np.abs(view.astype(int) - rgb(Reason.FEASIBLE.color)).max(axis=-1) < 25
+            return green.sum() > 500 and len(seen) > 4 and all(np.array_equal(view, v) for v in seen[-4:])
+
+        return self.wait_for_view(still)
+
+    def wait_for_change(self, before: np.ndarray) -> None:
+        """Wait until a hundredth of the 3D view looks different."""
+        self.wait_for_view(lambda v: (np.abs(v.astype(int) - before).max(axis=-1) > 40).mean() > 0.01)
+
+    # -- what can be done -------------------------------------------------------------------
+
+    def button(self, name: str) -> Locator:
+        return self.page.get_by_role("button", name=name, exact=True)
+
+    def choose(self, label: str, option: str) -> None:
+        self.page.get_by_label(label, exact=True).click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def number(self, label: str, value: float) -> None:
+        box = self.page.get_by_label(label, exact=True)
+        box.fill(f"{value:g}")
+        box.press("Enter")
+
+    def slide(self, label: str, value: float) -> None:
+        """Set a slider through its number box; arrow keys would turn the camera as well."""
+        box = self.slider_box(label)
+        box.fill(f"{value:g}")
+        box.press("Enter")
+
+    def slider_box(self, label: str) -> Locator:
+        row = self.page.locator(f"xpath=//*[normalize-space(text())='{label}']/ancestor::*[.//input][1]")
+        return row.locator("input").last
+
+    def click_3d(self, scene: Scene, point: np.ndarray) -> None:
+        """Click a point (3,) of the world in the 3D view, seen from where the page looks at first."""
+        box = self.page.locator("canvas").first.bounding_box()
+        assert box
+        size = self.page.viewport_size
+        assert size
+        view = viewpoint(scene, scene.task().T_world_object)
+        eye = view.camera((size["width"] - PANELS_WIDTH) / size["height"])
+        forward = (view.look_at - eye) / np.linalg.norm(view.look_at - eye)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        up = np.cross(right, forward)
+        x, y, depth = np.stack([right, up, forward]) @ (point - eye)
+        scale = box["height"] / 2 / np.tan(FIELD_OF_VIEW / 2) / depth
+        middle = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+        self.page.mouse.click(*(middle + scale * np.array([x, -y])))
+
+    def download_plan(self, to: Path) -> dict[str, Any]:
+        with self.page.expect_download() as download:
+            self.button("Download plan (JSON)").click()
+        path = to / download.value.suggested_filename
+        download.value.save_as(path)
+        return json.loads(path.read_text(encoding="utf-8"))
+
+
+def decode(source: str) -> np.ndarray:
+    """Decode a PNG data URI: (H, W, 3)."""
+    data = base64.b64decode(source.removeprefix("data:image/png;base64,"))
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))

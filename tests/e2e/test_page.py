@@ -1,0 +1,287 @@
+"""The page in a browser, from the first look to a plan in a file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from app.bodies import FLAT_SIZE, board_position
+from app.map_view import sample_columns
+from app.palette import REASONS
+from app.stage import viewpoint
+from app.state import State
+from app.values import RollChoice
+from symgrasp.feasibility import FeasibilityMap, create_map
+from symgrasp.manifold import grasp_to_tool
+from symgrasp.plan import Plan, plan_schema
+from symgrasp.poses import pose_error
+from symgrasp.reason import Reason
+from symgrasp.scene import Scene
+from symgrasp.world import BulletWorld
+from tests.conftest import write_scene
+from tests.e2e.page import GraspPage
+
+BOTTLE = Scene.load("bottle_on_table")
+COLUMNS_PER_DEGREE = 4
+
+
+@pytest.fixture(scope="module")
+def bottle_map() -> FeasibilityMap:
+    return create_map(BOTTLE)
+
+
+def drawn(m: FeasibilityMap, roll: RollChoice = RollChoice.EITHER) -> np.ndarray:
+    """What the page's picture of a map should be."""
+    return REASONS[roll.reason(m)[::-1, sample_columns(m.manifold)]]
+
+
+def cell_with(m: FeasibilityMap, reason: Reason) -> tuple[int, int]:
+    return tuple(np.argwhere(RollChoice.EITHER.reason(m) == reason)[0])
+
+
+def test_the_first_page(open_page, bottle_map):
+    page = open_page()
+    expect(page.text("Then click a green cell")).to_be_visible()
+    page.expect_title("bottle_on_table · pick · panda")
+    assert np.array_equal(page.picture(), drawn(bottle_map))
+    for text in ("h (cm)", "θ (°)", "feasible", "hits an obstacle", "out of reach"):
+        expect(page.text(text).first).to_be_visible()
+    page.settled_view()
+    assert page.complaints == []
+
+
+@pytest.mark.parametrize("degrees", [30, -52.5, 10.25])
+def test_turning_the_object_rolls_the_map(open_page, bottle_map, degrees):
+    page = open_page()
+    before = page.picture()
+    counts = page.page.locator(".sg-legend").inner_text()
+    columns = -int(degrees * COLUMNS_PER_DEGREE)
+    assert not np.array_equal(np.roll(before, columns, axis=1), before)
+    page.slide("Rotation (°)", degrees)
+    after = page.wait_for_picture(lambda p: np.array_equal(p, np.roll(before, columns, axis=1)))
+    assert np.array_equal(after, drawn(bottle_map.shift(np.deg2rad(degrees))))
+    assert page.page.locator(".sg-legend").inner_text() == counts
+    expect(page.text("Ready.")).to_be_visible()
+    expect(page.button("Cancel")).to_be_disabled()
+
+
+def test_dragging_the_slider_rolls_the_map_too(open_page):
+    page = open_page()
+    before = page.picture()
+    slider = page.page.get_by_role("slider").first
+    slider.focus()
+    for _ in range(3):
+        slider.press("ArrowRight")
+    page.wait_for_picture(lambda p: np.array_equal(p, np.roll(before, -3, axis=1)))
+
+
+def test_moving_the_object_computes_the_map_anew(open_page):
+    page = open_page()
+    page.slide("x (cm)", 60)
+    page.slide("Lean (°)", 20)
+    request = State.of(BOTTLE, "").move(x=0.6).move(lean=np.deg2rad(20.0)).request
+    expected = drawn(create_map(request.moved_scene()))
+    page.wait_for_picture(lambda p: np.array_equal(p, expected))
+    page.expect_title("pick")
+    page.button("Put it back").click()
+    page.wait_for_picture(lambda p: np.array_equal(p, drawn(create_map(BOTTLE))))
+    expect(page.slider_box("x (cm)")).to_have_value("55")
+    expect(page.slider_box("Lean (°)")).to_have_value("0")
+
+
+def test_a_feasible_cell_poses_the_arm(open_page, bottle_map):
+    page = open_page()
+    row, column = cell_with(bottle_map, Reason.FEASIBLE)
+    parked = page.settled_view()
+    page.number("h (cm)", 100 * bottle_map.manifold.h[row])
+    page.number("θ (°)", np.rad2deg(bottle_map.manifold.theta[column]))
+    roll = RollChoice.EITHER.roll(bottle_map, row, column)
+    witness = bottle_map.witness((roll, row, column))
+    assert witness
+    joints = ", ".join(f"{angle:.0f}°" for angle in np.rad2deg(witness.q))
+    expect(page.text("panda holds it: feasible")).to_be_visible()
+    expect(page.text(f"Joints {joints}")).to_be_visible()
+    page.wait_for_change(parked)
+    expect(page.page.locator(".sg-mark")).to_have_count(1)
+    page.button("Let go").click()
+    expect(page.text("No grasp picked")).to_be_visible()
+
+
+def test_an_infeasible_cell_says_why(open_page, bottle_map):
+    page = open_page()
+    row, column = cell_with(bottle_map, Reason.SCENE_COLLISION)
+    page.number("h (cm)", 100 * bottle_map.manifold.h[row])
+    page.number("θ (°)", np.rad2deg(bottle_map.manifold.theta[column]))
+    roll = RollChoice.EITHER.roll(bottle_map, row, column)
+    why = bottle_map.why((roll, row, column))
+    assert "table" in why or "parcel" in why or "lamp" in why
+    expect(page.text(f"panda cannot hold it here: {why}")).to_be_visible()
+
+
+def test_the_roll_can_be_chosen(open_page, bottle_map):
+    page = open_page()
+    page.choose("Roll", "180°")
+    page.wait_for_picture(lambda p: np.array_equal(p, drawn(bottle_map, RollChoice.HALF_TURN)))
+
+
+def expect_picked(page: GraspPage, h: float, theta: float) -> None:
+    """The page reads out the middle of the cell that was clicked."""
+    place = f"h = {round(100 * h, 2):g} cm, θ = {round(np.rad2deg(theta), 2):g}°"
+    expect(page.text(place)).to_be_visible()
+
+
+@pytest.mark.parametrize("turn", [0.0, 37.5])
+def test_clicking_the_object_picks_the_cell_under_the_pointer(open_page, bottle_map, turn):
+    page = open_page()
+    page.slide("Rotation (°)", turn)
+    shifted = bottle_map.shift(np.deg2rad(turn))
+    page.wait_for_picture(lambda p: np.array_equal(p, drawn(shifted)))
+    grid = bottle_map.manifold
+    row, column = grid.cell(0.1, np.deg2rad(60.0))  # towards the camera
+    point = BOTTLE.task().T_world_object @ [*grid.contact(grid.h[row], grid.theta[column]), 1.0]
+    page.click_3d(BOTTLE, point[:3])
+    expect_picked(page, grid.h[row], grid.theta[column] - np.deg2rad(turn))
+
+
+def test_clicking_the_flat_map_picks_a_cell(open_page, bottle_map):
+    page = open_page()
+    view = viewpoint(BOTTLE, BOTTLE.task().T_world_object)
+    grid = bottle_map.manifold
+    row, column = grid.cell(0.08, np.deg2rad(150.0))
+    x = (np.rad2deg(grid.theta[column]) / 360) * FLAT_SIZE[0]
+    y = (grid.h[row] / 0.3 - 0.5) * FLAT_SIZE[1]
+    point = board_position(State.of(BOTTLE, ""), view) + x * view.right + [0.0, 0.0, y]
+    page.click_3d(BOTTLE, point)
+    expect_picked(page, grid.h[row], grid.theta[column])
+
+
+def check_plan(content: dict[str, Any], kind: str) -> Plan:
+    """The file follows the schema and holds in a fresh world."""
+    jsonschema.validate(content, plan_schema())
+    plan = Plan.model_validate(content)
+    assert plan.kind == kind
+    scene = Scene.from_content(plan.scene.content)
+    assert scene.sha256 == plan.scene.sha256
+    with BulletWorld(scene) as world:
+        for task in plan.tasks:
+            arms = [scene.arm(hold.arm) for hold in task.holds]
+            pose = task.object_pose_turned.array()
+            world.set_object(pose)
+            postures = []
+            for arm, hold in zip(arms, task.holds, strict=True):
+                q = np.array([hold.joints[name] for name in arm.joint_names])
+                postures.append((arm, q, hold.opening))
+                standoff = arm.hand.standoff(float(scene.profile.radius(hold.grasp.h)))
+                grasp = grasp_to_tool(pose, hold.grasp.h, hold.grasp.theta, hold.grasp.roll, standoff)
+                distance, angle = pose_error(arm.world_tool_pose(q), grasp)
+                assert distance < 1e-5
+                assert angle < 1e-5
+            world.set_arms(postures)
+            assert world.collisions(arms) == []
+    return plan
+
+
+def test_one_grasp_for_a_sequence(open_page, tmp_path):
+    page = open_page(scene="pick_pour_place")
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 3 tasks: h = ")).to_be_visible()
+    plan = check_plan(page.download_plan(tmp_path), "sequential")
+    assert [task.name for task in plan.tasks] == ["pick", "pour", "place"]
+    for k, task in enumerate(plan.tasks):
+        page.slide("Plan step", k + 1)
+        page.expect_title(f"· {task.name} ·")
+        expect(page.page.get_by_label("Task", exact=True)).to_have_value(task.name)
+        expect(page.text("panda holds it: feasible")).to_be_visible()
+        turn = round(4 * np.rad2deg(task.delta)) / 4
+        expect(page.slider_box("Rotation (°)")).to_have_value(f"{turn:g}")
+        assert page.page.locator(f"img[alt='plan map {task.name} panda']").count() == 1
+    expect(page.page.locator(".sg-mark")).to_have_count(1 + len(plan.tasks))
+
+
+def test_two_arms_together(open_page, tmp_path):
+    page = open_page(scene="log_two_robots")
+    expect(page.button("One grasp for all tasks")).to_be_disabled()
+    parked = page.settled_view()
+    page.button("All arms together").click()
+    expect(page.text("2 arms hold the object together in lift.")).to_be_visible()
+    plan = check_plan(page.download_plan(tmp_path), "bimanual")
+    assert [hold.arm for hold in plan.tasks[0].holds] == ["left", "right"]
+    expect(page.page.locator("img[alt='handprint']")).to_have_count(2 + 2 * 2)
+    page.wait_for_change(parked)
+    page.choose("Arm", "right")
+    page.expect_title("· right")
+    expect(page.text("right holds it: feasible")).to_be_visible()
+
+
+def test_no_plan_is_said_in_a_line_and_the_page_lives_on(open_page):
+    page = open_page(scene="pick_pour_place")
+    page.slide("x (cm)", 110)
+    page.expect_title("pick_pour_place")
+    page.button("One grasp for all tasks").click()
+    expect(page.alerts.filter(has_text="no grasp is feasible in task pick")).to_be_visible()
+    expect(page.button("Download plan (JSON)")).to_be_hidden()
+    page.button("Put it back").click()
+    expect(page.alerts).to_have_count(0)
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 3 tasks")).to_be_visible()
+
+
+def test_an_object_inside_an_obstacle_is_named_with_its_depth(open_page):
+    page = open_page()
+    page.slide("z (cm)", -3)
+    expect(page.alerts.filter(has_text="bottle is 30 mm inside table")).to_be_visible()
+
+
+def test_two_browsers_do_not_see_each_other(open_page, bottle_map):
+    one, other = open_page(), open_page()
+    one.slide("Rotation (°)", 45)
+    one.wait_for_picture(lambda p: np.array_equal(p, drawn(bottle_map.shift(np.deg2rad(45)))))
+    one.choose("Scene", "soda_can")
+    one.expect_title("soda_can")
+    assert np.array_equal(other.picture(), drawn(bottle_map))
+    expect(other.slider_box("Rotation (°)")).to_have_value("0")
+    other.slide("Rotation (°)", -15)
+    other.wait_for_picture(lambda p: np.array_equal(p, drawn(bottle_map.shift(np.deg2rad(-15)))))
+    other.expect_title("bottle_on_table")
+    one.expect_title("soda_can")
+
+
+def test_a_long_computation_can_be_cancelled_and_begun_again(open_page, tmp_path, content):
+    content["map"] = {"heights": 60, "angles": 48, "redundancy": 500}
+    long = open_page(str(write_scene(tmp_path, content)), wait_for_map=False)
+    expect(long.text("Computing the map of pick")).to_be_visible()
+    long.button("Cancel").click()
+    expect(long.text("Stopped")).to_be_visible()
+    long.slide("Rotation (°)", 30)  # the page answers, and nothing begins by itself
+    expect(long.text("Stopped")).to_be_visible()
+    long.button("Compute the map").click()
+    expect(long.text("Computing the map of pick")).to_be_visible()
+    long.choose("Scene", "soda_can")
+    long.expect_title("soda_can")
+
+
+def test_names_from_a_file_are_shown_as_text(open_page, tmp_path, content):
+    hostile = '<img src=x onerror="window.hacked=1">'
+    script = "<script>window.hacked=1</script>"
+    content["name"] = script
+    content["object"]["name"] = hostile
+    content["robots"][0]["name"] = hostile + "robot"
+    content["tasks"][0]["name"] = script + "task"
+    for obstacle in content["obstacles"]:
+        obstacle["name"] = hostile + obstacle["name"]
+    page = open_page(str(write_scene(tmp_path, content)))
+    page.expect_title(f"{script} · {script}task · {hostile}robot")
+    expect(page.text(f"the {hostile} turns")).to_be_visible()
+    page.number("h (cm)", 4)
+    page.number("θ (°)", 90)
+    why = page.text("cannot hold it here: hits an obstacle")
+    expect(why).to_contain_text(f"{hostile}robot/")
+    expect(why).to_contain_text(f"and {hostile}")
+    page.button("One grasp for all tasks").click()
+    expect(page.text(f"{script}task · {hostile}robot · object turned")).to_be_visible()
+    assert page.page.evaluate("window.hacked") is None
+    assert page.complaints == []
