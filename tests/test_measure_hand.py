@@ -166,7 +166,8 @@ def test_of_several_hands_one_must_be_named(tmp_path):
     ],
 )
 def test_what_is_no_parallel_hand(change, message, tmp_path):
-    text = re.sub(*change, box_hand(np.eye(3), (1, 1), {**SIZES, "stroke": 0.009}))
+    old, new = change
+    text = re.sub(old, new, box_hand(np.eye(3), (1, 1), {**SIZES, "stroke": 0.009}))
     path = tmp_path / "boxes.urdf"
     path.write_text(text)
     with pytest.raises(UrdfError, match=message) as caught:

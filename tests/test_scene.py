@@ -9,7 +9,7 @@ import yaml
 
 from symgrasp.errors import ProfileError, SceneError, SymgraspError, UrdfError
 from symgrasp.files import SCENES_DIR
-from symgrasp.poses import from_position_rpy
+from symgrasp.poses import from_position_rpy, translation
 from symgrasp.scene import Scene, scene_schema, shipped_scenes
 from tests.conftest import SHIPPED, write_scene
 
@@ -76,6 +76,51 @@ def test_a_hand_described_in_the_scene(content, tmp_path):
     assert not scene.arm().hand.spans(0.03)
 
 
+def test_a_hand_mounted_on_a_flange():
+    scene = Scene.load("log_iiwa_and_panda")
+    panda, iiwa = scene.arms.values()
+    assert (panda.hand.name, iiwa.hand.name) == ("franka", "wsg50")
+    assert (panda.tool, iiwa.tool) == ("panda_grasptarget", "wsg50_tool")
+    assert iiwa.dof == 7
+    links = iiwa.robot.model.forward(iiwa.robot_values(iiwa.home))
+    flange, base = (links[iiwa.robot.model.link_index(n)] for n in ("lbr_iiwa_link_7", "wsg50_base"))
+    np.testing.assert_allclose(base, flange @ translation([0, 0, 0.045]), atol=1e-12)
+    np.testing.assert_allclose(iiwa.tool_pose(iiwa.home)[:3, 2], flange[:3, 2], atol=1e-9)
+
+
+MOUNT = {"link": "panda_link8", "pose": {"rpy_deg": [0, 0, 45]}, "prefix": "second_"}
+
+
+def test_a_mounted_hand_with_a_prefix(content, tmp_path):
+    del content["robots"][0]["tool"]
+    content["robots"][0].update(hand="pr2", mount=MOUNT)
+    scene = Scene.load(write_scene(tmp_path, content))
+    arm = scene.arm()
+    assert arm.tool == "panda_tool"
+    assert arm.hand.links[0] == "second_gripper_pole"
+    assert "second_left_gripper_joint" in scene.robots["panda"].model.joint_names
+    assert Scene.from_content(json.loads(json.dumps(scene.content))).sha256 == scene.sha256
+
+
+def test_an_inline_hand_brings_its_urdf_table_and_tool(content, tmp_path):
+    """Its relative URDF becomes absolute, so that the content works without the scene's folder."""
+    urdf = (SCENES_DIR / "hands" / "wsg50.urdf").read_text()
+    (tmp_path / "hand.urdf").write_text(urdf)
+    del content["robots"][0]["tool"]
+    hand = {
+        "name": "mine", "urdf": "hand.urdf", "links": ["wsg50_base"], "touch_links": [],
+        "tool": {"link": "wsg50_base", "pose": {"position": [0, 0, 0.15]}},
+        "joints": {"wsg50_joint": [[0, 0], [0.05, 0.03], [0.1, 0.05]]},
+        "min_opening": 0, "max_opening": 0.1, "finger_depth": 0.05, "pad_width": 0.02,
+    }  # fmt: skip
+    content["robots"][0].update(hand=hand, mount=MOUNT)
+    scene = Scene.load(write_scene(tmp_path, content))
+    again = Scene.from_content(json.loads(json.dumps(scene.content)))
+    assert again.sha256 == scene.sha256
+    assert again.arm().hand.joint_values(0.025) == pytest.approx({"second_wsg50_joint": 0.015})
+    assert again.arm().tool == "panda_tool"
+
+
 def test_home_by_name(content, tmp_path):
     content["robots"][0]["home"] = {"panda_joint4": -2.0, "panda_finger_joint1": 0.01}
     scene = Scene.load(write_scene(tmp_path, content))
@@ -84,6 +129,12 @@ def test_home_by_name(content, tmp_path):
     assert home["panda_joint4"] == -2.0
     assert home["panda_finger_joint1"] == 0.01
     assert home["panda_joint1"] == 0.0
+
+
+HAND = {
+    "name": "mine", "links": ["panda_hand"], "touch_links": [], "joints": {"panda_finger_joint1": 0.5},
+    "min_opening": 0, "max_opening": 0.08, "finger_depth": 0.03, "pad_width": 0.02,
+}  # fmt: skip
 
 
 def robot(change):
@@ -106,6 +157,16 @@ BAD = [
     (robot({"tool": "panda_grasp"}), SceneError, "robots[0].tool", "did you mean 'panda_grasptarget'"),
     (robot({"hand": "frank"}), SceneError, "robots[0].hand", "did you mean 'franka'"),
     (robot({"hand": None}), SceneError, "robots[0]", "either tool and hand, or arms"),
+    (robot({"hand": {"name": "mine"}}), SceneError, "robots[0].hand.links", "required"),
+    (robot({"hand": {**HAND, "max_opening": 0.0001, "min_opening": 0.05}}), SceneError,
+     "robots[0].hand.max_opening", "more than 0.05"),
+    (robot({"hand": {**HAND, "joints": {"panda_finger_joint1": [[0, 0]]}}}), SceneError,
+     "robots[0].hand.joints.panda_finger_joint1", "two or more"),
+    (robot({"hand": {**HAND, "urdf": "no.urdf"}}), SceneError, "robots[0].hand.urdf", "existing URDF file"),
+    (robot({"hand": HAND, "tool": None}), SceneError, "robots[0].tool", "hand mine names none"),
+    (robot({"mount": {"link": "panda_link8"}}), SceneError, "robots[0].mount", "a urdf of its own"),
+    (robot({"hand": "wsg50", "mount": {"link": "panda_link9"}}), SceneError,
+     "robots[0].mount.link", "did you mean 'panda_link8'"),
     (robot({"home": [1, 2]}), SceneError, "robots[0].home", "7 values, for panda_joint1"),
     (robot({"home": [9, 0, 0, 0, 0, 0, 0]}), SceneError, "robots[0].home", "panda_joint1 within"),
     (robot({"home": {"joint1": 0}}), SceneError, "robots[0].home", "'panda_joint1'"),
