@@ -23,6 +23,7 @@ __all__ = ["main"]
 
 DEFAULT_SCENE = "bottle_on_table"
 METHODS = {"sequential": ("best", "first", "regrasp"), "bimanual": ("exact", "hill_climb")}
+EXPORT_FORMATS = ("csv", "trajectory", "tsr")
 MAP_ENDINGS = (".npz", ".png", ".json")
 
 # The heavy imports (PyBullet, viser) stand inside the commands that need them: `--help`,
@@ -96,6 +97,11 @@ def _parser() -> argparse.ArgumentParser:
     hand.add_argument("urdf", metavar="URDF", help="a file, or package://<python package>/<path>")
     text = "a link fixed to the palm, best the tool frame (needed where a robot has several hands)"
     hand.add_argument("--tool", metavar="LINK", nargs="+", default=[None], help=text)
+
+    export = add("export", _export, "Write a plan in the format of another tool.")
+    export.add_argument("format", choices=EXPORT_FORMATS)
+    export.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
+    export.add_argument("--out", metavar="FILE", type=Path, required=True, help="the file to write")
 
     schema = add("schema", _schema, "Print the JSON Schema of a file format.")
     schema.add_argument("format", choices=("scene", "plan"))
@@ -196,6 +202,18 @@ def _hand(args: argparse.Namespace) -> int:
         if hand.urdf and args.urdf.startswith("package://"):
             hand = replace(hand, urdf=args.urdf)
         print(indent(hand_yaml(hand), "    "))
+    return 0
+
+
+def _export(args: argparse.Namespace) -> int:
+    from symgrasp.exports import EXPORTS
+    from symgrasp.plan import Plan
+
+    _check_folder(args.out)
+    text = EXPORTS[args.format](Plan.load(args.plan))
+    with write_atomically(args.out) as file:
+        file.write(text.encode())
+    print(f"written to {args.out}")
     return 0
 
 

@@ -13,7 +13,7 @@ ROOT = Path(symgrasp.__file__).parent
 ORDER = [
     "errors", "files", "poses", "meshes", "profile", "manifold", "assembly", "hand", "handprint", "robot",
     "gripper", "measure_hand", "ik", "scene", "reason", "pictures", "fit", "world", "candidates",
-    "feasibility", "engine", "planners", "plan", "verify", "cli", "__main__",
+    "feasibility", "engine", "planners", "plan", "exports", "verify", "cli", "__main__",
 ]  # fmt: skip
 
 
