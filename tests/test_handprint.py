@@ -69,6 +69,15 @@ def test_a_body_on_the_axis_covers_every_angle():
     assert 0 < away.cells.any(axis=0).sum() <= 2
 
 
+def test_a_body_that_only_touches_the_axis_covers_every_angle_there():
+    """Four points with one on the axis: another body may touch that one from any direction."""
+    grid = Manifold(BOTTLE, 10, 12)
+    tip = np.array([[0, 0, 0], [0.001, 0, -0.01], [-0.001, 0, -0.01], [0, 0.001, -0.01]])
+    tool = grasp_to_tool(np.eye(4), grid.h[4], 0.0, 0.0, 0.0)
+    assert np.allclose((tip @ tool[:3, :3].T)[0, :2], 0.0)
+    assert handprint([tip], grid, 4, 0, 0.0).cells.all()
+
+
 def test_a_body_beyond_the_axis_covers_the_far_side():
     """Where it is, as seen from the axis: opposite of the column that the hand grasps at."""
     grid = Manifold(BOTTLE, 10, 12)

@@ -133,6 +133,16 @@ def test_a_tool_link_gives_the_origin_and_is_turned_where_its_axes_are_others(tm
     assert hand.finger_depth == pytest.approx(0.09 - 0.05 - 0.004, abs=2e-4)
 
 
+def test_a_palm_to_one_side_counts_for_what_it_covers_on_both(tmp_path):
+    """A palm 40 mm wide, 12 mm off the middle of the fingers, reaches 8 mm on the narrow side."""
+    text = box_hand(np.eye(3), (1, 1), SIZES)
+    shape = box(np.array([0.04, 0.12, 0.05]), np.array([0, 0, 0.025]))
+    assert shape in text
+    path = tmp_path / "boxes.urdf"
+    path.write_text(text.replace(shape, box(np.array([0.04, 0.12, 0.05]), np.array([0.012, 0, 0.025]))))
+    assert measure_hand(RobotModel(path)).palm_width == pytest.approx(0.016, abs=1e-4)
+
+
 def test_of_several_hands_one_must_be_named(tmp_path):
     one = box_hand(np.eye(3), (1, 1), SIZES).removeprefix("<robot name='boxes'>").removesuffix("</robot>")
     two = one
