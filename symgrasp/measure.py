@@ -18,7 +18,7 @@ from symgrasp.poses import Array, inverse, translation
 
 __all__ = ["SIMPLIFIED", "Measurement", "measure_mesh"]
 
-SIMPLIFIED = 2e-4
+SIMPLIFIED = 1.5e-4
 """Largest difference (m) of r(h) between a measured profile and the few knots that stand for it."""
 
 COLUMNS = 240
@@ -267,13 +267,15 @@ def _curve(surface: _Surface) -> Array:
     noise = 1.4826 * float(np.median(beside))
     solid = np.flatnonzero(radii > 0)
     curve = np.column_stack([surface.levels, radii])[solid[0] : solid[-1] + 1]
-    curve = _flatten_end(curve, surface.rings, surface.ends[0], noise)
+    curve = _smooth_end(curve, surface.rings, surface.ends[0], noise)
     mirror = np.array([-1.0, 1.0])
-    return (_flatten_end((curve * mirror)[::-1], surface.rings, -surface.ends[1], noise) * mirror)[::-1]
+    return (_smooth_end((curve * mirror)[::-1], surface.rings, -surface.ends[1], noise) * mirror)[::-1]
 
 
-def _flatten_end(curve: Array, rings: Array, end: Array, noise: float) -> Array:
-    """Square off the first end of a profile where noise alone keeps it from being flat.
+def _smooth_end(curve: Array, rings: Array, end: Array, noise: float) -> Array:
+    """Replace the first end of a profile, where it is flat but for noise, by a smooth one.
+
+    Near the axis few vertices share all angles, so the median does not average their noise.
 
     Args:
         curve: (n, 2) as [h, r].
@@ -282,15 +284,30 @@ def _flatten_end(curve: Array, rings: Array, end: Array, noise: float) -> Array:
         noise: standard deviation of the surface (m).
     """
     spread = np.maximum.accumulate(end) - np.minimum.accumulate(end)  # NaN from the first gap on
-    flat = spread <= np.minimum(6.0 * noise, rings / 20.0) + 2.0 * EDGE
-    disc = slice(0, int(np.argmin(flat)) if not flat.all() else len(flat))
+    flat = spread <= np.minimum(6.0 * noise, 2.5 * noise + rings / 20.0) + 2.0 * EDGE
+    disc = slice(0, len(flat) if flat.all() else int(np.argmin(flat)))
     if not flat[0] or abs(end[0] - curve[0, 0]) > 6.0 * noise + 2.0 * EDGE:
         return curve
-    height = float(np.average(end[disc], weights=rings[disc]))
+    radii, width = rings[disc], rings[disc][-1]
+    height = float(np.average(end[disc], weights=radii))
     near, far = (curve[np.searchsorted(curve[:, 0], height + k * noise, side="right")] for k in (3, 6))
+    if far[1] > 1.3 * width:
+        return _round_end(curve, radii, end[disc])
     slope = (far[1] - near[1]) / (far[0] - near[0]) if far[0] > near[0] else 0.0
     edge = max(0.0, near[1] + slope * (height - near[0]))
     return np.concatenate([[[height, edge]], curve[curve[:, 0] >= near[0]]])
+
+
+def _round_end(curve: Array, rings: Array, end: Array) -> Array:
+    """Replace the tip of a profile by the paraboloid that fits its rings, by their area."""
+    columns = np.column_stack([np.ones_like(rings), rings**2])
+    root = np.sqrt(rings)
+    (apex, bend), *_ = np.linalg.lstsq(columns * root[:, None], end * root, rcond=None)
+    r = np.linspace(0.0, rings[-1], 12)
+    beyond = (curve[:, 0] > apex + bend * r[-1] ** 2) & (np.maximum.accumulate(curve[:, 1]) > r[-1])
+    if bend <= 0 or not beyond.any():
+        return curve
+    return np.concatenate([np.column_stack([apex + bend * r**2, r]), curve[beyond]])
 
 
 def _deviation(surface: _Surface, curve: Array, closed: bool) -> Array:
