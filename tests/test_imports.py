@@ -11,9 +11,10 @@ import symgrasp
 
 ROOT = Path(symgrasp.__file__).parent
 ORDER = [
-    "errors", "files", "poses", "meshes", "profile", "manifold", "assembly", "hand", "handprint", "robot",
-    "gripper", "measure_hand", "ik", "scene", "reason", "pictures", "fit", "world", "candidates",
-    "feasibility", "engine", "planners", "plan", "exports", "verify", "cli", "__main__",
+    "errors", "files", "poses", "meshes", "meridian", "axis", "mesh_io", "outline", "measure", "profile",
+    "manifold", "assembly", "hand", "handprint", "robot", "gripper", "measure_hand", "ik", "scene",
+    "reason", "pictures", "fit", "world", "candidates", "feasibility", "engine", "planners", "plan",
+    "exports", "verify", "cli", "__main__",
 ]  # fmt: skip
 
 
