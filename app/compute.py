@@ -13,7 +13,8 @@ from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
 from symgrasp.feasibility import FeasibilityMap, Progress, create_map
 from symgrasp.manifold import ROLLS
 from symgrasp.meshes import read_mesh
-from symgrasp.plan import Hold, Plan, plan_bimanual, plan_sequential
+from symgrasp.plan import Hold, Plan
+from symgrasp.planning import plan_bimanual, plan_sequential
 from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
 
@@ -122,9 +123,10 @@ class Workbench:
     ) -> PlanResult:
         """Find one grasp of an arm for all tasks it does alone."""
         tasks = [task.name for task in scene.tasks.values() if task.arms == (arm,)]
-        maps = self._maps([MapRequest(scene, arm, task, poses.get(task)) for task in tasks], progress)
+        requests = [MapRequest(scene, arm, task, poses.get(task)) for task in tasks]
+        maps, rest = self._maps(requests, progress)
         known = {task: result.map for (task, _), result in maps.items()}
-        return _shown(plan_sequential(moved(scene, poses), arm, known), scene, maps)
+        return _shown(plan_sequential(moved(scene, poses), arm, known, progress=rest), scene, maps)
 
     def bimanual(
         self, scene: Scene, poses: Mapping[str, ObjectPose], task: str, progress: Progress
@@ -133,22 +135,21 @@ class Workbench:
         arms = scene.task(task).arms
         if len(arms) < 2:  # says that one arm is not enough before anything is computed
             plan_bimanual(scene, task)
-        requests = [MapRequest(scene, arm, task, poses.get(task)) for arm in arms]
-        share = len(arms) / (len(arms) + 1)
-        maps = self._maps(requests, lambda x: progress(x * share))
+        maps, rest = self._maps([MapRequest(scene, arm, task, poses.get(task)) for arm in arms], progress)
         known = {arm: result.map for (_, arm), result in maps.items()}
-        plan = plan_bimanual(
-            moved(scene, poses), task, known, progress=lambda x: progress(share + x * (1 - share))
-        )
-        return _shown(plan, scene, maps)
+        return _shown(plan_bimanual(moved(scene, poses), task, known, progress=rest), scene, maps)
 
-    def _maps(self, requests: list[MapRequest], progress: Progress) -> dict[tuple[str, str], MapResult]:
-        """Compute several maps; keyed by task and arm."""
-        maps = {}
-        for k, request in enumerate(requests):
-            part = lambda share, k=k: progress((k + share) / len(requests))  # noqa: E731
-            maps[request.task, request.arm] = self.map(request, part)
-        return maps
+    def _maps(
+        self, requests: list[MapRequest], progress: Progress
+    ) -> tuple[dict[tuple[str, str], MapResult], Progress]:
+        """Compute the maps of a plan, by task and arm; the planner's own progress comes after them."""
+        parts = len(requests) + 1
+
+        def part(k: int) -> Progress:
+            return lambda share: progress((k + share) / parts)
+
+        maps = {(r.task, r.arm): self.map(r, part(k)) for k, r in enumerate(requests)}
+        return maps, part(len(requests))
 
 
 def _check_visuals(scene: Scene) -> None:

@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 DEFAULT_SCENE = "bottle_on_table"
-METHODS = {"sequential": ("best", "first", "regrasp"), "bimanual": ("exact", "hill_climb")}
+METHODS = {
+    "sequential": ("best", "first", "regrasp"),
+    "bimanual": ("exact", "hill_climb"),
+    "handover": ("exact",),
+}
 EXPORT_FORMATS = ("csv", "trajectory", "tsr")
 MAP_ENDINGS = (".npz", ".png", ".json")
 
@@ -152,7 +156,7 @@ def _map_content(the_map: FeasibilityMap, ending: str) -> bytes:
 
 
 def _plan(args: argparse.Namespace) -> int:
-    from symgrasp.plan import plan_bimanual, plan_sequential
+    from symgrasp.planning import plan_bimanual, plan_handover, plan_sequential
 
     _check_folder(args.out)
     methods = METHODS[args.kind]
@@ -163,8 +167,10 @@ def _plan(args: argparse.Namespace) -> int:
     progress = _progress(f"{args.kind} plan")
     if args.kind == "sequential":
         plan = plan_sequential(scene, args.arm, method=method, progress=progress)
-    else:
+    elif args.kind == "bimanual":
         plan = plan_bimanual(scene, args.task, method=method, seed=args.seed, progress=progress)
+    else:
+        plan = plan_handover(scene, progress=progress)
     plan.save(args.out)
     for task in plan.tasks:
         print(f"{task.name}: turn the object by {_deg(task.delta):.1f}°")

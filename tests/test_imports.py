@@ -12,9 +12,9 @@ import symgrasp
 ROOT = Path(symgrasp.__file__).parent
 ORDER = [
     "errors", "files", "poses", "meshes", "meridian", "axis", "mesh_io", "outline", "measure", "profile",
-    "manifold", "assembly", "hand", "handprint", "robot", "gripper", "measure_hand", "ik", "scene",
-    "reason", "pictures", "fit", "world", "candidates", "feasibility", "engine", "planners", "plan",
-    "exports", "verify", "cli", "__main__",
+    "objects", "manifold", "assembly", "hand", "handprint", "robot", "gripper", "measure_hand", "ik",
+    "scene", "reason", "pictures", "fit", "object_report", "world", "candidates", "feasibility", "engine",
+    "planners", "plan", "planning", "exports", "verify", "cli", "__main__",
 ]  # fmt: skip
 
 

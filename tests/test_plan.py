@@ -13,9 +13,10 @@ import pytest
 from symgrasp.errors import NoPlanError, PlanError, SceneError
 from symgrasp.feasibility import create_map
 from symgrasp.manifold import grasp_to_tool
-from symgrasp.plan import Plan, plan_bimanual, plan_schema, plan_sequential
+from symgrasp.plan import Plan, plan_schema
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.postures import Postures
+from symgrasp.planning import plan_bimanual, plan_sequential
 from symgrasp.poses import from_position_quat, pose_error, rotation_z
 from symgrasp.reason import Reason
 from symgrasp.scene import Scene, scene_schema

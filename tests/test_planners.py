@@ -15,10 +15,18 @@ from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import Manifold, wrap
 from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
 from symgrasp.planners.conflicts import fewest_regrasps, height_gap, smallest_conflicts
-from symgrasp.planners.sequential import best_common_grasp, common_grasps, first_common_grasp
+from symgrasp.planners.gaps import PrintGaps
+from symgrasp.planners.holding import HoldingSearch, hold_runs
+from symgrasp.planners.sequential import common_grasps, first_common_grasp
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
 from tests.conftest import load_small
+
+
+@cache
+def no_gaps() -> PrintGaps:
+    return PrintGaps([], GRID)
+
 
 GRID = Manifold(Profile([[0, 0.03], [0.4, 0.03]]), 5, 12)
 
@@ -80,6 +88,8 @@ def test_first_common_grasp_by_brute_force(maps):
 @settings(max_examples=100, deadline=None)
 def test_best_common_grasp_by_brute_force(maps):
     """No other height, roll and choice of angles has a better worst margin."""
+    runs = hold_runs([["arm"]] * len(maps))
+    search = HoldingSearch({(k, "arm"): m for k, m in enumerate(maps)}, runs, no_gaps())
     best = 0.0
     for roll, row in product(range(2), range(5)):
         radius = float(GRID.profile.radius(GRID.h[row]))
@@ -89,19 +99,20 @@ def test_best_common_grasp_by_brute_force(maps):
             worst = min(worst, max((min(a, b * radius) for a, b in margins), default=0.0))
         best = max(best, worst)
     if best == 0.0:
-        with pytest.raises(NoPlanError):
-            best_common_grasp(maps)
+        assert next(search.best_first(), None) is None
         assert not common_grasps(maps)
         return
-    found = best_common_grasp(maps)
+    found = next(search.best_first())
+    (grasp,) = found.cells
+    assert search.turns(found.cells, 0)[0] == 0  # the first task needs no turn
     reached = np.inf
-    for m, cell, delta in zip(maps, found.cells, found.deltas, strict=True):
-        assert m.feasible[cell]
-        assert m.shift(delta).feasible[found.grasp]
-        assert (cell.roll, cell.row) == (found.grasp.roll, found.grasp.row)
+    for k, m in enumerate(maps):
+        turn = search.turns(found.cells, k)[0]
+        assert m.shift(turn * GRID.dtheta).feasible[grasp]
+        cell = grasp._replace(column=(grasp.column + turn) % 12)
         along, around = m.margin(cell)
         reached = min(reached, along, around * float(GRID.profile.radius(GRID.h[cell.row])))
-    assert reached == pytest.approx(best)
+    assert reached == pytest.approx(best) == found.score
     assert common_grasps(maps)[0].margin == pytest.approx(best)
 
 

@@ -37,8 +37,8 @@ class PrintGaps:
             [[a.handprint(grid, i, r) for i in range(grid.heights)] for r in range(len(ROLLS))] for a in arms
         ]
         every = [p for arm in prints for roll in arm for p in roll]
-        first = min(p.first_row for p in every)
-        last = max(p.first_row + len(p.cells) for p in every)
+        first = min((p.first_row for p in every), default=0)
+        last = max((p.first_row + len(p.cells) for p in every), default=0)
         shape = (len(ROLLS), grid.heights, last - first, grid.angles)
         self._prints = [np.zeros(shape, dtype=np.bool_) for _ in arms]
         for k, arm in enumerate(prints):

@@ -1,4 +1,4 @@
-"""One grasp for a sequence of tasks: Algorithm 2 of the paper, and the best such grasp.
+"""One grasp for a sequence of tasks: Algorithm 2 of the paper, and all such grasps.
 
 Turning the object is free in every task, so a task cares only about the grasp's height and roll:
 at the right turn any angle at which its map is feasible there will do. All planners below rest on
@@ -18,7 +18,7 @@ from symgrasp.manifold import ROLLS, wrap
 from symgrasp.planners.conflicts import explain_conflict
 from symgrasp.poses import Array
 
-__all__ = ["CommonGrasp", "SequentialGrasp", "best_common_grasp", "common_grasps", "first_common_grasp"]
+__all__ = ["CommonGrasp", "SequentialGrasp", "common_grasps", "first_common_grasp"]
 
 
 class SequentialGrasp(NamedTuple):
@@ -69,25 +69,6 @@ def first_common_grasp(maps: Sequence[FeasibilityMap]) -> SequentialGrasp:
             if None not in columns:
                 return _grasp(maps, roll, row, [c for c in columns if c is not None])
     raise NoPlanError(explain_conflict(maps))
-
-
-def best_common_grasp(maps: Sequence[FeasibilityMap]) -> SequentialGrasp:
-    """Return the common grasp whose worst task has the largest margin on the surface.
-
-    Args:
-        maps: the map of every task, all over the same grid.
-
-    Raises:
-        NoPlanError: no height and roll is feasible in every task; says why.
-        InputError: there is no map, or the grids differ.
-    """
-    check_same_grid(maps)
-    margins = [surface_margin(m) for m in maps]
-    worst = np.min([m.max(axis=2) for m in margins], axis=0)
-    if worst.max() <= 0:
-        raise NoPlanError(explain_conflict(maps))
-    roll, row = (int(k) for k in np.unravel_index(worst.argmax(), worst.shape))
-    return _grasp(maps, roll, row, [int(m[roll, row].argmax()) for m in margins])
 
 
 def common_grasps(maps: Sequence[FeasibilityMap]) -> list[CommonGrasp]:
