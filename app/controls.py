@@ -115,7 +115,7 @@ class Controls:
             )
             self._on(self.lean, lambda s, v: s.move(lean=np.deg2rad(v)), "inputs")
             self.towards = gui.add_slider(
-                "towards (°)", -180.0, 180.0, 1.0, 0.0, hint="Direction the axis leans to; 0 is along x."
+                "Lean to (°)", -180.0, 180.0, 1.0, 0.0, hint="Direction the axis leans to; 0 is along x."
             )
             self._on(self.towards, lambda s, v: s.move(towards=np.deg2rad(v)), "inputs")
             self.gizmo = gui.add_checkbox("Drag handles", False)

@@ -52,7 +52,9 @@ def grasp_html(state: State) -> str:
     if witness is None:
         return f'<div class="sg"><b>{place}</b><br>{escape(state.arm)} cannot hold it here: {why}</div>'
     margin = state.map.margin(state.cell)
-    joints = ", ".join(f"{angle:.0f}°" for angle in np.rad2deg(witness.q))
+    holds = state.shown.holds if state.shown else ()
+    q = next((list(hold.joints.values()) for hold in holds if hold.arm == state.arm), witness.q)
+    joints = ", ".join(f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(q)))
     return (
         f'<div class="sg"><b>{place}</b><br>{escape(state.arm)} holds it: {why}; '
         f"room for {100 * margin.along:.1f} cm along and {np.rad2deg(margin.around):.1f}° around"

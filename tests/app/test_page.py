@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 import subprocess
 import sys
@@ -90,6 +91,13 @@ def test_the_readout_says_how_and_why_not():
     assert "panda cannot hold it here: " + missed.map.why(missed.cell) in grasp_html(missed)
     assert "waits for the map" in grasp_html(missed.move(x=0.5))
     assert "No grasp picked" in grasp_html(state)
+
+
+def test_the_joints_of_a_plan_are_read_out_as_the_plan_has_them():
+    state = with_plan("log_two_robots", "bimanual")
+    for hold in state.shown.holds:
+        joints = ", ".join(f"{round(math.degrees(q)) + 0:d}°" for q in hold.joints.values())
+        assert f"Joints {joints};" in grasp_html(state.choose_arm(hold.arm))
 
 
 def test_the_plan_is_summed_up():

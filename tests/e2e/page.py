@@ -138,11 +138,10 @@ class GraspPage:
         row = self.page.locator(f"xpath=//*[normalize-space(text())='{label}']/ancestor::*[.//input][1]")
         return row.locator("input").last
 
-    def click_3d(self, scene: Scene, point: np.ndarray) -> None:
-        """Click a point (3,) of the world in the 3D view, seen from where the page looks at first."""
-        box = self.page.locator("canvas").first.bounding_box()
+    def at(self, scene: Scene, point: np.ndarray) -> tuple[float, float]:
+        """Return the pixel of a point (3,) of the world, seen from where the page looks at first."""
+        box, size = self.page.locator("canvas").first.bounding_box(), self.page.viewport_size
         assert box
-        size = self.page.viewport_size
         assert size
         view = viewpoint(scene, scene.task().T_world_object)
         eye = view.camera((size["width"] - PANELS_WIDTH) / size["height"])
@@ -152,8 +151,24 @@ class GraspPage:
         up = np.cross(right, forward)
         x, y, depth = np.stack([right, up, forward]) @ (point - eye)
         scale = box["height"] / 2 / np.tan(FIELD_OF_VIEW / 2) / depth
-        middle = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
-        self.page.mouse.click(*(middle + scale * np.array([x, -y])))
+        return box["x"] + box["width"] / 2 + scale * x, box["y"] + box["height"] / 2 - scale * y
+
+    def click_3d(self, scene: Scene, point: np.ndarray) -> None:
+        """Click a point of the world in the 3D view."""
+        self.page.mouse.click(*self.at(scene, point))
+
+    def drag_3d(self, scene: Scene, start: np.ndarray, end: np.ndarray) -> None:
+        """Drag what is at a point of the world to another."""
+        mouse = self.page.mouse
+        mouse.move(*self.at(scene, start - 0.02 * (end - start)))
+        self.settled_view()
+        mouse.move(*self.at(scene, start))
+        self.settled_view()  # the handle has noticed the pointer
+        mouse.down()
+        for share in np.linspace(0, 1, 6):
+            mouse.move(*self.at(scene, start + share * (end - start)))
+            self.view()
+        mouse.up()
 
     def download_plan(self, to: Path) -> dict[str, Any]:
         with self.page.expect_download() as download:

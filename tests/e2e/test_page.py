@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import jsonschema
@@ -102,7 +103,7 @@ def test_a_feasible_cell_poses_the_arm(open_page, bottle_map):
     roll = RollChoice.EITHER.roll(bottle_map, row, column)
     witness = bottle_map.witness((roll, row, column))
     assert witness
-    joints = ", ".join(f"{angle:.0f}°" for angle in np.rad2deg(witness.q))
+    joints = ", ".join(f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(witness.q)))
     expect(page.text("panda holds it: feasible")).to_be_visible()
     expect(page.text(f"Joints {joints}")).to_be_visible()
     page.wait_for_change(parked)
@@ -157,6 +158,20 @@ def test_clicking_the_flat_map_picks_a_cell(open_page, bottle_map):
     point = board_position(State.of(BOTTLE, ""), view) + x * view.right + [0.0, 0.0, y]
     page.click_3d(BOTTLE, point)
     expect_picked(page, grid.h[row], grid.theta[column])
+
+
+def test_dragging_the_handles_moves_the_object(open_page):
+    page = open_page()
+    page.settled_view()
+    page.page.get_by_label("Drag handles").check()
+    bottle = BOTTLE.task().T_world_object[:3, 3]
+    page.drag_3d(BOTTLE, bottle + np.array([0.0, 0.13, 0.0]), bottle + np.array([0.0, 0.23, 0.0]))
+    box = page.slider_box("y (cm)")
+    expect(box).to_have_value(re.compile(r"^(9|10|11)(\.5)?$"))
+    expect(page.slider_box("x (cm)")).to_have_value("55")
+    page.expect_title("pick")
+    moved = State.of(BOTTLE, "").move(y=float(box.input_value()) / 100)
+    assert np.mean(page.picture() == drawn(create_map(moved.moved_scene()))) > 0.9  # the box rounds
 
 
 def check_plan(content: dict[str, Any], kind: str) -> Plan:
