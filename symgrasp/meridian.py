@@ -36,7 +36,7 @@ class Cuts(NamedTuple):
 
 def column_angles(columns: int) -> Array:
     """Return the angles (columns,) (rad) of half-planes at equal distances all around."""
-    return (np.arange(columns) + 0.5) * (2 * np.pi / columns)
+    return np.linspace(0.0, 2 * np.pi, columns, endpoint=False) + np.pi / columns
 
 
 def cut(vertices: Array, faces: np.ndarray, columns: int) -> Cuts:

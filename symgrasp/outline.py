@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from symgrasp.poses import Array
 
@@ -26,7 +26,7 @@ def distance_outside(points: Array, outline: Array) -> Array:
     segment = np.repeat(np.arange(len(lengths)), count)
     s = (np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1).clip(1)[segment]
     samples = closed[segment] + s[:, None] * (closed[segment + 1] - closed[segment])
-    nearest = segment[cKDTree(samples).query(points)[1]]
+    nearest = segment[KDTree(samples).query(points)[1]]
     distance = np.full(len(points), np.inf)
     for step in (-1, 0, 1):
         k = np.clip(nearest + step, 0, len(lengths) - 1)

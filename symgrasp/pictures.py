@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symgrasp.measure import Measurement
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_map", "draw_openings", "to_png"]
+__all__ = ["draw_map", "draw_object", "draw_openings", "to_png"]
 
 
 def draw_map(reason: np.ndarray, heights: tuple[float, float], theta_start: float, title: str) -> Figure:
@@ -94,6 +95,44 @@ def draw_openings(
     labels = {Reason.FEASIBLE: "fits"}
     patches = [Patch(color=r.color, label=labels.get(r, r.label)) for r in seen]
     figure.legend(handles=patches, loc="outside right center", frameon=False)
+    return figure
+
+
+def draw_object(points: Array, measurement: Measurement | None, title: str) -> Figure:
+    """Draw a profile, and beside it how far the mesh it was measured from deviates from it.
+
+    Args:
+        points: (n, 2) knots [h, r] (m).
+        measurement: of the mesh, if there is one.
+        title: text above the panels.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 4.2) if measurement else (4, 4.2), layout="constrained")
+    if measurement:
+        outline, panel = figure.subplots(1, 2, sharey=True, width_ratios=(1, 2))
+        limit = 1e3 * max(measurement.worst[0], 1e-5)
+        image = panel.imshow(
+            1e3 * measurement.deviation,
+            origin="lower",
+            aspect="auto",
+            interpolation="nearest",
+            extent=(-180, 180, 100 * measurement.heights[0], 100 * measurement.heights[-1]),
+            cmap="RdBu_r",
+            vmin=-limit,
+            vmax=limit,
+        )
+        panel.set(xlabel="θ (°)", xticks=np.arange(-180, 181, 60))
+        panel.set_title(f"deviation, at most {measurement.worst[0] * 1e3:.2g} mm", fontsize="medium")
+        figure.colorbar(image, ax=panel, label="mm outside the profile")
+    else:
+        outline = figure.subplots()
+    h, r = 100 * points[:, 0], 1e3 * points[:, 1]
+    outline.fill_betweenx(h, -r, r, color="#dcdcdc")
+    outline.plot(r, h, marker=".", color="#3b3b3b")
+    outline.plot(-r, h, color="#3b3b3b")
+    outline.set(xlabel="r (mm)", ylabel="h (cm)")
+    figure.suptitle(title)
     return figure
 
 

@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import ProfileError
-from symgrasp.measure import measure_mesh
+from symgrasp.measure import Measurement, measure_mesh
 from symgrasp.poses import Array
 
 __all__ = ["COLLISION_FACETS", "Profile"]
@@ -77,8 +77,12 @@ class Profile:
             MeshError: the file is unusable, or what it shows is no object of revolution; see
                 `symgrasp.measure.measure_mesh`, which also tells how symmetric it is.
         """
-        measurement = measure_mesh(path, scale=scale)
-        profile = cls(measurement.points, str(path))
+        return cls.measured(measure_mesh(path, scale=scale))
+
+    @classmethod
+    def measured(cls, measurement: Measurement) -> Profile:
+        """Return the profile that a measurement found."""
+        profile = cls(measurement.points, measurement.source)
         profile.T_mesh_object = measurement.T_mesh_object
         return profile
 
