@@ -62,11 +62,16 @@ def to_tsr(plan: Plan) -> str:
 
     A region holds every tool pose ``T_world_object · T_ref_tsr · Rz(yaw)·Trans(0, 0, z) · Tw_e``
     with z and yaw inside Bw (rows x, y, z, roll, pitch, yaw): the whole turn about the object's
-    axis, and the heights around the grasp that the hand can hold with the same standoff.
+    axis, and the heights around the grasp, inside its margin in every task, that the hand can hold
+    with the same opening.
     """
     scene = Scene.from_content(plan.scene.content, "plan: scene.content")
-    grasps = {(h.arm, h.grasp.h, h.grasp.roll): h for task in plan.tasks for h in task.holds}
-    regions = [_region(plan, scene, hold) for hold in grasps.values()]
+    tightest: dict[tuple[str, float, float], Hold] = {}
+    for hold in (hold for task in plan.tasks for hold in task.holds):
+        known = tightest.setdefault((hold.arm, hold.grasp.h, hold.grasp.roll), hold)
+        if hold.margin_along < known.margin_along:
+            tightest[hold.arm, hold.grasp.h, hold.grasp.roll] = hold
+    regions = [_region(plan, scene, hold) for hold in tightest.values()]
     return yaml.safe_dump_all(regions, sort_keys=False, allow_unicode=True)
 
 

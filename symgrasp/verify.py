@@ -105,8 +105,13 @@ def _check_order(plan: Plan, scene: Scene, report: Report) -> None:
         extra = [name for name in names if name not in expected]
         report.expect(not extra, f"tasks: {extra} are not in the sequence {expected}")
         report.expect(len(arms) == 1, f"tasks: one arm does the sequence, not {sorted(arms)}")
-    else:
+    elif plan.kind == "bimanual":
         report.expect(len(plan.tasks) == 1 and len(arms) > 1, "tasks: one task with several arms")
+    else:
+        names = [task.name for task in plan.tasks]
+        report.expect(
+            names == list(scene.tasks), f"tasks: {names}, but the scene asks for {list(scene.tasks)}"
+        )
     for k, (before, after) in enumerate(pairwise(plan.tasks), start=1):
         if before.name == after.name:  # set down and grasped anew
             same = before.object_pose == after.object_pose

@@ -16,12 +16,13 @@ from symgrasp.manifold import grasp_to_tool
 from symgrasp.plan import Plan, plan_schema
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.postures import Postures
-from symgrasp.planning import plan_bimanual, plan_sequential
+from symgrasp.planning import plan_bimanual, plan_handover, plan_sequential
 from symgrasp.poses import from_position_quat, pose_error, rotation_z
 from symgrasp.reason import Reason
 from symgrasp.scene import Scene, scene_schema
+from symgrasp.verify import verify
 from symgrasp.world import BulletWorld
-from tests.conftest import load_small
+from tests.conftest import load_small, write_scene
 
 
 @cache
@@ -34,7 +35,12 @@ def bimanual() -> Plan:
     return plan_bimanual(load_small("log_two_robots", 20, 24, 6))
 
 
-PLANS = [sequential, bimanual]
+@cache
+def handover() -> Plan:
+    return plan_handover(load_small("handover_between_robots", 12, 24, 8))
+
+
+PLANS = [sequential, bimanual, handover]
 
 
 @pytest.mark.parametrize("make", PLANS)
@@ -82,6 +88,29 @@ def test_shipped_planners_do_not_end_at_the_first_cell():
     first = load_small("pick_pour_place", 12, 24, 8).manifold
     grasp = sequential().tasks[0].holds[0].grasp
     assert first.cell(grasp.h, grasp.theta) != (0, 0)
+
+
+def test_a_handover_keeps_both_grasps():
+    """Left picks and gives, right takes and places; each keeps its grasp as long as it holds on."""
+    pick, give, place = handover().tasks
+    assert [h.arm for h in give.holds] == ["left", "right"]
+    assert pick.holds[0].grasp == give.holds[0].grasp
+    assert give.holds[1].grasp == place.holds[0].grasp
+
+
+def test_a_handover_needs_somebody_who_carries(content, tmp_path):
+    robot = content["robots"][0]
+    content["robots"].append({**robot, "name": "other", "base": {"position": [0, 2, 0]}})
+    content["tasks"].append({"name": "place", "arms": ["other"], "pose": {"position": [0.55, 1.9, 0]}})
+    scene = Scene.load(write_scene(tmp_path, content))
+    with pytest.raises(SceneError, match="an arm that carries the object there from task 'pick'"):
+        plan_handover(scene)
+
+
+def test_four_arms():
+    plan = plan_bimanual(load_small("log_four_robots", 24, 12, 4))
+    assert len(plan.tasks[0].holds) == 4
+    assert verify(plan).holds
 
 
 def test_two_arms_hold_apart():

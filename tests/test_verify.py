@@ -13,7 +13,7 @@ from symgrasp.cli import main
 from symgrasp.errors import PlanError
 from symgrasp.plan import Plan
 from symgrasp.verify import verify
-from tests.test_plan import PLANS, bimanual, sequential
+from tests.test_plan import PLANS, bimanual, handover, sequential
 
 UNCHECKED = ("schema_version", "versions", "planner", "units", "frames")
 """What a plan says about its making rather than about the world."""
@@ -86,6 +86,8 @@ def edit(make, change) -> dict:
     ("make", "change"),
     [
         (sequential, lambda c: c["tasks"].pop()),
+        (handover, lambda c: c["tasks"].pop(1)),
+        (handover, lambda c: c["tasks"][2]["holds"].__setitem__(0, c["tasks"][1]["holds"][0])),
         (sequential, lambda c: c["tasks"].pop(0)),
         (sequential, lambda c: c["tasks"].reverse()),
         (sequential, lambda c: c.update(tasks=[])),
