@@ -13,7 +13,8 @@ from app.meshes import link_visuals
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.robot import RobotModel
-from symgrasp.scene import Obstacle, Scene
+from symgrasp.scene import Scene
+from symgrasp.scene_build import Obstacle
 
 __all__ = [
     "FIELD_OF_VIEW",

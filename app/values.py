@@ -11,7 +11,8 @@ import numpy as np
 from symgrasp.feasibility import FeasibilityMap
 from symgrasp.plan import Plan
 from symgrasp.poses import Array, axis_frame, rotation_z, spin
-from symgrasp.scene import Scene, Task
+from symgrasp.scene import Scene
+from symgrasp.scene_build import Task
 
 __all__ = ["MapRequest", "MapResult", "ObjectPose", "PlanResult", "RollChoice", "moved"]
 

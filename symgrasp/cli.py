@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from symgrasp.errors import InputError, NoPlanError, SymgraspError, one_of
 from symgrasp.files import resolve, write_atomically
-from symgrasp.scene import Scene, scene_schema, shipped_scenes
+from symgrasp.scene import Scene, shipped_scenes
+from symgrasp.scene_file import scene_schema
 
 if TYPE_CHECKING:
     from symgrasp.feasibility import FeasibilityMap

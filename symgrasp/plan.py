@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from symgrasp.errors import PlanError
 from symgrasp.files import write_atomically
 from symgrasp.poses import Array, quat_wxyz
-from symgrasp.scene import describe
+from symgrasp.scene_file import describe
 
 __all__ = [
     "CLEARANCE_LIMIT",

@@ -21,7 +21,8 @@ from symgrasp.planners.holding import HoldingSearch, HoldRun, hold_runs
 from symgrasp.planners.postures import Posture, Postures
 from symgrasp.planners.sequential import first_common_grasp
 from symgrasp.poses import rotation_z
-from symgrasp.scene import Scene, Task
+from symgrasp.scene import Scene
+from symgrasp.scene_build import Task
 from symgrasp.world import BulletWorld
 
 __all__ = ["plan_bimanual", "plan_handover", "plan_sequential"]

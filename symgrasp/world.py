@@ -25,7 +25,8 @@ from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, axis_frame, quat_wxyz, wxyz_to_xyzw
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm, Robot, RobotModel
-from symgrasp.scene import Obstacle, Scene
+from symgrasp.scene import Scene
+from symgrasp.scene_build import Obstacle
 
 
 @contextmanager

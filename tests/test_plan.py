@@ -19,7 +19,8 @@ from symgrasp.planners.postures import Postures
 from symgrasp.planning import plan_bimanual, plan_handover, plan_sequential
 from symgrasp.poses import from_position_quat, pose_error, rotation_z
 from symgrasp.reason import Reason
-from symgrasp.scene import Scene, scene_schema
+from symgrasp.scene import Scene
+from symgrasp.scene_file import scene_schema
 from symgrasp.verify import verify
 from symgrasp.world import BulletWorld
 from tests.conftest import load_small, write_scene

@@ -10,7 +10,8 @@ import yaml
 from symgrasp.errors import ProfileError, SceneError, SymgraspError, UrdfError
 from symgrasp.files import SCENES_DIR
 from symgrasp.poses import from_position_rpy, translation
-from symgrasp.scene import Scene, scene_schema, shipped_scenes
+from symgrasp.scene import Scene, shipped_scenes
+from symgrasp.scene_file import scene_schema
 from tests.conftest import SHIPPED, write_scene
 
 
