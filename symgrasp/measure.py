@@ -4,40 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import trimesh
 
-from symgrasp.axis import find_axis, frame_along
+from symgrasp.axis import find_axis
 from symgrasp.errors import MeshError
-from symgrasp.meridian import column_angles, cut, envelope
+from symgrasp.meridian import column_angles
 from symgrasp.mesh_io import read_body
 from symgrasp.outline import distance_outside, simplify
-from symgrasp.poses import Array, inverse, translation
+from symgrasp.poses import Array, translation
+from symgrasp.surface import COLUMNS, EDGE, Surface, stand_up, survey
 
 __all__ = ["SIMPLIFIED", "Measurement", "measure_mesh"]
 
 SIMPLIFIED = 1.5e-4
 """Largest difference (m) of r(h) between a measured profile and the few knots that stand for it."""
 
-COLUMNS = 240
-"""Angles at which the surface is measured."""
-
-STEP, FEWEST_ROWS, MOST_ROWS = 1e-4, 200, 4000
-"""Distance (m) of the heights at which it is measured, and how many they are."""
-
-RINGS = 96
-"""Radii at which the ends are measured."""
-
-EDGE = 1e-6
-"""Distance (m) from a ring of vertices at which the profile is measured on either side of it."""
-
 COVERED = 0.9
 """Share of the angles at which an open mesh must have a surface, at every height."""
-
-UPRIGHT = np.cos(np.deg2rad(10.0))
-"""An axis this near to the file's own vertical is taken to stand in the file as it stands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,26 +81,6 @@ class Measurement:
         return float(np.sqrt(np.nanmean(self.deviation**2)))
 
 
-class _Surface(NamedTuple):
-    """The outer surface of a mesh in its object frame, over a grid.
-
-    Attributes:
-        levels: (k,) heights of the rows.
-        even: (k,) bool, which of them are evenly spaced.
-        radius: (k, COLUMNS) distance of the outermost surface from the axis, 0 where there is none.
-        rho: (k, COLUMNS) the same with facets undone, 0 where there is none.
-        rings: (RINGS,) radii.
-        ends: (2, RINGS) height of the bottom and of the top at those radii, NaN where open.
-    """
-
-    levels: Array
-    even: np.ndarray
-    radius: Array
-    rho: Array
-    rings: Array
-    ends: Array
-
-
 def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | None = None) -> Measurement:
     """Measure the object of revolution that a mesh shows, wherever it lies in its file.
 
@@ -135,16 +100,17 @@ def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | Non
     if tolerance is not None and not tolerance > 0:
         raise MeshError(source, "tolerance", tolerance, "a length in metres above zero")
     mesh = read_body(path, scale)
-    T_mesh_object = _stand_up(mesh, find_axis(mesh), vertical=1 if source.lower().endswith(".glb") else 2)
-    surface = _survey(mesh, T_mesh_object)
+    T_mesh_object = stand_up(mesh, find_axis(mesh), vertical=1 if source.lower().endswith(".glb") else 2)
+    surface = survey(mesh, T_mesh_object)
     _check_closed(source, mesh, surface)
     curve = _curve(surface)
     points = simplify(curve, SIMPLIFIED)
     bottom = points[0, 0]
-    deviation = _deviation(surface, curve, mesh.is_watertight)
+    outline = simplify(curve, 0.05 * SIMPLIFIED)
+    deviation = _deviation(surface, outline, mesh.is_watertight)
     limit = max(1.5e-3, 0.03 * float(points[:, 1].max())) if tolerance is None else tolerance
-    angles = (column_angles(COLUMNS) + np.pi) % (2 * np.pi) - np.pi
-    _check_symmetric(source, deviation, surface.levels - bottom, angles, limit)
+    angles = _wrap(column_angles(COLUMNS))
+    _check_symmetric(source, surface, outline, deviation, limit)
     rows = surface.even & (surface.levels > points[0, 0]) & (surface.levels < points[-1, 0])
     order = np.argsort(angles)
     return _frozen(
@@ -167,70 +133,7 @@ def _frozen(measurement: Measurement) -> Measurement:
     return measurement
 
 
-def _survey(mesh: trimesh.Trimesh, T_mesh_object: Array) -> _Surface:
-    """Measure the outer surface of a mesh in an object frame."""
-    to_object = inverse(T_mesh_object)
-    vertices = mesh.vertices @ to_object[:3, :3].T + to_object[:3, 3]
-    cuts = cut(vertices, np.asarray(mesh.faces), COLUMNS)
-    levels, even = _levels(vertices[:, 2])
-    radius, rho = envelope(cuts.column, cuts.h, cuts.r, levels, COLUMNS, cuts.rho)
-    rings = (np.arange(RINGS) + 0.5) * (np.hypot(vertices[:, 0], vertices[:, 1]).max() / RINGS)
-    ends = []
-    for sign in (-1.0, 1.0):
-        heights, _ = envelope(cuts.column, cuts.r, sign * cuts.h, rings, COLUMNS)
-        ends.append(np.where(np.isfinite(heights).all(axis=1), sign * np.median(heights, axis=1), np.nan))
-    return _Surface(levels, even, np.maximum(radius, 0.0), np.nan_to_num(rho), rings, np.array(ends))
-
-
-def _levels(heights: Array) -> tuple[Array, np.ndarray]:
-    """Return heights to measure at, and which are even.
-
-    Where many vertices share a height the profile may bend or jump there, so it is measured just
-    below and just above: that is what keeps shoulders sharp.
-    """
-    bottom, top = heights.min(), heights.max()
-    count = int(np.clip((top - bottom) / STEP, FEWEST_ROWS, MOST_ROWS))
-    evenly = bottom + (np.arange(count) + 0.5) * ((top - bottom) / count)
-    ordered = np.sort(heights)
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > 5 * EDGE) + 1)
-    rings = [g for g in groups if len(g) >= 8 and g[-1] - g[0] < 10 * EDGE]
-    beside = [level for g in rings for level in (g[0] - EDGE, g[-1] + EDGE)]
-    closer = EDGE * 1.25 ** np.arange(int(np.log(STEP * 10 / EDGE) / np.log(1.25)))
-    levels = np.concatenate([evenly, beside, bottom + closer, top - closer])
-    order = np.argsort(levels, kind="stable")
-    return levels[order], (np.arange(len(levels)) < count)[order]
-
-
-def _stand_up(mesh: trimesh.Trimesh, T_mesh_axis: Array, vertical: int) -> Array:
-    """Turn an axis frame so that its z points from the bottom to the top of the object."""
-    axis, origin = T_mesh_axis[:3, 2], T_mesh_axis[:3, 3]
-    if abs(axis[vertical]) >= UPRIGHT:
-        return frame_along(axis * np.sign(axis[vertical]), origin)
-    surface = _survey(mesh, T_mesh_axis)
-    upright = _points_up(surface)
-    if upright is None:
-        upright = bool(axis[2] >= 0)
-    return frame_along(axis if upright else -axis, origin)
-
-
-def _points_up(surface: _Surface) -> bool | None:
-    """Whether the bottom of an object is the end with the lower h; None where both look alike."""
-    low, high = surface.levels[0], surface.levels[-1]
-    height = high - low
-    # How far an end lies back near the axis, as in the mouth of a glass; a hole goes all through.
-    inner = np.median(surface.ends[:, : RINGS // 8], axis=1)
-    hollow = np.nan_to_num(np.abs(inner - [low, high]), nan=height)
-    if abs(hollow[0] - hollow[1]) > 0.1 * height:
-        return bool(hollow[0] < hollow[1])
-    radii = np.median(surface.rho, axis=1)
-    near = min(1e-3, 0.02 * height)
-    widths = [float(np.interp(h, surface.levels, radii)) for h in (low + near, high - near)]
-    if abs(widths[0] - widths[1]) > 0.05 * max(widths):
-        return widths[0] > widths[1]
-    return None
-
-
-def _check_closed(source: str, mesh: trimesh.Trimesh, surface: _Surface) -> None:
+def _check_closed(source: str, mesh: trimesh.Trimesh, surface: Surface) -> None:
     """Refuse an open mesh with heights at which no surface goes around the axis."""
     if mesh.is_watertight:
         return
@@ -247,18 +150,32 @@ def _check_closed(source: str, mesh: trimesh.Trimesh, surface: _Surface) -> None
         )  # fmt: skip
 
 
-def _check_symmetric(source: str, deviation: Array, heights: Array, angles: Array, tolerance: float) -> None:
-    size = np.nan_to_num(np.abs(deviation))
-    row, column = np.unravel_index(np.argmax(size), size.shape)
-    if size[row, column] > tolerance:
-        where = f"height {heights[row]:.3f} m, angle {np.rad2deg(angles[column]):.0f}°"
+def _check_symmetric(
+    source: str, surface: Surface, outline: Array, deviation: Array, tolerance: float
+) -> None:
+    """Refuse a surface that deviates by more than the tolerance anywhere, also between the columns."""
+    grid = np.nan_to_num(deviation).ravel()
+    # Vertices are what sticks out furthest; those inside may belong to the inside of a hollow object.
+    corners = np.maximum(distance_outside(surface.corners[:, :2], outline), 0.0)
+    at = np.column_stack(
+        [np.repeat(surface.levels, COLUMNS), np.tile(column_angles(COLUMNS), len(deviation))]
+    )
+    values = np.concatenate([grid, corners])
+    places = np.concatenate([at, surface.corners[:, [0, 2]]])
+    worst = int(np.argmax(np.abs(values)))
+    if abs(values[worst]) > tolerance:
+        height, angle = places[worst, 0] - outline[0, 0], np.rad2deg(_wrap(places[worst, 1]))
         raise MeshError(
-            source, "symmetry", f"{1e3 * deviation[row, column]:+.1f} mm at {where}",
+            source, "symmetry", f"{1e3 * values[worst]:+.1f} mm at height {height:.3f} m, angle {angle:.0f}°",
             f"a surface of revolution to within {1e3 * tolerance:.2g} mm",
         )  # fmt: skip
 
 
-def _curve(surface: _Surface) -> Array:
+def _wrap(angle: Array) -> Array:
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def _curve(surface: Surface) -> Array:
     """Return the measured profile (n, 2) as [h, r], before it is simplified."""
     # The median treats both ways of noise alike: on walls it averages radii, and beside a flat end
     # or shoulder, where some angles already have a surface and others not yet, it finds the height.
@@ -310,11 +227,11 @@ def _round_end(curve: Array, rings: Array, end: Array) -> Array:
     return np.concatenate([np.column_stack([apex + bend * r**2, r]), curve[beyond]])
 
 
-def _deviation(surface: _Surface, curve: Array, closed: bool) -> Array:
+def _deviation(surface: Surface, outline: Array, closed: bool) -> Array:
     """Return how far (levels, COLUMNS) the surface lies outside the measured profile (m)."""
     points = np.column_stack([np.repeat(surface.levels, COLUMNS), surface.radius.ravel()])
-    distance = distance_outside(points, simplify(curve, 0.05 * SIMPLIFIED)).reshape(surface.radius.shape)
+    distance = distance_outside(points, outline).reshape(surface.radius.shape)
     missing = surface.radius == 0
-    beyond = (surface.levels < curve[0, 0]) | (surface.levels > curve[-1, 0])
+    beyond = (surface.levels < outline[0, 0]) | (surface.levels > outline[-1, 0])
     distance[missing & beyond[:, None]] = 0.0
     return distance if closed else np.where(missing, np.nan, distance)
