@@ -30,6 +30,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+FLIP = -0.55
+"""Height of an axis below which its frame is built from the opposite axis: about 123° from
+upright, an angle at which objects are seldom held on purpose."""
+
 
 def from_rotation(rotation: ArrayLike, position: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """Assemble poses from rotation matrices (..., 3, 3) and positions (..., 3)."""
@@ -130,13 +134,13 @@ def axis_frame(pose: ArrayLike) -> Array:
     """Return the pose (4, 4) with the same origin and z axis whose spin about z is fixed.
 
     It depends on origin and axis alone, so every turn of an object about its axis of symmetry
-    has bit for bit the same axis frame. For an axis that points up the rotation is the shortest
-    one from the world's z; for one that points down it is the same for the opposite axis, after
-    a half turn about x, which keeps it well conditioned everywhere.
+    has bit for bit the same axis frame. The rotation is the shortest one from the world's z; for
+    an axis that points well down it is that of the opposite axis after a half turn about x, which
+    keeps it well conditioned everywhere. It jumps where the one becomes the other.
     """
     pose = np.asarray(pose, dtype=float)
     axis = pose[:3, 2] + 0.0  # + 0.0 turns -0.0 into 0.0
-    up = axis[2] >= 0.0
+    up = axis[2] >= FLIP
     x, y, z = axis if up else -axis
     s = 1.0 / (1.0 + z)
     rotation = np.array([[1 - x * x * s, -x * y * s, x], [-x * y * s, 1 - y * y * s, y], [-x, -y, z]])
