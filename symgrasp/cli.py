@@ -98,6 +98,14 @@ def _parser() -> argparse.ArgumentParser:
     verify = add("verify", _verify, "Check a plan: 0 it holds, 1 it does not, 2 it cannot be read.")
     verify.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
 
+    thing = add(
+        "object", _object, "Say how an object is shaped, how symmetric it is and which hand holds it."
+    )
+    thing.add_argument("object", metavar="OBJECT", help="name of the library, a mesh, or a .yaml profile")
+    thing.add_argument("--scale", type=float, default=1.0, help="metres in one unit of a mesh (default: 1)")
+    thing.add_argument("--out", metavar="FILE", type=Path, help="write a picture of the profile (.png)")
+    thing.add_argument("--fit", metavar="FILE", type=Path, help="write a picture of openings (.png)")
+
     hand = add("hand", _hand, "Measure a parallel hand in a URDF; print it as a scene file takes it.")
     hand.add_argument("urdf", metavar="URDF", help="a file, or package://<python package>/<path>")
     text = "a link fixed to the palm, best the tool frame (needed where a robot has several hands)"
@@ -209,6 +217,29 @@ def _hand(args: argparse.Namespace) -> int:
         if hand.urdf and args.urdf.startswith("package://"):
             hand = replace(hand, urdf=args.urdf)
         print(indent(hand_yaml(hand), "    "))
+    return 0
+
+
+def _object(args: argparse.Namespace) -> int:
+    from symgrasp.fit import plot_openings
+    from symgrasp.hand import HANDS
+    from symgrasp.object_report import describe_object
+    from symgrasp.pictures import to_png
+
+    for option, out in (("--out", args.out), ("--fit", args.fit)):
+        if out:
+            _check_folder(out)
+            if out.suffix != ".png":
+                raise InputError("command line", option, str(out), "a file that ends in .png")
+    report = describe_object(args.object, args.scale)
+    for line in report.lines():
+        print(line)
+    pictures = [(args.out, report.plot), (args.fit, lambda: plot_openings(report.profile, HANDS))]
+    for out, draw in pictures:
+        if out:
+            with write_atomically(out) as file:
+                file.write(to_png(draw()))
+            print(f"written to {out}")
     return 0
 
 

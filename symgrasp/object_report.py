@@ -43,6 +43,28 @@ class ObjectReport:
     measurement: Measurement | None
     holds: Mapping[str, tuple[tuple[float, float], ...]]
 
+    def lines(self) -> list[str]:
+        """Say all of it in a few lines, in centimetres and millimetres."""
+        p = self.profile
+        smallest, largest = p.radius_span(p.h_min, p.h_max)
+        text = [
+            f"{self.name}: {100 * (p.h_max - p.h_min):.2f} cm tall, {len(p.points)} knots",
+            f"  radius               {1e3 * smallest:.1f} to {1e3 * largest:.1f} mm",
+        ]
+        if self.measurement is not None:
+            m = self.measurement
+            axis, origin = m.T_mesh_object[:3, 2], m.T_mesh_object[:3, 3]
+            text += [
+                f"  axis in the file     ({', '.join(f'{x:.4f}' for x in axis)})",
+                f"  bottom in the file   ({', '.join(f'{x:.4f}' for x in origin)}) m",
+                f"  symmetry error       {1e3 * m.largest.max():.2f} mm largest, {1e3 * m.overall_rms:.2f} mm RMS, "
+                f"{1e3 * m.tolerance:.2f} mm allowed",
+            ]
+        for hand, intervals in self.holds.items():
+            where = " and ".join(f"{100 * a:.1f} to {100 * b:.1f} cm" for a, b in intervals) or "nowhere"
+            text.append(f"  {hand + ' holds it':20} {where}")
+        return text
+
     def plot(self) -> Figure:
         """Draw the profile and, for an object from a mesh, the map of its deviations."""
         return pictures.draw_object(self.profile.points, self.measurement, self.name)

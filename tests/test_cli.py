@@ -14,6 +14,7 @@ import pytest
 from symgrasp.cli import main
 from symgrasp.feasibility import FeasibilityMap
 from symgrasp.plan import Plan, plan_schema
+from symgrasp.scene import Scene
 from tests.conftest import SHIPPED, write_scene
 
 
@@ -54,6 +55,27 @@ def test_plan_sequential_and_bimanual(tmp_path, capsys):
         assert plan.kind == kind
         assert "holds at h =" in capsys.readouterr().out
         jsonschema.validate(json.loads(out.read_text()), plan_schema())
+
+
+def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):
+    assert (
+        main(["object", "wine_bottle", "--out", str(tmp_path / "a.png"), "--fit", str(tmp_path / "b.png")])
+        == 0
+    )
+    text = capsys.readouterr().out
+    assert "wine_bottle: 30.00 cm tall" in text
+    assert "franka holds it" in text
+    assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in ("a.png", "b.png"))
+    mesh = tmp_path / "bottle.stl"
+    Scene.load("soda_can").profile.mesh().apply_scale(1000).export(mesh)
+    assert main(["object", str(mesh)]) == 2
+    assert "--scale 0.001" in capsys.readouterr().err
+    assert main(["object", str(mesh), "--scale", "0.001"]) == 0
+    text = capsys.readouterr().out
+    assert "11.50 cm tall" in text
+    assert "symmetry error" in text
+    assert main(["object", "wine_bottel"]) == 2
+    assert "did you mean 'wine_bottle'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["scene", "plan"])

@@ -61,6 +61,19 @@ def test_content_builds_the_same_scene_elsewhere(content, tmp_path):
     assert again.obstacles[-1].path == tmp_path / "cup.obj"
 
 
+def test_objects_of_the_library_and_from_a_mesh(content, tmp_path):
+    """Whatever the profile came from, the content holds it in numbers."""
+    profile = Scene.load("soda_can").profile
+    profile.mesh(facets=128).export(tmp_path / "can.stl")
+    for source, error in (({"library": "can_330ml"}, 4e-3), ({"mesh": "can.stl"}, 3e-4)):
+        content["object"] = {"name": "can", **source}
+        scene = Scene.load(write_scene(tmp_path, content))
+        heights = np.linspace(0.002, 0.113, 30)
+        np.testing.assert_allclose(scene.profile.radius(heights), profile.radius(heights), atol=error)
+        assert set(scene.content["object"]) == {"name", "profile", "scale"}
+        assert Scene.from_content(scene.content).sha256 == scene.sha256
+
+
 def test_a_hand_described_in_the_scene(content, tmp_path):
     content["robots"][0]["hand"] = {
         "name": "stubby",
@@ -174,6 +187,12 @@ BAD = [
     (lambda c: c["object"].update(profile=[[0, -0.1], [1, 0.1]]), ProfileError, "profile[0]", "not negative"),
     (lambda c: c["object"].update(profile=[[0, 0.1], [1, 0.1], [0.5, 0.1]]), ProfileError,
      "profile[2]", "above"),
+    (lambda c: c["object"].update(mesh="can.stl"), SceneError,
+     "object", "exactly one of profile, library"),
+    (lambda c: c.update(object={"name": "o", "mesh": "no.stl"}), SceneError,
+     "object.mesh", "existing mesh file"),
+    (lambda c: c.update(object={"name": "o", "library": "beer"}), SceneError,
+     "object.library", "'jam_jar'"),
     (lambda c: c["object"].update(profile="round"), SceneError, "object.profile", "list"),
     (lambda c: c["obstacles"].append({"name": "m", "mesh": "no.stl"}), SceneError,
      "obstacles[3].mesh", "mesh file"),
