@@ -57,8 +57,8 @@ class ObjectReport:
             text += [
                 f"  axis in the file     ({', '.join(f'{x:.4f}' for x in axis)})",
                 f"  bottom in the file   ({', '.join(f'{x:.4f}' for x in origin)}) m",
-                f"  symmetry error       {1e3 * m.largest.max():.2f} mm largest, {1e3 * m.overall_rms:.2f} mm RMS, "
-                f"{1e3 * m.tolerance:.2f} mm allowed",
+                f"  symmetry error       {1e3 * m.largest.max():.2f} mm largest, "
+                f"{1e3 * m.overall_rms:.2f} mm RMS, {1e3 * m.tolerance:.2f} mm allowed",
             ]
         for hand, intervals in self.holds.items():
             where = " and ".join(f"{100 * a:.1f} to {100 * b:.1f} cm" for a, b in intervals) or "nowhere"
