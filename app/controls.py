@@ -23,7 +23,7 @@ PANELS_WIDTH = MAP_WIDTH + CONTROLS_WIDTH
 TURN_STEP = 0.25
 """Step of the rotation slider (degrees): one column of the map's picture."""
 
-REACH = 120.0
+REACH = 200.0
 """How far (cm) the object may be moved from the world's origin."""
 
 Change = Callable[[State], State]

@@ -164,7 +164,7 @@ def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     def view(azimuth: float) -> Viewpoint:
         direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         right = np.cross([0.0, 0.0, 1.0], direction)
-        reach = np.abs((bases - look_at) @ right).max() + 0.2
+        reach = np.abs((np.concatenate([bases, points]) - look_at) @ right).max() + 0.2
         return Viewpoint(look_at, direction, float(max(VIEW_WIDTH, 2 * reach)))
 
     def badness(view: Viewpoint) -> float:
