@@ -207,9 +207,11 @@ def _smooth_end(curve: Array, rings: Array, end: Array, noise: float) -> Array:
         return curve
     radii, width = rings[disc], rings[disc][-1]
     height = float(np.average(end[disc], weights=radii))
-    near, far = (curve[np.searchsorted(curve[:, 0], height + k * noise, side="right")] for k in (3, 6))
-    if far[1] > 1.3 * width:
+    # Beyond a flat disc the wall begins; a round end goes on growing.
+    beyond = np.interp(end[disc][-1] + 3.0 * noise, *curve.T)
+    if beyond > 1.15 * width + (rings[1] - rings[0]):
         return _round_end(curve, radii, end[disc])
+    near, far = (curve[np.searchsorted(curve[:, 0], height + k * noise, side="right")] for k in (3, 6))
     slope = (far[1] - near[1]) / (far[0] - near[0]) if far[0] > near[0] else 0.0
     edge = max(0.0, near[1] + slope * (height - near[0]))
     return np.concatenate([[[height, edge]], curve[curve[:, 0] >= near[0]]])
