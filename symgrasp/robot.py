@@ -237,11 +237,16 @@ class RobotModel:
         return hash(self.urdf)
 
     def collision_urdf(self) -> bytes:
-        """Return the URDF without what is only seen."""
+        """Return the URDF without what is only seen; every link has a mass, or PyBullet complains."""
         root = ET.fromstring(self.urdf)
         for link in root.iter("link"):
             for visual in link.findall("visual"):
                 link.remove(visual)
+            if link.find("inertial") is None:
+                inertial = ET.SubElement(link, "inertial")
+                ET.SubElement(inertial, "mass", value="1")
+                moments = {"ixx": "1", "ixy": "0", "ixz": "0", "iyy": "1", "iyz": "0", "izz": "1"}
+                ET.SubElement(inertial, "inertia", moments)
         return ET.tostring(root)
 
 

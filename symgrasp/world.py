@@ -406,14 +406,13 @@ def _load_urdf(client: int, model: RobotModel, pose: Array) -> int:
     with tempfile.NamedTemporaryFile(suffix=".urdf") as file:
         file.write(model.collision_urdf())
         file.flush()
-        with _silenced():
-            body = pybullet.loadURDF(
-                file.name,
-                basePosition=pose[:3, 3].tolist(),
-                baseOrientation=_xyzw(pose),
-                useFixedBase=True,
-                physicsClientId=client,
-            )
+        body = pybullet.loadURDF(
+            file.name,
+            basePosition=pose[:3, 3].tolist(),
+            baseOrientation=_xyzw(pose),
+            useFixedBase=True,
+            physicsClientId=client,
+        )
     for i, link in enumerate(_link_names(client, body)):
         shapes = pybullet.getCollisionShapeData(body, i - 1, physicsClientId=client)
         if model.has_shape(link) and not shapes:
