@@ -33,7 +33,7 @@ class RobotView:
     def __init__(self, client: viser.ClientHandle, root: str, robot: Robot) -> None:
         self.model = robot.model
         place(client.scene.add_frame(root, show_axes=False), robot.T_world_base)
-        nodes = add_links(client, root, robot.model.path)
+        nodes = add_links(client, root, robot.model)
         self.nodes = {self.model.link_index(link): node for link, node in nodes.items()}
         self._shown: Array | None = None
 

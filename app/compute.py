@@ -15,6 +15,7 @@ from symgrasp.manifold import ROLLS
 from symgrasp.meshes import read_mesh
 from symgrasp.plan import Hold, Plan
 from symgrasp.planning import plan_bimanual, plan_sequential
+from symgrasp.robot import RobotModel
 from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
 
@@ -155,10 +156,10 @@ class Workbench:
 def _check_visuals(scene: Scene) -> None:
     """Read everything that is shown, so that what cannot be read is known now."""
     for robot in scene.robots.values():
-        link_visuals(robot.model.path)
+        link_visuals(robot.model.urdf)
     for o in scene.obstacles:
         if o.kind == "urdf" and o.path:
-            link_visuals(o.path)
+            link_visuals(RobotModel(o.path).urdf)
         elif o.kind == "mesh" and o.path:
             read_mesh(o.path, f"obstacle {o.name}")
 

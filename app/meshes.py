@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -14,7 +14,6 @@ from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from symgrasp.errors import MeshError
-from symgrasp.robot import RobotModel
 
 __all__ = ["link_visuals"]
 
@@ -28,38 +27,33 @@ WHITEST = 235
 
 
 @lru_cache(maxsize=16)
-def link_visuals(path: Path) -> dict[str, bytes]:
+def link_visuals(urdf: bytes) -> dict[str, bytes]:
     """Return link name → GLB in the link frame, of every link that can be seen.
 
     Args:
-        path: the URDF file.
+        urdf: the robot with everything that is mounted on it, as `symgrasp.robot.RobotModel.urdf`
+            has it.
 
     Raises:
-        UrdfError: the URDF or one of its meshes is missing or unusable.
         MeshError: a mesh cannot be read.
     """
-    model = RobotModel(path)
-    urdf = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
-    materials = [*urdf.robot.materials, *(v.material for link in urdf.robot.links for v in link.visuals)]
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf), build_scene_graph=False, load_meshes=False).robot
+    materials = [*robot.materials, *(v.material for link in robot.links for v in link.visuals)]
     named = {m.name: m.color.rgba for m in reversed(materials) if m is not None and m.color is not None}
     glbs = {}
-    for link in urdf.robot.links:
+    for link in robot.links:
         scene = trimesh.Scene()
         for visual in link.visuals:
-            _add_visual(scene, visual, model, link.name, named)
+            _add_visual(scene, visual, link.name, named)
         if scene.geometry:
             glbs[link.name] = export_glb(scene, include_normals=True)
     return glbs
 
 
 def _add_visual(
-    scene: trimesh.Scene,
-    visual: yourdfpy.Visual,
-    model: RobotModel,
-    link: str,
-    named: Mapping[str | None, np.ndarray],
+    scene: trimesh.Scene, visual: yourdfpy.Visual, link: str, named: Mapping[str | None, np.ndarray]
 ) -> None:
-    meshes = _shapes(visual, model, link)
+    meshes = _shapes(visual, link)
     own = [_own_color(mesh) for mesh in meshes]
     given = named.get(visual.material.name) if visual.material is not None else None
     # A mesh of several colours knows better than the one colour of the URDF; a mesh of one
@@ -84,7 +78,7 @@ def _own_color(mesh: trimesh.Trimesh) -> Color | None:
     return None
 
 
-def _shapes(visual: yourdfpy.Visual, model: RobotModel, link: str) -> list[trimesh.Trimesh]:
+def _shapes(visual: yourdfpy.Visual, link: str) -> list[trimesh.Trimesh]:
     geometry = visual.geometry
     assert geometry is not None  # the parser gives every visual one
     if geometry.box is not None:
@@ -94,9 +88,9 @@ def _shapes(visual: yourdfpy.Visual, model: RobotModel, link: str) -> list[trime
     if geometry.sphere is not None:
         return [trimesh.creation.icosphere(subdivisions=3, radius=geometry.sphere.radius)]
     assert geometry.mesh is not None
-    path = model.mesh_path(geometry.mesh.filename, link)
+    path = geometry.mesh.filename
     try:
-        loaded = trimesh.load_scene(str(path), process=False)
+        loaded = trimesh.load_scene(path, process=False)
         meshes = [m for m in loaded.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
     except Exception as error:  # trimesh raises whatever its many parsers raise
         raise MeshError(path, f"link {link}: visual", str(error), "a readable mesh") from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -77,9 +76,9 @@ def place(node: viser.SceneNodeHandle, pose: Array) -> None:
     node.position = pose[:3, 3]
 
 
-def add_links(client: viser.ClientHandle, root: str, path: Path) -> dict[str, viser.GlbHandle]:
-    """Add the visible links of a URDF under a node; link name → its node."""
-    visuals = link_visuals(path)
+def add_links(client: viser.ClientHandle, root: str, model: RobotModel) -> dict[str, viser.GlbHandle]:
+    """Add the visible links of a robot under a node; link name → its node."""
+    visuals = link_visuals(model.urdf)
     return {
         link: client.scene.add_glb(f"{root}/{k}", glb, cast_shadow=False, receive_shadow=False)
         for k, (link, glb) in enumerate(visuals.items())
@@ -111,7 +110,7 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
         model = RobotModel(o.path)
         place(scene.add_frame(name, show_axes=False), o.T_world_obstacle)
         poses = model.forward(model.default_values())
-        for link, node in add_links(client, name, o.path).items():
+        for link, node in add_links(client, name, model).items():
             place(node, poses[model.link_index(link)])
 
 

@@ -11,6 +11,7 @@ import trimesh
 
 from app.meshes import link_visuals
 from symgrasp.errors import SymgraspError
+from symgrasp.robot import RobotModel
 from symgrasp.scene import Scene
 
 URDF = """<robot name="r"><material name="blue"><color rgba="0 0 1 1"/></material>
@@ -18,10 +19,10 @@ URDF = """<robot name="r"><material name="blue"><color rgba="0 0 1 1"/></materia
 </robot>"""
 
 
-def write(folder: Path, shape: str, material: str = '<material name="blue"/>') -> Path:
+def urdf(folder: Path, shape: str, material: str = '<material name="blue"/>') -> bytes:
     path = folder / "robot.urdf"
     path.write_text(URDF.format(shape=shape, material=material))
-    return path
+    return RobotModel(path).urdf
 
 
 def loaded(glb: bytes) -> trimesh.Scene:
@@ -30,12 +31,18 @@ def loaded(glb: bytes) -> trimesh.Scene:
 
 def test_every_link_of_the_panda_is_seen_and_its_size_is_right():
     model = Scene.load("bottle_on_table").arm().robot.model
-    visuals = link_visuals(model.path)
+    visuals = link_visuals(model.urdf)
     assert set(visuals) >= {f"panda_link{k}" for k in range(8)} | {"panda_hand", "panda_leftfinger"}
     for link in visuals:
         seen, solid = loaded(visuals[link]).bounds, np.concatenate(model.hulls(link))
         assert np.allclose(seen[0], solid.min(axis=0), atol=0.02)
         assert np.allclose(seen[1], solid.max(axis=0), atol=0.02)
+
+
+def test_a_hand_that_is_mounted_on_a_robot_is_seen():
+    arm = Scene.load("log_iiwa_and_panda").arm("iiwa")
+    visuals = link_visuals(arm.robot.model.urdf)
+    assert set(arm.hand.links) <= set(visuals)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +54,7 @@ def test_every_link_of_the_panda_is_seen_and_its_size_is_right():
     ],
 )
 def test_plain_shapes_have_their_size_place_and_colour(tmp_path, shape, size):
-    scene = loaded(link_visuals(write(tmp_path, shape))["base"])
+    scene = loaded(link_visuals(urdf(tmp_path, shape))["base"])
     assert scene.extents == pytest.approx(size, abs=0.005)
     assert scene.bounds.mean(axis=0) == pytest.approx([0, 0, 0.5], abs=0.005)
     (mesh,) = scene.geometry.values()
@@ -62,14 +69,14 @@ def two_coloured(folder: Path, names: tuple[str, ...]) -> None:
 
 def test_a_mesh_of_one_colour_takes_the_colour_of_the_urdf(tmp_path):
     two_coloured(tmp_path, ("red",))
-    scene = loaded(link_visuals(write(tmp_path, '<mesh filename="m.obj"/>'))["base"])
+    scene = loaded(link_visuals(urdf(tmp_path, '<mesh filename="m.obj"/>'))["base"])
     (mesh,) = scene.geometry.values()
     assert mesh.visual.material.baseColorFactor[:3].tolist() == [0, 0, 235]
 
 
 def test_a_mesh_of_several_colours_keeps_them(tmp_path):
     two_coloured(tmp_path, ("red", "black"))
-    scene = loaded(link_visuals(write(tmp_path, '<mesh filename="m.obj"/>'))["base"])
+    scene = loaded(link_visuals(urdf(tmp_path, '<mesh filename="m.obj"/>'))["base"])
     colors = {tuple(m.visual.material.baseColorFactor[:3].tolist()) for m in scene.geometry.values()}
     assert colors == {(235, 0, 0), (0, 0, 0)}
 
@@ -77,4 +84,4 @@ def test_a_mesh_of_several_colours_keeps_them(tmp_path):
 def test_a_mesh_that_cannot_be_read_is_an_error(tmp_path):
     (tmp_path / "m.obj").write_text("this is no mesh")
     with pytest.raises(SymgraspError, match=r"m\.obj.*link base"):
-        link_visuals(write(tmp_path, '<mesh filename="m.obj"/>'))
+        link_visuals(urdf(tmp_path, '<mesh filename="m.obj"/>'))
