@@ -297,7 +297,7 @@ def _climb(
         statistics={
             "restarts": found.restarts,
             "iterations": found.iterations,
-            "print_checks": found.print_checks,
+            "counted": found.counted,
             "body_checks": found.body_checks,
         },
     )

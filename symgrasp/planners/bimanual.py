@@ -20,6 +20,9 @@ from symgrasp.robot import Arm
 
 __all__ = ["Climb", "Placement", "hill_climb", "print_overlap"]
 
+Count = Callable[[Sequence[Cell]], int]
+"""How many collisions there are with every hand at its cell: what the climb brings down."""
+
 BodiesFree = Callable[[Sequence[Cell]], bool]
 """Whether the whole robots are free of each other with every arm at the witness of its cell."""
 
@@ -45,14 +48,14 @@ class Placement:
         cells: one cell an arm, in the order of the maps.
         restarts: restarts begun.
         iterations: moves considered, over all restarts.
-        print_checks: handprints compared.
+        counted: times that collisions were counted.
         body_checks: times the whole robots were checked.
     """
 
     cells: tuple[Cell, ...]
     restarts: int
     iterations: int
-    print_checks: int
+    counted: int
     body_checks: int
 
 
@@ -63,8 +66,9 @@ def hill_climb(
     seed: int,
     limits: Climb | None = None,
     progress: Progress | None = None,
+    count: Count | None = None,
 ) -> Placement:
-    """Place every arm's hand on a feasible cell so that no two prints share a cell: Algorithm 3.
+    """Place every arm's hand on a feasible cell so that nothing is counted any more: Algorithm 3.
 
     Args:
         maps: one map an arm, all over the same grid.
@@ -73,6 +77,7 @@ def hill_climb(
         seed: of the random choices; the same seed gives the same placement.
         limits: how long to search.
         progress: told the share of restarts used; may raise `Cancelled`.
+        count: what to count; the cells that handprints share if None.
 
     Raises:
         NoPlanError: nothing found within the limits, or an arm has no feasible cell.
@@ -84,7 +89,7 @@ def hill_climb(
     for m, cells in zip(maps, starts, strict=True):
         if not len(cells):
             raise NoPlanError(f"{m.arm} has no feasible cell in task {m.task}")
-    search = _Search(maps, arms)
+    search = _Search(maps, count or _shared_cells(maps, arms))
     rng = np.random.default_rng(seed)
     iterations = body_checks = 0
     for restart in range(limits.restarts):
@@ -92,10 +97,10 @@ def hill_climb(
             progress(restart / limits.restarts)
         cells = [Cell(*map(int, rng.choice(choices))) for choices in starts]
         for _ in range(limits.iterations):
-            if search.overlap(cells) == 0:
+            if search.count(cells) == 0:
                 body_checks += 1
                 if bodies_free(cells):
-                    return Placement(tuple(cells), restart + 1, iterations, search.print_checks, body_checks)
+                    return Placement(tuple(cells), restart + 1, iterations, search.counted, body_checks)
                 break  # apart on the object, but the arms meet: start elsewhere
             iterations += 1
             arm = int(rng.integers(len(cells)))
@@ -113,22 +118,31 @@ def print_overlap(prints: Sequence[Handprint], columns: Sequence[int]) -> int:
     )
 
 
-class _Search:
-    """Handprints of all arms, and moves between cells."""
+def _shared_cells(maps: Sequence[FeasibilityMap], arms: Sequence[Arm]) -> Count:
+    grid = maps[0].manifold
+    print_of = cache(lambda arm, roll, row: arms[arm].handprint(grid, row, roll))
 
-    def __init__(self, maps: Sequence[FeasibilityMap], arms: Sequence[Arm]) -> None:
-        self.maps = maps
-        self.print_checks = 0
-        grid = maps[0].manifold
-        self._print = cache(lambda arm, roll, row: arms[arm].handprint(grid, row, roll))
-
-    def overlap(self, cells: Sequence[Cell]) -> int:
-        self.print_checks += 1
-        prints = [self._print(arm, cell.roll, cell.row) for arm, cell in enumerate(cells)]
+    def count(cells: Sequence[Cell]) -> int:
+        prints = [print_of(arm, cell.roll, cell.row) for arm, cell in enumerate(cells)]
         return print_overlap(prints, [cell.column for cell in cells])
 
+    return count
+
+
+class _Search:
+    """Moves between cells, and how often collisions were counted."""
+
+    def __init__(self, maps: Sequence[FeasibilityMap], count: Count) -> None:
+        self.maps = maps
+        self.counted = 0
+        self._count = count
+
+    def count(self, cells: Sequence[Cell]) -> int:
+        self.counted += 1
+        return self._count(cells)
+
     def best_neighbour(self, cells: Sequence[Cell], arm: int) -> Cell:
-        """Return the feasible neighbour of an arm's cell with the fewest shared cells, or the cell."""
+        """Return the feasible neighbour of an arm's cell with the fewest collisions, or the cell."""
         roll, row, column = cells[arm]
         heights, angles = self.maps[arm].feasible.shape[1:]
         best, fewest = cells[arm], np.inf
@@ -136,7 +150,7 @@ class _Search:
             cell = Cell(roll, row + dh, (column + dtheta) % angles)
             if not 0 <= cell.row < heights or not self.maps[arm].feasible[cell]:
                 continue
-            count = self.overlap([*cells[:arm], cell, *cells[arm + 1 :]])
+            count = self.count([*cells[:arm], cell, *cells[arm + 1 :]])
             if count < fewest:
                 best, fewest = cell, count
         return best
