@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from app.meshes import link_visuals
+from app.things import OWN, Thing, from_library
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
 from symgrasp.feasibility import FeasibilityMap, Progress, create_map
 from symgrasp.manifold import ROLLS
@@ -38,6 +39,7 @@ class Store:
     def __init__(self, first: str) -> None:
         self._lock = threading.Lock()
         self._scenes: dict[str, Scene] = {}
+        self._with: dict[tuple[str, str], tuple[Scene, Thing]] = {}
         self._maps: OrderedDict[MapRequest, MapResult] = OrderedDict()
         self.first = first
         self.names = tuple(dict.fromkeys([first, *shipped_scenes()]))
@@ -58,6 +60,24 @@ class Store:
         _check_visuals(scene)
         with self._lock:
             return self._scenes.setdefault(name, scene)
+
+    def scene_with(self, name: str, choice: str) -> tuple[Scene, Thing | None]:
+        """Return a scene by name with its own object or one of the library, and that object.
+
+        Raises:
+            InputError: one of them is unusable, or they do not go together.
+        """
+        scene = self.scene(name)
+        if choice == OWN:
+            return scene, None
+        with self._lock:
+            known = self._with.get((name, choice))
+        if known:
+            return known
+        thing = from_library(choice)
+        changed = scene.with_object(thing.name, thing.profile), thing
+        with self._lock:
+            return self._with.setdefault((name, choice), changed)
 
     def map(self, request: MapRequest) -> MapResult | None:
         """Return a map that was computed before."""
@@ -90,7 +110,8 @@ class Workbench:
     def world(self, scene: Scene) -> BulletWorld:
         """Return a world with the scene's robots, obstacles and object; its tasks do not matter."""
         old = self._world
-        if old and old.scene.robots is scene.robots and old.scene.obstacles is scene.obstacles:
+        shared = ("robots", "obstacles", "profile")
+        if old and all(getattr(old.scene, part) is getattr(scene, part) for part in shared):
             return old
         self.close()
         self._world = BulletWorld(scene)

@@ -13,7 +13,9 @@ import viser
 from app.map_view import Mark, legend_html, map_html, plan_html
 from app.readout import grasp_html, map_title, notes_html, plan_line, status_html
 from app.state import Pick, State
+from app.things import UNITS, UPLOAD_LIMIT, choices
 from app.values import RollChoice
+from symgrasp.mesh_io import MESH_ENDINGS
 
 __all__ = ["PANELS_WIDTH", "Actions", "Controls"]
 
@@ -37,6 +39,12 @@ class Actions(Protocol):
 
     def open_scene(self, name: str) -> None:
         """Load another scene."""
+
+    def choose_object(self, choice: str) -> None:
+        """Put another object into the scene."""
+
+    def upload(self, name: str, content: bytes, scale: float) -> None:
+        """Measure a mesh and put the object into the scene."""
 
     def plan(self, kind: str) -> None:
         """Run a planner."""
@@ -100,6 +108,7 @@ class Controls:
     def _build_object(self) -> None:
         gui = self.gui
         with gui.add_folder("Object"):
+            self._build_choice()
             self.turn = gui.add_slider(
                 "Rotation (°)", -180.0, 180.0, TURN_STEP, 0.0,
                 hint="Turn the object about its own axis: the map only shifts.",
@@ -122,6 +131,27 @@ class Controls:
             self._on(self.gizmo, lambda s, v: replace(s, gizmo=v))
             reset = gui.add_button("Put it back", icon=viser.Icon.ARROW_BACK_UP, color="gray")
             reset.on_click(lambda _: self.actions.change(State.reset_pose))
+
+    def _build_choice(self) -> None:
+        gui = self.gui
+        self.thing = gui.add_dropdown("Object", choices())
+        self.thing.on_update(lambda e: self.actions.choose_object(self.thing.value) if e.client else None)
+        limit = (
+            f"{', '.join(ending[1:].upper() for ending in MESH_ENDINGS)}; at most {UPLOAD_LIMIT / 1e6:g} MB"
+        )
+        self.unit = gui.add_dropdown("Mesh unit", tuple(UNITS), hint="What one unit of an uploaded mesh is.")
+        self.upload = gui.add_upload_button(
+            "Upload a mesh",
+            icon=viser.Icon.UPLOAD,
+            color="gray",
+            mime_type=",".join(MESH_ENDINGS),
+            hint=limit,
+        )
+        self.upload.on_upload(
+            lambda _: self.actions.upload(
+                self.upload.value.name, self.upload.value.content, UNITS[self.unit.value]
+            )
+        )
 
     def _build_grasp(self) -> None:
         gui = self.gui
@@ -193,6 +223,8 @@ class Controls:
             self.h.min = 100 * state.scene.profile.h_min
             self.h.max = 100 * state.scene.profile.h_max
             self.task.options = tuple(state.scene.tasks)
+        if self.thing.options != (things := choices(state.uploaded)):
+            self.thing.options = things
         if self.arm.options != (arms := state.scene.task(state.task).arms):
             self.arm.options = arms
         if write_inputs:
@@ -212,6 +244,7 @@ class Controls:
         self.lean.value = _within(self.lean, np.rad2deg(base.lean))
         self.towards.value = _within(self.towards, np.rad2deg(base.towards))
         self.scene.value = state.scene_name
+        self.thing.value = state.choice
         self.task.value, self.arm.value, self.roll.value = state.task, state.arm, state.roll.value
         self.gizmo.value, self.board.value = state.gizmo, state.board
         pick = state.pick or Pick(state.scene.profile.h_min, 0.0)

@@ -15,6 +15,7 @@ import viser
 from app.compute import Store, Workbench
 from app.controls import PANELS_WIDTH, Controls
 from app.state import State
+from app.things import Thing, check_size, from_mesh
 from app.values import MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
@@ -85,10 +86,46 @@ class Session:
 
         def done(ticket: int, scene: Scene) -> None:
             with self._changed:
-                if self.state is None or (self.state.busy and self.state.busy.ticket == ticket):
-                    self._take(State.of(scene, name), "")
+                old = self.state
+                if old is None or (old.busy and old.busy.ticket == ticket):
+                    self._take(replace(State.of(scene, name), uploaded=old.uploaded if old else None), "")
 
         self._submit(f"Loading {name}", lambda _: self.store.scene(name), done)
+
+    def choose_object(self, choice: str) -> None:
+        """Put another object into the scene, on the worker."""
+        state = self.state
+        if state is None:
+            return
+        if state.uploaded and choice == state.uploaded.choice:
+            thing = state.uploaded
+            self._change_object(f"Loading {choice}", lambda: self._put(state.scene_name, thing))
+        else:
+            self._change_object(f"Loading {choice}", lambda: self.store.scene_with(state.scene_name, choice))
+
+    def upload(self, name: str, content: bytes, scale: float) -> None:
+        """Measure a mesh on the worker and put the object into the scene."""
+        state = self.state
+        if state is None:
+            return
+        try:
+            check_size(name, content)
+        except SymgraspError as error:
+            self.change(lambda s, problem=str(error): s.failed(problem))
+            return
+        self._change_object(
+            f"Measuring {name}", lambda: self._put(state.scene_name, from_mesh(name, content, scale))
+        )
+
+    def _put(self, scene: str, thing: Thing) -> tuple[Scene, Thing]:
+        """Return a scene with an object in place of its own."""
+        return self.store.scene(scene).with_object(thing.name, thing.profile), thing
+
+    def _change_object(self, label: str, run: Callable[[], tuple[Scene, Thing | None]]) -> None:
+        def done(ticket: int, found: tuple[Scene, Thing | None]) -> None:
+            self.change(lambda s: s.choose_object(*found) if s.busy and s.busy.ticket == ticket else s)
+
+        self._submit(label, lambda _: run(), done)
 
     def plan(self, kind: str) -> None:
         """Run a planner on the worker."""

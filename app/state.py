@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from app.things import OWN, Thing
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.errors import InputError
 from symgrasp.feasibility import Cell, FeasibilityMap
@@ -57,9 +58,11 @@ class State:
     """One browser's scene, pose, map, pick and plan; a change returns a new one.
 
     Attributes:
-        scene: the scene as loaded.
+        scene: the scene as loaded, with the object that was put into it.
         scene_name: what it was chosen by.
         task, arm: the names chosen.
+        thing: the object that was put into the scene in place of its own.
+        uploaded: the object that was uploaded last.
         roll: the rolls shown.
         poses: task → base pose, of the tasks that were moved.
         delta: turn (rad) of the object about its axis.
@@ -78,6 +81,8 @@ class State:
     scene_name: str
     task: str
     arm: str
+    thing: Thing | None = None
+    uploaded: Thing | None = None
     roll: RollChoice = RollChoice.EITHER
     poses: Mapping[str, ObjectPose] = field(default_factory=dict)
     delta: float = 0.0
@@ -115,6 +120,11 @@ class State:
         return self.request.T_world_object @ rotation_z(self.delta)
 
     @property
+    def choice(self) -> str:
+        """What the object was chosen by."""
+        return self.thing.choice if self.thing else OWN
+
+    @property
     def is_current(self) -> bool:
         """Whether the map shown is the one for the object's pose."""
         return self.result is not None and self.result.request == self.request
@@ -138,7 +148,7 @@ class State:
         """Everything that a widget or the gizmo shows and can change."""
         return (
             self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick, self.step,
-            self.gizmo, self.board,
+            self.gizmo, self.board, self.thing, self.uploaded,
         )  # fmt: skip
 
     @cached_property
@@ -177,6 +187,12 @@ class State:
         return moved(self.scene, self.poses)
 
     # -- changes ----------------------------------------------------------------------------
+
+    def choose_object(self, scene: Scene, thing: Thing | None) -> State:
+        """Show the scene with another object in it, or with its own again (None)."""
+        uploaded = thing if thing and thing.measurement else self.uploaded
+        state = replace(self._without_plan(), busy=None, result=None, pick=None)
+        return replace(state, scene=scene, thing=thing, uploaded=uploaded)
 
     def choose_task(self, name: str) -> State:
         """Show another task, with its first arm unless the chosen one takes part."""
@@ -282,6 +298,8 @@ class State:
         if self.busy is None or self.busy.ticket != ticket:
             return self
         refused = None if self.is_current else self.request
+        if problem and self.busy.request is None:  # it was not the map that failed
+            refused = self.refused
         return replace(self, busy=None, refused=refused, problem=problem)
 
     def failed(self, problem: str) -> State:

@@ -40,11 +40,14 @@ class SceneView:
         self._beside = beside
         self._scene: Scene | None = None
         self._builds = 0
+        self._root = self._object_root = ""
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
         """Bring the view up to the state; the gizmo only moves along if nobody is dragging it."""
-        if state.scene is not self._scene:
+        if self._scene is None or state.scene.robots is not self._scene.robots:
             self._build(state)
+        elif state.scene is not self._scene:
+            self._build_object(state)
         with self.client.atomic():
             if state.is_current or not state.busy:  # arms wait where they are for a new map
                 for name, values in postures(state).items():
@@ -55,12 +58,9 @@ class SceneView:
     def _build(self, state: State) -> None:
         """Replace everything by another scene."""
         client, scene = self.client, state.scene
-        if self._builds:
-            client.scene.remove_by_name(f"/stage{self._builds}")
-        # A new name each time: browsers keep the poses of removed nodes under their names.
-        self._builds += 1
-        root = f"/stage{self._builds}"
-        view = viewpoint(scene, state.T_world_object)
+        root = self._root = self._replace(self._root, "/stage")
+        self._object_root = ""
+        view = self._viewpoint = viewpoint(scene, state.T_world_object)
         with client.atomic():
             client.camera.fov = FIELD_OF_VIEW
             client.camera.up_direction = (0.0, 0.0, 1.0)
@@ -71,13 +71,26 @@ class SceneView:
         add_floor(client, f"{root}/floor", scene)
         for k, obstacle in enumerate(scene.obstacles):
             add_obstacle(client, f"{root}/obstacle{k}", obstacle, k)
-        self.object = ObjectView(client, root, scene, self.on_surface, self.on_drag)
-        self.board = FlatMap(client, f"{root}/board", state, view, self.on_board)
+        self._build_object(state)
         self.robots = {
             name: RobotView(client, f"{root}/robot{k}", robot)
             for k, (name, robot) in enumerate(scene.robots.items())
         }
-        self._scene = scene
+
+    def _build_object(self, state: State) -> None:
+        """Replace the object and its map by another."""
+        root = self._object_root = self._replace(self._object_root, f"{self._root}/thing")
+        self.client.scene.add_frame(root, show_axes=False)
+        self.object = ObjectView(self.client, root, state.scene, self.on_surface, self.on_drag)
+        self.board = FlatMap(self.client, f"{root}/board", state, self._viewpoint, self.on_board)
+        self._scene = state.scene
+
+    def _replace(self, old: str, new: str) -> str:
+        """Remove a node; return the name of a new one, since browsers keep poses under their names."""
+        if old:
+            self.client.scene.remove_by_name(old)
+        self._builds += 1
+        return f"{new}{self._builds}"
 
     def _aspect(self) -> float:
         """Return width by height of the 3D view, of which the panels take their part at first."""

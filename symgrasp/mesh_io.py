@@ -14,7 +14,7 @@ from symgrasp.errors import MeshError, one_of
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array
 
-__all__ = ["MESH_ENDINGS", "read_body"]
+__all__ = ["LARGEST", "MESH_ENDINGS", "SMALLEST", "read_body"]
 
 MESH_ENDINGS = (".glb", ".obj", ".off", ".ply", ".stl")
 """File endings of the mesh formats that objects are measured from."""

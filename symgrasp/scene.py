@@ -19,7 +19,7 @@ from symgrasp.manifold import Manifold
 from symgrasp.profile import Profile
 from symgrasp.robot import Arm, Robot
 from symgrasp.scene_build import Obstacle, SceneBuilder, Task
-from symgrasp.scene_file import MapSettings, PoseFile, SceneFile, TaskFile, describe
+from symgrasp.scene_file import MapSettings, ObjectFile, PoseFile, SceneFile, TaskFile, describe
 
 __all__ = ["Scene", "shipped_scenes"]
 
@@ -155,6 +155,20 @@ class Scene:
             file=self.file.model_copy(update={"tasks": files}),
             tasks={**self.tasks, task.name: task},
         )
+
+    def with_object(self, name: str, profile: Profile) -> Scene:
+        """Return the scene with another object in place of its own; robots and obstacles are shared.
+
+        Raises:
+            SceneError: the name is no name, or that of a robot or obstacle.
+        """
+        try:
+            thing = ObjectFile(name=name, profile=[tuple(p) for p in profile.points.tolist()])
+        except ValidationError as error:
+            raise SceneError("object", *describe(error, {"name": name})) from None
+        if name in (*self.robots, *(o.name for o in self.obstacles)):
+            raise SceneError("object", "name", name, "a name that no robot or obstacle of the scene has")
+        return replace(self, file=self.file.model_copy(update={"object": thing}), profile=profile)
 
     def with_settings(self, **changes: float) -> Scene:
         """Return the scene with other map settings; robots and object are shared.

@@ -9,6 +9,7 @@ import yaml
 
 from symgrasp.errors import ProfileError, SceneError, SymgraspError, UrdfError
 from symgrasp.files import SCENES_DIR
+from symgrasp.objects import load_object
 from symgrasp.poses import from_position_rpy, translation
 from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.scene_file import scene_schema
@@ -251,6 +252,29 @@ def test_unknown_names_list_the_valid_ones():
         scene.arm("middle")
     with pytest.raises(SceneError, match="'lift'"):
         scene.task("drop")
+
+
+def test_another_object_takes_the_place_of_the_scenes_own():
+    scene = Scene.load("bottle_on_table")
+    ball = load_object("tennis_ball")[1]
+    own = scene.manifold
+    changed = scene.with_object("ball", ball)
+    assert changed.profile is ball
+    assert changed.manifold.profile is ball
+    assert (scene.manifold, scene.file.object.name) == (own, "bottle")
+    assert changed.robots is scene.robots
+    again = Scene.from_content(changed.content)
+    assert again.sha256 == changed.sha256 != scene.sha256
+    assert np.array_equal(again.profile.points, ball.points)
+    assert again.file.object.name == "ball"
+
+
+@pytest.mark.parametrize("name", ["", "x" * 101, "table", "panda"])
+def test_an_object_needs_a_name_of_its_own(name):
+    scene = Scene.load("bottle_on_table")
+    with pytest.raises(SymgraspError, match=r"^object: name: ") as caught:
+        scene.with_object(name, scene.profile)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_settings_can_be_changed_and_are_checked():

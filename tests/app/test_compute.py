@@ -8,6 +8,7 @@ import pytest
 from app import compute
 from app.compute import Store, Workbench
 from app.state import State
+from app.things import OWN
 from app.values import MapRequest, MapResult
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.feasibility import create_map
@@ -60,7 +61,10 @@ def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(bench):
     bottle = load_small("bottle_on_table")
     world = bench.world(bottle)
     assert bench.world(State.of(bottle, "").move(x=0.5).moved_scene()) is world
-    assert bench.world(load_small("soda_can")) is not world
+    can = load_small("soda_can")
+    assert bench.world(can) is not world
+    world = bench.world(can)
+    assert bench.world(can.with_object("other", bottle.profile)) is not world
 
 
 def test_progress_may_stop_it(bench):
@@ -100,6 +104,14 @@ def test_a_scene_is_loaded_once_and_checked(store, tmp_path, content):
     content["tasks"][0]["pose"]["position"][2] = -0.02
     with pytest.raises(SymgraspError, match=r"bottle is 20\.0 mm inside table"):
         Store(str(write_scene(tmp_path, content)))
+
+
+def test_a_scene_with_an_object_of_the_library_is_made_once(store):
+    scene, thing = store.scene_with("soda_can", "tennis_ball")
+    assert scene.profile is thing.profile
+    assert scene.robots is store.scene("soda_can").robots
+    assert store.scene_with("soda_can", "tennis_ball") == (scene, thing)
+    assert store.scene_with("soda_can", OWN) == (store.scene("soda_can"), None)
 
 
 def test_the_first_scene_is_offered_even_if_it_is_a_file(tmp_path, content):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 from app.compute import Store, Workbench
 from app.readout import postures
 from app.state import State
+from app.things import OWN, from_library
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import create_map
@@ -218,6 +220,42 @@ def test_numbers_that_are_none_are_refused(value):
 
 
 # -- picking --------------------------------------------------------------------------------
+
+
+def test_another_object_needs_a_map_of_its_own_and_stands_where_the_old_one_stood():
+    state = opened("pick_pour_place").move(x=0.5).turn(0.3).choose(0.05, 0.0)
+    thing = from_library("wine_bottle")
+    changed = state.choose_object(state.scene.with_object(thing.name, thing.profile), thing)
+    assert changed.wanted == changed.request
+    assert changed.request.scene.profile is thing.profile
+    assert (changed.result, changed.pick, changed.map) == (None, None, None)
+    assert np.array_equal(changed.T_world_object, state.T_world_object)
+    assert (changed.choice, changed.uploaded) == ("wine_bottle", None)
+    back = changed.choose_object(state.scene, None)
+    assert (back.choice, back.request) == (OWN, state.request)
+
+
+def test_an_uploaded_object_stays_on_offer():
+    state = opened()
+    thing = from_library("wine_bottle")
+    measured = replace(thing, choice="b.stl (upload)", measurement=object())
+    scene = state.scene.with_object(thing.name, thing.profile)
+    state = state.choose_object(scene, measured).choose_object(scene, thing)
+    assert (state.thing, state.uploaded) == (thing, measured)
+
+
+def test_a_new_object_drops_the_plan():
+    state = with_plan("log_two_robots", "bimanual")
+    changed = state.choose_object(state.scene, None)
+    assert (changed.plan, changed.step, changed.shown) == (None, None, None)
+
+
+def test_an_upload_that_failed_does_not_stop_the_map():
+    state = opened().move(x=0.5)
+    failed = state.started(1, "Measuring").stopped(1, "no mesh")
+    assert failed.wanted == state.request
+    assert failed.problem == "no mesh"
+    assert state.started(1, "Measuring").stopped(1).wanted is None  # cancelled by a person
 
 
 def test_a_height_off_the_object_is_refused_in_its_units():

@@ -110,9 +110,9 @@ class GraspPage:
 
         return self.wait_for_view(still)
 
-    def wait_for_change(self, before: np.ndarray) -> None:
-        """Wait until a hundredth of the 3D view looks different."""
-        self.wait_for_view(lambda v: (np.abs(v.astype(int) - before).max(axis=-1) > 40).mean() > 0.01)
+    def wait_for_change(self, before: np.ndarray, share: float = 0.01) -> None:
+        """Wait until so much of the 3D view looks different."""
+        self.wait_for_view(lambda v: (np.abs(v.astype(int) - before).max(axis=-1) > 40).mean() > share)
 
     # -- what can be done -------------------------------------------------------------------
 
@@ -122,6 +122,11 @@ class GraspPage:
     def choose(self, label: str, option: str) -> None:
         self.page.get_by_label(label, exact=True).click()
         self.page.get_by_role("option", name=option, exact=True).click()
+
+    def upload(self, path: Path) -> None:
+        with self.page.expect_file_chooser() as chooser:
+            self.button("Upload a mesh").click()
+        chooser.value.set_files(path)
 
     def number(self, label: str, value: float) -> None:
         box = self.page.get_by_label(label, exact=True)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import jsonschema
 import numpy as np
+import pybullet_data
 import pytest
 from playwright.sync_api import expect
 
@@ -15,9 +17,11 @@ from app.map_view import sample_columns
 from app.palette import REASONS
 from app.stage import viewpoint
 from app.state import State
+from app.things import from_mesh
 from app.values import RollChoice
 from symgrasp.feasibility import FeasibilityMap, create_map
 from symgrasp.manifold import grasp_to_tool
+from symgrasp.objects import load_object
 from symgrasp.plan import Plan, plan_schema
 from symgrasp.poses import pose_error
 from symgrasp.reason import Reason
@@ -249,6 +253,71 @@ def test_an_object_inside_an_obstacle_is_named_with_its_depth(open_page):
     page = open_page()
     page.slide("z (cm)", -3)
     expect(page.alerts.filter(has_text="bottle is 30 mm inside table")).to_be_visible()
+
+
+def test_an_object_of_the_library_takes_the_place_of_the_scenes_own(open_page, bottle_map, tmp_path):
+    page = open_page()
+    before = page.settled_view()
+    page.choose("Object", "wine_bottle")
+    _, profile = load_object("wine_bottle")
+    scene = BOTTLE.with_object("wine_bottle", profile)
+    expected = drawn(create_map(scene))
+    page.wait_for_picture(lambda p: np.array_equal(p, expected))
+    expect(page.text("the wine_bottle turns")).to_be_visible()
+    page.wait_for_change(before, share=0.001)
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 1 task: h = ")).to_be_visible()
+    plan = check_plan(page.download_plan(tmp_path), "sequential")
+    assert plan.scene.content["object"] == {
+        "name": "wine_bottle", "profile": profile.points.tolist(), "scale": 1.0,
+    }  # fmt: skip
+    page.choose("Object", "the scene's own")
+    page.wait_for_picture(lambda p: np.array_equal(p, drawn(bottle_map)))
+    expect(page.button("Download plan (JSON)")).to_be_hidden()
+    assert page.complaints == []
+
+
+def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
+    mesh = load_object("wine_bottle")[1].mesh(64)
+    mesh.apply_scale(1000.0)
+    hostile = "<img src=x onerror=window.hacked=1>.stl"
+    mesh.export(tmp_path / "a.stl", file_type="stl")
+    path = (tmp_path / "a.stl").rename(tmp_path / hostile)
+    page = open_page()
+    page.upload(path)  # as if it were in metres
+    expect(page.alerts).to_contain_text("expected 0.005 to 10 m; choose the unit of the mesh")
+    assert np.array_equal(page.picture(), drawn(bottle_map))
+    page.choose("Mesh unit", "mm")
+    page.upload(path)
+    expect(page.page.get_by_label("Object", exact=True)).to_have_value(f"{hostile} (upload)")
+    expect(page.alerts).to_have_count(0)
+    page.expect_title("bottle_on_table")
+    thing = from_mesh(hostile, path.read_bytes(), 1e-3)
+    expected = drawn(create_map(BOTTLE.with_object(thing.name, thing.profile)))
+    assert np.array_equal(page.picture(), expected)
+    page.choose("Scene", "soda_can")
+    page.expect_title("soda_can")
+    page.choose("Object", f"{hostile} (upload)")  # it may go into any scene
+    expect(page.text(f"the {thing.name} turns")).to_be_visible()
+    page.expect_title("soda_can")
+    assert page.page.evaluate("window.hacked") is None
+    assert page.complaints == []
+
+
+def test_meshes_that_are_unusable_are_refused_in_a_line(open_page, bottle_map, tmp_path):
+    page = open_page()
+    page.upload(Path(pybullet_data.getDataPath(), "objects", "mug.obj"))
+    expect(page.alerts).to_contain_text("mug.obj: symmetry: ")
+    expect(page.alerts).to_contain_text("expected a surface of revolution to within 1.5 mm")
+    large = tmp_path / "large.stl"
+    large.write_bytes(bytes(20_000_001))
+    page.upload(large)
+    expect(page.alerts).to_contain_text("large.stl: size of the file: '20.0 MB'")
+    expect(page.alerts).to_contain_text("at most 20 MB")
+    expect(page.page.get_by_label("Object", exact=True)).to_have_value("the scene's own")
+    page.expect_title("bottle_on_table")
+    assert np.array_equal(page.picture(), drawn(bottle_map))
+    assert page.complaints == []
 
 
 def test_two_browsers_do_not_see_each_other(open_page, bottle_map):
