@@ -233,7 +233,4 @@ def _deviation(surface: Surface, outline: Array, closed: bool) -> Array:
     """Return how far (levels, COLUMNS) the surface lies outside the measured profile (m)."""
     points = np.column_stack([np.repeat(surface.levels, COLUMNS), surface.radius.ravel()])
     distance = distance_outside(points, outline).reshape(surface.radius.shape)
-    missing = surface.radius == 0
-    beyond = (surface.levels < outline[0, 0]) | (surface.levels > outline[-1, 0])
-    distance[missing & beyond[:, None]] = 0.0
-    return distance if closed else np.where(missing, np.nan, distance)
+    return distance if closed else np.where(surface.radius == 0, np.nan, distance)

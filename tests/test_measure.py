@@ -149,6 +149,18 @@ def test_facets_do_not_shrink_a_straight_profile(tmp_path, shape):
     assert found.off_axis < 1e-6
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("facets", [32, 200])
+def test_flat_ends_stay_flat_under_noise(tmp_path, facets, seed):
+    # One vertex in the middle of each end moves the whole disc, yet r(h) holds up to the ends.
+    found = Case(tmp_path, "cylinder", facets, 2e-4, seed, ".ply").found
+    h = np.linspace(0.0, found.points[-1, 0], 500)
+    assert np.interp(h, *found.points.T) == pytest.approx(
+        0.033, abs=3e-4 + 0.033 * (1 - np.cos(np.pi / facets))
+    )
+    assert found.points[-1, 0] == pytest.approx(0.115, abs=3e-4)
+
+
 @pytest.mark.parametrize(("shape", "seed"), [("bottle", 1), ("glass", 2), ("tumbler", 3), ("frustum", 4)])
 def test_objects_stand_on_their_closed_or_wider_end(tmp_path, shape, seed):
     # The tumbler's mouth is wider than its base, but hollow.
