@@ -116,6 +116,9 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
     export.add_argument("--out", metavar="FILE", type=Path, required=True, help="the file to write")
 
+    bench = add("bench", _bench, "Measure the planners against what one would do otherwise.")
+    bench.add_argument("--out", metavar="FILE", type=Path, help="write the figures as JSON")
+
     schema = add("schema", _schema, "Print the JSON Schema of a file format.")
     schema.add_argument("format", choices=("scene", "plan"))
     return parser
@@ -252,6 +255,21 @@ def _export(args: argparse.Namespace) -> int:
     with write_atomically(args.out) as file:
         file.write(text.encode())
     print(f"written to {args.out}")
+    return 0
+
+
+def _bench(args: argparse.Namespace) -> int:
+    from symgrasp.bench import report, run
+
+    if args.out:
+        _check_folder(args.out)
+    figures = []
+    for figure in run():
+        print(figure.line(), flush=True)
+        figures.append(figure)
+    if args.out:
+        with write_atomically(args.out) as file:
+            file.write((json.dumps(report(figures), indent=2, ensure_ascii=False) + "\n").encode())
     return 0
 
 

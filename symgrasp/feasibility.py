@@ -190,6 +190,17 @@ class FeasibilityMap:
         turned = self.T_world_object @ rotation_z(delta)
         return replace(self, T_world_object=turned, manifold=manifold, **rolled)
 
+    def masked(self, keep: np.ndarray) -> FeasibilityMap:
+        """Return the map with every feasible cell outside ``keep`` (R, H, A) taken for out of reach."""
+        drop = self.feasible & ~keep
+        return replace(
+            self,
+            reason=np.where(drop, Reason.UNREACHABLE, self.reason).astype(np.uint8),
+            q=np.where(drop[..., None], np.nan, self.q),
+            sample=np.where(drop, -1, self.sample),
+            branch=np.where(drop, -1, self.branch),
+        )
+
     def plot(self) -> Figure:
         """Draw both rolls of the map with axes, reasons and counts."""
         m = self.manifold

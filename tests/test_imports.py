@@ -15,7 +15,7 @@ ORDER = [
     "measure", "profile", "objects", "manifold", "assembly", "hand", "handprint", "robot", "gripper",
     "measure_hand", "ik", "scene_file", "scene_build", "scene", "reason", "pictures", "fit",
     "object_report", "world", "candidates", "feasibility", "engine", "planners", "plan", "planning",
-    "exports", "verify", "cli", "__main__",
+    "exports", "verify", "bench", "cli", "__main__",
 ]  # fmt: skip
 
 

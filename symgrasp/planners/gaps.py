@@ -45,6 +45,7 @@ class PrintGaps:
             for r, i in np.ndindex(len(ROLLS), grid.heights):
                 start = arm[r][i].first_row - first
                 self._prints[k][r, i, start : start + len(arm[r][i].cells)] = arm[r][i].cells
+        self.heights = grid.heights
         self._steps = (grid.dh, grid.dtheta * grid.profile.r_max)
         self._from = cache(self._compute)
 

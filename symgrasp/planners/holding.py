@@ -16,6 +16,7 @@ from itertools import count
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.planners.gaps import PrintGaps
@@ -155,10 +156,20 @@ def _any_turn(margins: Array) -> Array:
     return np.broadcast_to(margins.max(axis=2, keepdims=True), margins.shape)
 
 
-def _best_turn(margins: Array, others: Array) -> Array:
-    """Return for every grasp (R, H, A) the worse of its and the others' margins, at the best turn."""
+@njit(cache=True)
+def _best_turn(margins, others):
+    """Return for every grasp (R, H, A) the worse of its and the others' margins, at the best turn.
+
+    Turns are tried by falling margin of the others (A,), so most of them are never looked at.
+    """
+    rolls, heights, angles = margins.shape
+    order = np.argsort(-others)
     best = np.full(margins.shape, -1.0)
-    for k, bound in enumerate(others.tolist()):
-        if bound >= 0:
-            best = np.maximum(best, np.minimum(np.roll(margins, -k, axis=2), bound))
+    for r in range(rolls):
+        for i in range(heights):
+            for j in range(angles):
+                for k in order:
+                    if others[k] <= best[r, i, j]:
+                        break
+                    best[r, i, j] = max(best[r, i, j], min(margins[r, i, (j + k) % angles], others[k]))
     return best

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from symgrasp.candidates import Judge
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.ik import ClosedFormIK
+from symgrasp.manifold import ROLLS, grasp_to_tool
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm
@@ -48,14 +49,7 @@ class Postures:
     def __init__(self, world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap]) -> None:
         self.world, self.arms, self.maps = world, arms, maps
         self.body_checks = 0
-        settings = world.scene.settings
-        self._judges = [
-            Judge(world, arm, ClosedFormIK(arm, settings.redundancy), settings.approach) for arm in arms
-        ]
-        self._tools = [
-            inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
-            for arm, m in zip(arms, maps, strict=True)
-        ]
+        self._judge = cache(self._judge_of)
         self._free = cache(self._feasible)
 
     def witnesses(self, cells: Sequence[Cell]) -> list[Posture]:
@@ -89,6 +83,14 @@ class Postures:
         for robot in self.world.scene.robots:
             self.world.park(robot)
         self.world.set_object(m.T_world_object)
+        h, theta = m.manifold.h[cell.row], m.manifold.theta[cell.column]
+        standoff = arm.hand.standoff(float(m.manifold.profile.radius(h)))
+        tool = grasp_to_tool(m.T_world_object, h, theta, ROLLS[cell.roll], standoff)
         opening = float(m.opening[cell.row])
-        candidates = self._judges[k].candidates(self._tools[k][cell], opening)
+        candidates = self._judge(k).candidates(inverse(arm.robot.T_world_base) @ tool, opening)
         return [Posture(arm, c.q, opening) for c in candidates if c.fate == Reason.FEASIBLE]
+
+    def _judge_of(self, k: int) -> Judge:
+        settings = self.world.scene.settings
+        arm = self.arms[k]
+        return Judge(self.world, arm, ClosedFormIK(arm, settings.redundancy), settings.approach)

@@ -1,0 +1,45 @@
+"""The benchmark measures what it says; no figure here depends on how fast the machine is."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from symgrasp import bench
+from symgrasp.cli import main
+
+
+def figures(found) -> dict[str, bench.Figure]:
+    return {figure.name.strip(): figure for figure in found}
+
+
+def test_two_hands_exact_never_misses_what_climbing_finds():
+    found = figures(bench.several_hands(pairs=6))
+    exact = np.array(found["two hands, complete search: success"].values)
+    climb = np.array(found["two hands, hill climbing as printed: success"].values)
+    assert len(exact) == len(climb) == 6
+    assert (exact >= climb).all()
+    assert exact.any()
+    gained = found["smallest of gap and margins, more than climbing reaches"].values
+    assert min(gained) >= -1e-9
+
+
+def test_on_the_command_line(monkeypatch, tmp_path, capsys):
+    made = [bench.Figure("a", "ms", (1.0, 2.0, 4.0)), bench.Figure("b", "×", (3.0,))]
+    monkeypatch.setattr(bench, "run", lambda: iter(made))
+    assert main(["bench", "--out", str(tmp_path / "bench.json")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "2 ms" in lines[0]
+    assert "(1 to 4)" in lines[0]
+    content = json.loads((tmp_path / "bench.json").read_text())
+    assert content["figures"][1] == {"name": "b", "unit": "×", "values": [3.0]}
+    assert content["machine"]["cpus"] >= 1
+
+
+def test_a_long_sequence_and_sampling_are_measured():
+    (sequence,) = bench.long_sequence(tasks=6, runs=2)
+    assert len(sequence.values) == 2
+    success, ratio = bench.without_the_manifold(runs=2)
+    assert set(success.values) <= {0.0, 1.0}
+    assert len(ratio.values) == 2
