@@ -1,5 +1,17 @@
 """Closed-form inverse kinematics: all branches of a pose at sampled redundancy values."""
 
 from symgrasp.ik.closed_form import ClosedFormIK, Solutions
+from symgrasp.ik.spherical import SphericalIK
+from symgrasp.robot import Arm
 
-__all__ = ["ClosedFormIK", "Solutions"]
+__all__ = ["ClosedFormIK", "Solutions", "SphericalIK", "solver_for"]
+
+
+def solver_for(arm: Arm, samples: int) -> ClosedFormIK:
+    """Return the fastest solver of an arm: compiled where its axes allow, EAIK otherwise.
+
+    Raises:
+        UrdfError: no closed form is known for the arm, whichever joint is locked.
+    """
+    general = ClosedFormIK(arm, samples)
+    return SphericalIK(arm, samples) if SphericalIK.fits(general) else general

@@ -7,6 +7,7 @@ axes alone. The locked joint's value is the redundancy φ.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +77,10 @@ class ClosedFormIK:
             if not np.isfinite(upper - lower):
                 lower, upper = -np.pi, np.pi
             self.phi = lower + (np.arange(samples) + 0.5) * (upper - lower) / samples
-        self._solvers = [self._solver(phi) for phi in self.phi]
+
+    @cached_property
+    def _solvers(self) -> list[HPRobot]:
+        return [self._solver(phi) for phi in self.phi]
 
     def _solver(self, phi: float) -> HPRobot:
         locks = [] if self.locked is None else [(self.locked, float(phi))]
