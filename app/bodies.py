@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import viser
 
-from app.palette import INK, PICK, REASONS, faded, rgb
+from app.palette import INK, PICK, PRINTS, REASONS, faded, rgb
+from app.prints import on_surface, print_index, shown_prints
 from app.stage import Viewpoint, add_links, place, stand_around
 from app.state import State
 from app.surface import CellQuads, around, flat
@@ -83,7 +84,8 @@ class ObjectView:
         place(self.body, state.T_world_object)
         place(self.surface.node, state.request.T_world_object)
         if state.result:
-            self.surface.paint(_colors(state, state.roll.reason(state.result.map)))
+            reason, prints = state.roll.reason(state.result.map), shown_prints(state)
+            self.surface.paint(_colors(state, reason, [on_surface(state, cells) for cells in prints]))
         self.pick.visible = state.pick is not None
         if state.pick:
             self.pick.position = self.grid.contact(state.pick.h, state.pick.theta)
@@ -117,7 +119,7 @@ class FlatMap:
         """Bring it up to the state."""
         self.frame.visible = state.board
         if state.map:
-            self.cells.paint(_colors(state, state.roll.reason(state.map)))
+            self.cells.paint(_colors(state, state.roll.reason(state.map), shown_prints(state)))
             # What a turn leaves over beside whole cells moves the start of the grid.
             rest = (state.map.manifold.theta_start + np.pi) / (2 * np.pi)
             self.cells.node.position = (rest * FLAT_SIZE[0], 0.0, 0.0)
@@ -136,9 +138,12 @@ def board_position(state: State, view: Viewpoint) -> Array:
     return position
 
 
-def _colors(state: State, reason: np.ndarray) -> np.ndarray:
-    colors = REASONS[reason]
-    return colors if state.is_current else faded(colors)
+def _colors(state: State, reason: np.ndarray, prints: Sequence[np.ndarray]) -> np.ndarray:
+    colors = REASONS[reason] if state.is_current else faded(REASONS[reason])
+    if not prints:
+        return colors
+    index = print_index(prints)
+    return np.where(index[..., None] > 0, PRINTS[index], colors)
 
 
 def _add_seam(client: viser.ClientHandle, name: str, profile: Profile) -> None:

@@ -10,7 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 import viser
 
-from app.map_view import Mark, legend_html, map_html, plan_html
+from app.map_view import Mark, legend_html, map_html, plan_html, prints_html
+from app.prints import shown_prints
 from app.readout import grasp_html, map_title, notes_html, plan_line, status_html
 from app.state import Pick, State
 from app.things import UNITS, UPLOAD_LIMIT, choices
@@ -260,13 +261,13 @@ class Controls:
             self._set("legend", self.legend, "")
             return
         marks = [Mark(state.pick.h, state.pick.theta)] if state.pick else []
-        prints = []
-        if state.plan and state.shown and len(state.shown.holds) > 1:
-            prints = [state.plan.prints[state.task, hold.arm] for hold in state.shown.holds]
+        prints, legend = shown_prints(state), legend_html(state.map, state.roll)
+        if prints and state.shown:
+            legend += prints_html(state.shown, prints)
             marks = [Mark(h.grasp.h, h.grasp.theta, h.arm) for h in state.shown.holds]
         stale = not state.is_current
         self._set("map", self.map, map_html(state.map, state.roll, marks, prints, stale=stale))
-        self._set("legend", self.legend, legend_html(state.map, state.roll))
+        self._set("legend", self.legend, legend)
 
     def _show_busy(self, state: State) -> None:
         retry = state.busy is None and not state.is_current

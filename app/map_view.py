@@ -15,7 +15,8 @@ from html import escape
 import numpy as np
 from PIL import Image
 
-from app.palette import REASONS, faded
+from app.palette import OVERLAP, PRINTS, REASONS, faded
+from app.prints import hand_color, print_index
 from app.state import State
 from app.values import PlanResult, RollChoice
 from symgrasp.feasibility import FeasibilityMap
@@ -23,12 +24,21 @@ from symgrasp.manifold import Manifold, wrap
 from symgrasp.plan import PlanTask
 from symgrasp.reason import Reason
 
-__all__ = ["COLUMNS", "Mark", "legend_html", "map_html", "plan_html", "sample_columns", "to_png"]
+__all__ = [
+    "COLUMNS",
+    "Mark",
+    "legend_html",
+    "map_html",
+    "plan_html",
+    "prints_html",
+    "sample_columns",
+    "to_png",
+]
 
 COLUMNS = 1440
 """Columns of a picture: four a degree."""
 
-SHADE = 110
+SHADE = 205
 """Alpha of the cells under a hand."""
 
 
@@ -74,7 +84,7 @@ def map_html(
         m: the map.
         roll: which rolls to show.
         marks: grasps to circle.
-        prints: cells (H, A) to shade, over the grid that begins at -π.
+        prints: cells (H, A) under each hand, over the grid that begins at -π.
         stale: wash the colours out.
         height: of the picture (px).
         name: alternative text of the picture.
@@ -83,9 +93,9 @@ def map_html(
     picture = roll.reason(m)[::-1, sample_columns(grid)]
     layers = [_img(to_png(picture, faded(REASONS) if stale else REASONS), name)]
     still = Manifold(grid.profile, grid.heights, grid.angles)
-    for cells in prints:
-        shaded = to_png(cells[::-1, sample_columns(still)], np.zeros((2, 3), dtype=int), (0, SHADE))
-        layers.append(_img(shaded, "handprint"))
+    if prints:
+        index = print_index(prints)[::-1, sample_columns(still)]
+        layers.append(_img(to_png(index, PRINTS, (0, *[SHADE] * OVERLAP)), "handprints"))
     layers += [_circle(mark, grid) for mark in marks]
     return (
         f'<div class="sg-map" style="height:{height + 48}px">'
@@ -106,6 +116,18 @@ def legend_html(m: FeasibilityMap, roll: RollChoice) -> str:
             f"<small>{count} · {escape(share)} %</small></div>"
         )
     return f'<div class="sg-legend">{"".join(rows)}</div>'
+
+
+def prints_html(task: PlanTask, prints: Sequence[np.ndarray]) -> str:
+    """List the colours of the hands on a map, and that of their overlap if there is one."""
+    rows = [(hand_color(k), f"hand of {hold.arm}") for k, hold in enumerate(task.holds)]
+    if OVERLAP in print_index(prints):
+        rows.append((OVERLAP, "both hands"))
+    swatches = (
+        f'<div><i style="background:rgb{tuple(PRINTS[color].tolist())}"></i><span>{escape(name)}</span></div>'
+        for color, name in rows
+    )
+    return f'<div class="sg-legend">{"".join(swatches)}</div>'
 
 
 def plan_html(plan: PlanResult, state: State) -> str:

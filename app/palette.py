@@ -6,7 +6,7 @@ import numpy as np
 
 from symgrasp.reason import Reason
 
-__all__ = ["INK", "PICK", "REASONS", "faded", "rgb", "to_linear"]
+__all__ = ["INK", "OVERLAP", "PICK", "PRINTS", "REASONS", "faded", "rgb", "to_linear"]
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -22,6 +22,14 @@ INK = "#1d2733"
 
 PICK = "#e6007e"
 """The picked grasp; no reason has a colour near it."""
+
+HANDS = ("#0b3c9c", "#5fc9f0", "#a8641c", "#fff0c8")
+"""The hands of a task, in turn. They differ in lightness, so also to the colour-blind."""
+
+PRINTS = np.array([rgb(color) for color in ("#ffffff", *HANDS, "#000000")], dtype=np.uint8)
+"""(2 + hands, 3) sRGB: nothing, each hand, and where hands overlap."""
+
+OVERLAP = len(PRINTS) - 1
 
 FADED_TO = np.array([236, 238, 241])
 

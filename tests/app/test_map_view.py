@@ -8,6 +8,8 @@ from __future__ import annotations
 import base64
 import io
 import re
+from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -15,8 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from app.map_view import COLUMNS, Mark, legend_html, map_html, plan_html, sample_columns
-from app.palette import REASONS, faded, rgb, to_linear
+from app.map_view import COLUMNS, Mark, legend_html, map_html, plan_html, prints_html, sample_columns
+from app.palette import OVERLAP, PRINTS, REASONS, faded, rgb, to_linear
+from app.prints import on_surface, shown_prints
 from app.values import RollChoice
 from symgrasp.manifold import Manifold
 from symgrasp.reason import Reason
@@ -89,14 +92,55 @@ def test_marks_stand_where_their_grasp_is():
     assert "<b>" not in html.replace("<b>h (cm)</b>", "").replace("<b>θ (°)</b>", "")
 
 
-def test_handprints_are_shaded_and_the_rest_is_clear():
+def test_each_hand_has_its_colour_their_overlap_a_third_and_the_rest_is_clear():
     state = with_plan("log_two_robots", "bimanual")
-    cells = state.plan.prints["lift", "left"]
-    html = map_html(state.map, state.roll, prints=[cells])
-    (data,) = re.findall(r'alt="handprint" src="data:image/png;base64,([^"]+)"', html)
-    alpha = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA"))[..., 3]
-    still = Manifold(state.scene.profile, *cells.shape)
-    assert np.array_equal(alpha > 0, cells[::-1, sample_columns(still)])
+    left, right = shown_prints(state)
+    assert left.any()
+    assert right.any()
+    moved = np.roll(left, 1, axis=1)  # a plan's own prints share no cell
+    assert (left & moved).any()
+    for other in (right, moved):
+        html = map_html(state.map, state.roll, prints=[left, other])
+        (data,) = re.findall(r'alt="handprints" src="data:image/png;base64,([^"]+)"', html)
+        image = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA"))
+        columns = sample_columns(Manifold(state.scene.profile, *left.shape))
+        a, b = left[::-1, columns], other[::-1, columns]
+        assert np.array_equal(image[..., 3] > 0, a | b)
+        for cells, color in ((a & ~b, PRINTS[1]), (b & ~a, PRINTS[2]), (a & b, PRINTS[OVERLAP])):
+            assert (image[cells][:, :3] == color).all()
+        assert ("both hands" in prints_html(state.shown, [left, other])) == bool((a & b).any())
+
+
+def test_prints_on_the_surface_stay_under_the_hand_when_the_object_turns():
+    state = with_plan("log_two_robots", "bimanual")
+    grid, (left, _) = state.scene.manifold, shown_prints(state)
+    i, j = np.argwhere(left)[0]
+    turned = replace(state, delta=state.delta + 3 * grid.dtheta)
+    seen = on_surface(turned, left)
+    point = turned.T_world_object @ [*grid.contact(grid.h[i], grid.theta[j]), 1.0]
+    base = np.linalg.inv(turned.request.T_world_object) @ point
+    assert seen[grid.cell(base[2], np.arctan2(base[1], base[0]))]
+    assert seen.sum() == left.sum()
+
+
+@pytest.mark.parametrize(
+    "sight",
+    [
+        np.eye(3),
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+    ],
+    ids=["all colours", "no red", "no green", "no blue"],
+)
+def test_hands_are_told_apart_by_the_colour_blind(sight):
+    """Seen as Machado, Oliveira and Fernandes (2009) compute it, the colours differ in lightness."""
+    linear = to_linear(PRINTS[1:]) / 255
+    seen = np.clip(linear @ np.transpose(sight), 0, 1)
+    luminance = seen @ [0.2126, 0.7152, 0.0722]
+    lightness = 116 * np.cbrt(np.maximum(luminance, 0.0089)) - 16
+    for a, b in combinations(range(len(seen)), 2):
+        assert abs(lightness[a] - lightness[b]) > 10
 
 
 def test_a_plan_shows_a_map_for_every_task_turned_by_its_delta():

@@ -20,7 +20,9 @@ BOTTLE = load_object("wine_bottle")[1]
 def stl(scale: float = 1.0) -> bytes:
     mesh = BOTTLE.mesh(64)
     mesh.apply_scale(scale)
-    return bytes(mesh.export(file_type="stl"))
+    content = mesh.export(file_type="stl")
+    assert isinstance(content, bytes)
+    return content
 
 
 @pytest.fixture
