@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from symgrasp.errors import SceneError, SymgraspError, UrdfError
 from symgrasp.meshes import read_mesh
-from symgrasp.poses import Array, axis_frame, quat_wxyz, wxyz_to_xyzw
+from symgrasp.poses import Array, axis_frame, from_position_quat, quat_wxyz, wxyz_to_xyzw, xyzw_to_wxyz
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm, Robot, RobotModel
 from symgrasp.scene import Scene
@@ -51,7 +51,7 @@ def _silenced() -> Iterator[None]:
 with _silenced():  # it prints its build time
     import pybullet
 
-__all__ = ["Body", "BulletWorld", "Collision", "check_tasks"]
+__all__ = ["Body", "BulletWorld", "Collision", "Shape", "check_tasks"]
 
 RESTING_DEPTH = 1e-3
 """How deep (m) an object may sink into what it stands on and still count as resting."""
@@ -61,6 +61,12 @@ SELF_SAMPLES = 2000
 
 NEVER_GAP = 0.02
 """Links that come closer than this (m) in some sample are always checked, collided or not."""
+
+WALL_GAP = 0.5
+"""Distance (m) from which the rounding of a link is measured."""
+
+LINK_MARGIN = 1e-3
+"""Bullet rounds the shapes of links by this (m); what is set for a compound does not reach its parts."""
 
 
 class Body(NamedTuple):
@@ -87,6 +93,21 @@ class Collision(NamedTuple):
     a: Body
     b: Body
     depth: float
+
+
+class Shape(NamedTuple):
+    """A convex collision shape as PyBullet has it: a hull, blown up by a ball.
+
+    Attributes:
+        vertices: (n, 3) corners of the hull in the link frame.
+        rounding: radius (m) of the ball.
+        slack: by how much (m) the true shape may fall short of this one; inf where the parts of a
+            link cannot be told apart and this is the hull of them all.
+    """
+
+    vertices: Array
+    rounding: float
+    slack: float
 
 
 class _Query(NamedTuple):
@@ -309,6 +330,60 @@ class BulletWorld:
         pose[:3, 3] = state[4]
         return pose
 
+    # -- shapes -----------------------------------------------------------------------------
+
+    def shapes(self, name: str) -> dict[str, list[Shape]]:
+        """Return the convex shapes of each link of a robot, or of an obstacle that is a URDF."""
+        body = next(body for body, own in self._names.items() if own == name)
+        links = enumerate(self._links[body], start=-1)
+        return {link: shapes for index, link in links if (shapes := self._link_shapes(body, index))}
+
+    def _link_shapes(self, body: int, link: int) -> list[Shape]:
+        data = pybullet.getCollisionShapeData(body, link, physicsClientId=self._client)
+        if not data:
+            return []
+        info = pybullet.getDynamicsInfo(body, link, physicsClientId=self._client)
+        centre = _pose(info[3], info[4])  # Bullet's link frames sit at the centres of mass
+        shapes = [_primitive(kind, size, centre @ _pose(at, turn)) for _, _, kind, size, _, at, turn in data]
+        if any(shapes):
+            hulls = [self._mesh(body, link, k) for k, shape in enumerate(shapes) if shape is None]
+            rounding, slack = LINK_MARGIN, LINK_MARGIN
+        else:
+            hulls, every = [self._mesh(body, link, k) for k in range(len(data))], self._mesh(body, link, -1)
+            apart = len(every) == sum(map(len, hulls))
+            hulls = hulls if apart else [every]
+            rounding, slack = self._rounding(body, link, every), 0.0 if apart else np.inf
+        hulled = [Shape(v @ centre[:3, :3].T + centre[:3, 3], rounding, slack) for v in hulls if len(v)]
+        return [shape for shape in shapes if shape] + hulled
+
+    def _mesh(self, body: int, link: int, index: int) -> Array:
+        _, vertices = pybullet.getMeshData(
+            body, link, collisionShapeIndex=index, physicsClientId=self._client
+        )
+        return np.reshape(np.array(vertices, dtype=float), (-1, 3))
+
+    def _rounding(self, body: int, link: int, vertices: Array) -> float:
+        """Measure by how much Bullet blows up the hull of vertices: against a wall above the link."""
+        client = self._client
+        if link < 0:
+            position, orientation = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+        else:
+            position, orientation = pybullet.getLinkState(
+                body, link, computeForwardKinematics=True, physicsClientId=client
+            )[:2]
+        pose = _pose(position, orientation)
+        top = (vertices @ pose[2, :3]).max() + pose[2, 3]
+        half = 2.0
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=[half] * 3, physicsClientId=client
+        )
+        above = [pose[0, 3], pose[1, 3], top + WALL_GAP + half]
+        wall = pybullet.createMultiBody(0.0, shape, basePosition=above, physicsClientId=client)
+        pybullet.changeDynamics(wall, -1, collisionMargin=0.0, physicsClientId=client)
+        found = pybullet.getClosestPoints(body, wall, 1.0, link, -1, physicsClientId=client)
+        pybullet.removeBody(wall, physicsClientId=client)
+        return max(0.0, float(WALL_GAP - min(p[8] for p in found)))
+
     # -- questions --------------------------------------------------------------------------
 
     def first_collision(self, arm: Arm) -> Collision | None:
@@ -395,6 +470,25 @@ def check_tasks(scene: Scene) -> None:
                         task.name,
                         f"a pose outside of every obstacle; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
                     )
+
+
+def _pose(position: Sequence[float], xyzw: Sequence[float]) -> Array:
+    return from_position_quat(position, xyzw_to_wxyz(xyzw))
+
+
+def _primitive(kind: int, size: Sequence[float], pose: Array) -> Shape | None:
+    """Return the shape of a box, ball or capsule, and None for a hull."""
+    if kind == pybullet.GEOM_BOX:
+        # Rounded inwards: edges and corners fall short of the box by less than their diagonal.
+        corners, rounding, slack = np.array(list(np.ndindex(2, 2, 2))) - 0.5, 0.0, LINK_MARGIN
+        corners = corners * size
+    elif kind == pybullet.GEOM_SPHERE:
+        corners, rounding, slack = np.zeros((1, 3)), float(size[0]), 0.0
+    elif kind == pybullet.GEOM_CAPSULE:
+        corners, rounding, slack = np.array([[0, 0, -0.5 * size[0]], [0, 0, 0.5 * size[0]]]), size[1], 0.0
+    else:
+        return None
+    return Shape(corners @ pose[:3, :3].T + pose[:3, 3], rounding, slack)
 
 
 def _xyzw(pose: Array) -> list[float]:
