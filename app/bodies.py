@@ -9,6 +9,7 @@ import viser
 
 from app.palette import INK, PICK, PRINTS, REASONS, faded, rgb
 from app.prints import on_surface, print_index, shown_prints
+from app.profile_view import deviation_colors
 from app.stage import Viewpoint, add_links, place, stand_around
 from app.state import State
 from app.surface import CellQuads, around, flat
@@ -83,7 +84,10 @@ class ObjectView:
         """Bring it up to the state."""
         place(self.body, state.T_world_object)
         place(self.surface.node, state.request.T_world_object)
-        if state.result:
+        if state.errors and state.thing and state.thing.measurement:
+            colors = deviation_colors(state.thing.measurement, self.grid)
+            self.surface.paint(on_surface(state, colors))
+        elif state.result:
             reason, prints = state.roll.reason(state.result.map), shown_prints(state)
             self.surface.paint(_colors(state, reason, [on_surface(state, cells) for cells in prints]))
         self.pick.visible = state.pick is not None

@@ -12,6 +12,7 @@ import viser
 
 from app.map_view import Mark, legend_html, map_html, plan_html, prints_html
 from app.prints import shown_prints
+from app.profile_view import holds_html, profile_html, symmetry_html
 from app.readout import grasp_html, map_title, notes_html, plan_line, status_html
 from app.state import Pick, State
 from app.things import UNITS, UPLOAD_LIMIT, choices
@@ -28,6 +29,9 @@ TURN_STEP = 0.25
 
 REACH = 200.0
 """How far (cm) the object may be moved from the world's origin."""
+
+COLOURS = ("map", "symmetry error")
+"""What the object's surface may show."""
 
 Change = Callable[[State], State]
 
@@ -97,6 +101,7 @@ class Controls:
         self.title = self.gui.add_html('<div class="sg sg-title">Loading …</div>')
         self.map = self.gui.add_html("")
         self.legend = self.gui.add_html("")
+        self.holds = self.gui.add_html("")
         self.notes = self.gui.add_html("")
 
     def _build_status(self) -> None:
@@ -153,6 +158,9 @@ class Controls:
                 self.upload.value.name, self.upload.value.content, UNITS[self.unit.value]
             )
         )
+
+        self.colours = gui.add_dropdown("Colours", COLOURS, visible=False)
+        self._on(self.colours, lambda s, v: replace(s, errors=v == COLOURS[1]))
 
     def _build_grasp(self) -> None:
         gui = self.gui
@@ -246,6 +254,8 @@ class Controls:
         self.towards.value = _within(self.towards, np.rad2deg(base.towards))
         self.scene.value = state.scene_name
         self.thing.value = state.choice
+        self.colours.visible = bool(state.thing and state.thing.measurement)
+        self.colours.value = COLOURS[state.errors]
         self.task.value, self.arm.value, self.roll.value = state.task, state.arm, state.roll.value
         self.gizmo.value, self.board.value = state.gizmo, state.board
         pick = state.pick or Pick(state.scene.profile.h_min, 0.0)
@@ -256,6 +266,7 @@ class Controls:
 
     def _show_map(self, state: State) -> None:
         self._set("title", self.title, map_title(state))
+        self._set("holds", self.holds, holds_html(state) + symmetry_html(state))
         if state.map is None:
             self._set("map", self.map, '<div class="sg sg-faint">The map is being computed …</div>')
             self._set("legend", self.legend, "")
@@ -266,7 +277,8 @@ class Controls:
             legend += prints_html(state.shown, prints)
             marks = [Mark(h.grasp.h, h.grasp.theta, h.arm) for h in state.shown.holds]
         stale = not state.is_current
-        self._set("map", self.map, map_html(state.map, state.roll, marks, prints, stale=stale))
+        shown = map_html(state.map, state.roll, marks, prints, stale=stale)
+        self._set("map", self.map, f'<div class="sg-side">{shown}{profile_html(state)}</div>')
         self._set("legend", self.legend, legend)
 
     def _show_busy(self, state: State) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from symgrasp.reason import Reason
 
-__all__ = ["INK", "OVERLAP", "PICK", "PRINTS", "REASONS", "faded", "rgb", "to_linear"]
+__all__ = ["DIVERGING", "INK", "OVERLAP", "PICK", "PRINTS", "REASONS", "faded", "rgb", "to_linear"]
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -30,6 +30,9 @@ PRINTS = np.array([rgb(color) for color in ("#ffffff", *HANDS, "#000000")], dtyp
 """(2 + hands, 3) sRGB: nothing, each hand, and where hands overlap."""
 
 OVERLAP = len(PRINTS) - 1
+
+DIVERGING = np.array([rgb(c) for c in ("#2166ac", "#92c5de", "#f7f7f7", "#f4a582", "#b2182b")])
+"""(5, 3) sRGB: from negative over zero to positive; told apart by the colour-blind too."""
 
 FADED_TO = np.array([236, 238, 241])
 

@@ -38,6 +38,6 @@ def shown_prints(state: State) -> list[np.ndarray]:
 
 
 def on_surface(state: State, cells: np.ndarray) -> np.ndarray:
-    """Bring cells (H, A) of the object's frame to the coloured surface, which does not turn with it."""
+    """Bring cells (H, A, …) of the object's frame to the coloured surface, which does not turn with it."""
     _, turned = state.scene.manifold.shift(state.delta)
     return np.roll(cells, turned, axis=1)

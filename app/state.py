@@ -74,6 +74,7 @@ class State:
         busy: what is being computed.
         problem: one line about what went wrong last.
         gizmo: whether the handles that drag the object are seen.
+        errors: whether the object's surface shows the symmetry error of its mesh and not the map.
         board: whether the map is laid out in the scene as well.
     """
 
@@ -94,6 +95,7 @@ class State:
     busy: Busy | None = None
     problem: str = ""
     gizmo: bool = False
+    errors: bool = False
     board: bool = True
 
     @staticmethod
@@ -148,7 +150,7 @@ class State:
         """Everything that a widget or the gizmo shows and can change."""
         return (
             self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick, self.step,
-            self.gizmo, self.board, self.thing, self.uploaded,
+            self.gizmo, self.errors, self.board, self.thing, self.uploaded,
         )  # fmt: skip
 
     @cached_property
@@ -192,7 +194,7 @@ class State:
         """Show the scene with another object in it, or with its own again (None)."""
         uploaded = thing if thing and thing.measurement else self.uploaded
         state = replace(self._without_plan(), busy=None, result=None, pick=None)
-        return replace(state, scene=scene, thing=thing, uploaded=uploaded)
+        return replace(state, scene=scene, thing=thing, uploaded=uploaded, errors=False)
 
     def choose_task(self, name: str) -> State:
         """Show another task, with its first arm unless the chosen one takes part."""

@@ -27,6 +27,7 @@ from symgrasp.poses import pose_error
 from symgrasp.reason import Reason
 from symgrasp.scene import Scene
 from symgrasp.world import BulletWorld
+from tests.app.test_profile_view import oval_stl
 from tests.conftest import write_scene
 from tests.e2e.page import GraspPage
 
@@ -305,6 +306,30 @@ def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
     expect(page.text(f"the {thing.name} turns")).to_be_visible()
     page.expect_title("soda_can")
     assert page.page.evaluate("window.hacked") is None
+    assert page.complaints == []
+
+
+def test_the_symmetry_error_is_told_and_painted(open_page, tmp_path):
+    page = open_page()
+    expect(page.text("The hand franka fits from 0.9 to 19.1 and 24.0 to 29.1 cm.")).to_be_visible()
+    expect(page.page.get_by_label("Colours", exact=True)).to_have_count(0)
+    path = tmp_path / "oval.stl"
+    path.write_bytes(oval_stl())
+    page.upload(path)
+    expect(page.text("Symmetry error: 0.99 mm at most")).to_be_visible()
+    page.expect_title("bottle_on_table")
+    page.page.get_by_label("Flat map").uncheck()
+
+    def reds(view: np.ndarray) -> int:  # of the cells whose grasps hit an obstacle
+        red = REASONS[Reason.SCENE_COLLISION].astype(int)
+        return int(np.count_nonzero(np.abs(view - red).max(axis=-1) < 60))
+
+    page.wait_for_view(lambda v: reds(v) > 300)
+    page.choose("Colours", "symmetry error")
+    expect(page.text("0.99 mm inside")).to_be_visible()
+    page.wait_for_view(lambda v: reds(v) < 100)
+    page.choose("Colours", "map")
+    page.wait_for_view(lambda v: reds(v) > 300)
     assert page.complaints == []
 
 
