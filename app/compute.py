@@ -20,7 +20,7 @@ from symgrasp.robot import RobotModel
 from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
 
-__all__ = ["Store", "Workbench"]
+__all__ = ["Store", "Workbench", "check_visuals"]
 
 MAPS_KEPT = 64
 """Maps that the server remembers, newest first; a big one (96 x 192 cells) takes about 4 MB."""
@@ -57,7 +57,7 @@ class Store:
             return known
         scene = Scene.load(name)
         check_tasks(scene)
-        _check_visuals(scene)
+        check_visuals(scene)
         with self._lock:
             return self._scenes.setdefault(name, scene)
 
@@ -174,7 +174,7 @@ class Workbench:
         return maps, part(len(requests))
 
 
-def _check_visuals(scene: Scene) -> None:
+def check_visuals(scene: Scene) -> None:
     """Read everything that is shown, so that what cannot be read is known now."""
     for robot in scene.robots.values():
         link_visuals(robot.model.urdf)

@@ -17,6 +17,7 @@ from app.readout import grasp_html, map_title, notes_html, plan_line, status_htm
 from app.state import Pick, State
 from app.things import UNITS, UPLOAD_LIMIT, choices
 from app.values import RollChoice
+from symgrasp.hand import HANDS
 from symgrasp.mesh_io import MESH_ENDINGS
 
 __all__ = ["PANELS_WIDTH", "Actions", "Controls"]
@@ -33,6 +34,9 @@ REACH = 200.0
 COLOURS = ("map", "symmetry error")
 """What the object's surface may show."""
 
+MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
+"""Hands that can be mounted where a scene mounts one."""
+
 Change = Callable[[State], State]
 
 
@@ -47,6 +51,9 @@ class Actions(Protocol):
 
     def choose_object(self, choice: str) -> None:
         """Put another object into the scene."""
+
+    def choose_hand(self, hand: str) -> None:
+        """Mount another hand on the chosen arm."""
 
     def upload(self, name: str, content: bytes, scale: float) -> None:
         """Measure a mesh and put the object into the scene."""
@@ -199,8 +206,10 @@ class Controls:
             self.scene = gui.add_dropdown("Scene", scenes)
             self.task = _choice(gui, "Task")
             self.arm = _choice(gui, "Arm")
+            self.hand = gui.add_dropdown("Hand", MOUNTABLE, visible=False)
             self.board = gui.add_checkbox("Flat map", True)
         self.scene.on_update(lambda e: self.actions.open_scene(self.scene.value) if e.client else None)
+        self.hand.on_update(lambda e: self.actions.choose_hand(self.hand.value) if e.client else None)
         self._on(self.task, lambda s, v: s.choose_task(v))
         self._on(self.arm, lambda s, v: s.choose_arm(v))
         self._on(self.board, lambda s, v: replace(s, board=v))
@@ -257,6 +266,10 @@ class Controls:
         self.colours.visible = bool(state.thing and state.thing.measurement)
         self.colours.value = COLOURS[state.errors]
         self.task.value, self.arm.value, self.roll.value = state.task, state.arm, state.roll.value
+        hand = state.scene.mounted.get(state.arm)
+        self.hand.visible = hand is not None
+        if hand is not None:
+            self.hand.value = hand
         self.gizmo.value, self.board.value = state.gizmo, state.board
         pick = state.pick or Pick(state.scene.profile.h_min, 0.0)
         self.h.value = round(100 * pick.h, 2)

@@ -12,7 +12,7 @@ from typing import Any
 
 import viser
 
-from app.compute import Store, Workbench
+from app.compute import Store, Workbench, check_visuals
 from app.controls import PANELS_WIDTH, Controls
 from app.state import State
 from app.things import Thing, check_size, from_mesh
@@ -97,11 +97,25 @@ class Session:
         state = self.state
         if state is None:
             return
-        if state.uploaded and choice == state.uploaded.choice:
-            thing = state.uploaded
-            self._change_object(f"Loading {choice}", lambda: self._put(state.scene_name, thing))
+        uploaded = state.uploaded
+        if uploaded and choice == uploaded.choice:
+            run = lambda: self._put(state, uploaded)  # noqa: E731
         else:
-            self._change_object(f"Loading {choice}", lambda: self.store.scene_with(state.scene_name, choice))
+            run = lambda: self._load(state, choice)  # noqa: E731
+        self._change_object(f"Loading {choice}", run)
+
+    def choose_hand(self, hand: str) -> None:
+        """Mount another hand on the chosen arm, on the worker."""
+        state = self.state
+        if state is None:
+            return
+
+        def run() -> tuple[Scene, Thing | None]:
+            scene = state.scene.with_hand(state.arm, hand)
+            check_visuals(scene)
+            return scene, state.thing
+
+        self._change_object(f"Mounting {hand}", run)
 
     def upload(self, name: str, content: bytes, scale: float) -> None:
         """Measure a mesh on the worker and put the object into the scene."""
@@ -113,13 +127,18 @@ class Session:
         except SymgraspError as error:
             self.change(lambda s, problem=str(error): s.failed(problem))
             return
-        self._change_object(
-            f"Measuring {name}", lambda: self._put(state.scene_name, from_mesh(name, content, scale))
-        )
+        self._change_object(f"Measuring {name}", lambda: self._put(state, from_mesh(name, content, scale)))
 
-    def _put(self, scene: str, thing: Thing) -> tuple[Scene, Thing]:
-        """Return a scene with an object in place of its own."""
-        return self.store.scene(scene).with_object(thing.name, thing.profile), thing
+    def _load(self, state: State, choice: str) -> tuple[Scene, Thing | None]:
+        """Return the scene with its own object or one of the library, sharing what others computed."""
+        scene, thing = self.store.scene_with(state.scene_name, choice)
+        if scene.robots is state.scene.robots:
+            return scene, thing
+        return state.scene.with_object(scene.file.object.name, scene.profile), thing  # other hands
+
+    def _put(self, state: State, thing: Thing) -> tuple[Scene, Thing]:
+        """Return the scene with an object in place of its own."""
+        return state.scene.with_object(thing.name, thing.profile), thing
 
     def _change_object(self, label: str, run: Callable[[], tuple[Scene, Thing | None]]) -> None:
         def done(ticket: int, found: tuple[Scene, Thing | None]) -> None:

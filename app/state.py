@@ -149,8 +149,8 @@ class State:
     def inputs(self) -> tuple[object, ...]:
         """Everything that a widget or the gizmo shows and can change."""
         return (
-            self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick, self.step,
-            self.gizmo, self.errors, self.board, self.thing, self.uploaded,
+            self.scene, self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick,
+            self.step, self.gizmo, self.errors, self.board, self.thing, self.uploaded,
         )  # fmt: skip
 
     @cached_property

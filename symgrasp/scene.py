@@ -170,6 +170,28 @@ class Scene:
             raise SceneError("object", "name", name, "a name that no robot or obstacle of the scene has")
         return replace(self, file=self.file.model_copy(update={"object": thing}), profile=profile)
 
+    @property
+    def mounted(self) -> dict[str, str]:
+        """Return arm → hand, by their names, of the arms whose hand another may replace."""
+        arms = [arm for robot in self.file.robots for arm in robot.arm_files()]
+        return {a.name: a.hand for a in arms if a.mount and a.tool is None and isinstance(a.hand, str)}
+
+    def with_hand(self, arm: str, hand: str) -> Scene:
+        """Return the scene with another hand on an arm, where the scene mounts one.
+
+        Raises:
+            SceneError: the arm's hand cannot be replaced, or there is no such hand that can be mounted.
+            UrdfError: the hand does not go with the robot.
+        """
+        if arm not in self.mounted:
+            raise SceneError(self.source, "arm", arm, one_of(self.mounted, arm))
+        content = self.file.model_dump(mode="json", exclude_none=True)
+        for robot in content["robots"]:
+            for entry in robot.get("arms", [robot]):
+                if entry["name"] == arm:
+                    entry["hand"] = hand
+        return Scene.from_content(content, self.source)
+
     def with_settings(self, **changes: float) -> Scene:
         """Return the scene with other map settings; robots and object are shared.
 

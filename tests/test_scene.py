@@ -9,6 +9,7 @@ import yaml
 
 from symgrasp.errors import ProfileError, SceneError, SymgraspError, UrdfError
 from symgrasp.files import SCENES_DIR
+from symgrasp.hand import HANDS
 from symgrasp.objects import load_object
 from symgrasp.poses import from_position_rpy, translation
 from symgrasp.scene import Scene, shipped_scenes
@@ -275,6 +276,22 @@ def test_an_object_needs_a_name_of_its_own(name):
     with pytest.raises(SymgraspError, match=r"^object: name: ") as caught:
         scene.with_object(name, scene.profile)
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_mounted_hand_can_be_replaced():
+    scene = Scene.load("log_iiwa_and_panda")
+    assert scene.mounted == {"iiwa": "wsg50"}
+    changed = scene.with_hand("iiwa", "pr2")
+    assert changed.mounted == {"iiwa": "pr2"}
+    assert changed.arm("iiwa").hand == HANDS["pr2"]
+    assert set(HANDS["pr2"].links) <= set(changed.arm("iiwa").robot.model.link_names)
+    assert changed.arm("panda").hand == scene.arm("panda").hand
+    assert scene.arm("iiwa").hand == HANDS["wsg50"]
+    assert changed.with_hand("iiwa", "wsg50").sha256 == scene.sha256
+    for arm, hand in [("panda", "wsg50"), ("iiwa", "franka"), ("iiwa", "no_such")]:
+        with pytest.raises(SceneError) as caught:
+            scene.with_hand(arm, hand)
+        assert len(str(caught.value).splitlines()) == 1
 
 
 def test_settings_can_be_changed_and_are_checked():

@@ -333,6 +333,23 @@ def test_the_symmetry_error_is_told_and_painted(open_page, tmp_path):
     assert page.complaints == []
 
 
+def test_another_hand_is_mounted_where_the_scene_mounts_one(open_page):
+    page = open_page(scene="log_iiwa_and_panda")
+    expect(page.page.get_by_label("Hand", exact=True)).to_have_count(0)  # the Panda comes with its own
+    page.choose("Arm", "iiwa")
+    page.expect_title("· iiwa")
+    expect(page.page.get_by_label("Hand", exact=True)).to_have_value("wsg50")
+    page.choose("Hand", "pr2")
+    expect(page.text("The hand pr2 fits from ")).to_be_visible()
+    page.expect_title("· iiwa")
+    changed = Scene.load("log_iiwa_and_panda").with_hand("iiwa", "pr2")
+    assert np.array_equal(page.picture(), drawn(create_map(changed, "iiwa", "lift")))
+    page.choose("Object", "log_70mm")  # into the scene with the other hand
+    expect(page.text("the log_70mm turns")).to_be_visible()
+    expect(page.page.get_by_label("Hand", exact=True)).to_have_value("pr2")
+    assert page.complaints == []
+
+
 def test_meshes_that_are_unusable_are_refused_in_a_line(open_page, bottle_map, tmp_path):
     page = open_page()
     page.upload(Path(pybullet_data.getDataPath(), "objects", "mug.obj"))
