@@ -32,9 +32,12 @@ def _holding(hand: Hand, profile: Profile) -> tuple[tuple[float, float], ...]:
 
 
 def _hands(state: State) -> dict[str, tuple[int, Hand]]:
-    """Return hand name → colour and hand, of the arms of the task."""
-    arms = [state.scene.arm(name) for name in state.scene.task(state.task).arms]
-    return {arm.hand.name: (hand_color(k), arm.hand) for k, arm in reversed(list(enumerate(arms)))}
+    """Return hand name → colour and hand, of the first arm of the task with it."""
+    hands: dict[str, tuple[int, Hand]] = {}
+    for k, name in enumerate(state.scene.task(state.task).arms):
+        hand = state.scene.arm(name).hand
+        hands.setdefault(hand.name, (hand_color(k), hand))
+    return hands
 
 
 def profile_html(state: State, height: int = 230) -> str:
