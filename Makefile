@@ -15,7 +15,9 @@ test: $(VENV)/dev.stamp  ## install, then run every check and test
 	$(BIN)/pytest $(ARGS)
 
 $(BIN)/python:
-	$(PYTHON) -m venv $(VENV) || { $(PYTHON) -m pip install virtualenv && $(PYTHON) -m virtualenv $(VENV); }
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+	$(PYTHON) -m pip install --quiet --target $(VENV)-boot virtualenv && \
+	PYTHONPATH=$(VENV)-boot $(PYTHON) -m virtualenv $(VENV); }
 
 $(VENV)/app.stamp: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --editable .

@@ -77,8 +77,11 @@ def _read(path: Path) -> ET.Element:
         robot = ET.parse(path).getroot()
     except OSError as error:
         raise UrdfError(path, "urdf", str(path), "a readable URDF file") from error
-    except (ET.ParseError, ValueError) as error:
+    except (ET.ParseError, ValueError, LookupError) as error:
         raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
+    for tag in ("link", "joint"):
+        _no_repeats(path, f"{tag} name", _names(robot, tag))
+    _no_repeats(path, "child link of joints", [c.get("link", "") for c in robot.iterfind("joint/child")])
     for link in robot.iter("link"):
         for mesh in link.iter("mesh"):
             reference = mesh.get("filename", "")
@@ -87,6 +90,12 @@ def _read(path: Path) -> ET.Element:
                 raise UrdfError(path, f"link {link.get('name')}", reference, "an existing mesh file")
             mesh.set("filename", str(file.resolve()))
     return robot
+
+
+def _no_repeats(path: Path, field: str, names: Sequence[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise UrdfError(path, field, name, "a name that is not used twice")
 
 
 def _names(robot: ET.Element, tag: str) -> list[str]:

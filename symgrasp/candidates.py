@@ -100,6 +100,9 @@ class Judge:
         choices = solutions.q[solutions.inside]
         if not len(choices):
             return None
+        # A joint that turns further than once around goes on from where it is, where its limits allow.
+        near = choices + 2 * np.pi * np.round((q - choices) / (2 * np.pi))
+        choices = np.where((near >= self.arm.lower) & (near <= self.arm.upper), near, choices)
         turn = np.abs(choices - q).max(axis=1)
         nearest = int(turn.argmin())
         return choices[nearest] if turn[nearest] <= RETREAT_TURN else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -46,6 +47,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SymgraspError as error:
         print(f"symgrasp: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # whoever reads the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except OSError as error:
         print(f"symgrasp: {error.filename}: {error.strerror}", file=sys.stderr)
         return 2
@@ -93,7 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     plan.add_argument("--method", metavar="METHOD", help=f"{text}; the first is the default")
     plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
-    plan.add_argument("--seed", type=int, default=0, help="hill_climb: seed (default: %(default)s)")
+    plan.add_argument("--seed", type=_natural, default=0, help="hill_climb: seed (default: %(default)s)")
 
     verify = add("verify", _verify, "Check a plan: 0 it holds, 1 it does not, 2 it cannot be read.")
     verify.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
@@ -297,6 +301,13 @@ def _check_folder(out: Path) -> None:
         raise InputError("command line", "--out", str(out), f"a file in an existing folder, not {out.parent}")
     if out.is_dir():
         raise InputError("command line", "--out", str(out), "a file, not a folder")
+
+
+def _natural(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise ValueError
+    return value
 
 
 def _progress(what: str) -> Callable[[float], None] | None:

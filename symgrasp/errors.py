@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from reprlib import Repr
 
 __all__ = [
     "Cancelled",
@@ -22,6 +23,11 @@ __all__ = [
     "UrdfError",
     "one_of",
 ]
+
+
+_SHORT = Repr()
+_SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 4, 120, 120
+_SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = 8
 
 
 class SymgraspError(Exception):
@@ -43,9 +49,10 @@ class InputError(SymgraspError, ValueError):
         self.field = field
         self.value = value
         self.expected = expected
-        shown = repr(value)
-        if len(shown) > 120:
-            shown = shown[:117] + "..."
+        try:
+            shown = _SHORT.repr(value)
+        except ValueError:  # an integer of thousands of digits
+            shown = f"a very large {type(value).__name__}"
         line = f"{self.source}: {field}: {shown}: expected {expected}"
         super().__init__(" ".join(line.split()))
 

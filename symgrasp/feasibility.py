@@ -324,6 +324,8 @@ def create_map(
     T_base_tool = T_base_world @ grid.tool_poses(the_task.T_world_object, the_arm.hand.finger_depth)
 
     with nullcontext(world) if world else BulletWorld(scene) as W:
+        W.margin = scene.settings.margin
+        W.set_arms(())  # a map that was cancelled in this world may have left an arm elsewhere
         W.set_object(the_task.T_world_object)
         judge = Judge(W, the_arm, ik, scene.settings.approach)
         for row, h in enumerate(grid.h):
@@ -337,8 +339,6 @@ def create_map(
                 draft.record(cell, *_verdict(candidates))
             if progress:
                 progress((row + 1) / grid.heights)
-        for name in scene.robots:
-            W.park(name)
     return draft.finish(scene.name, the_task.name, the_task.T_world_object)
 
 

@@ -8,9 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
-__all__ = ["SCENES_DIR", "package_dir", "resolve", "write_atomically"]
+import yaml
+
+__all__ = ["SCENES_DIR", "package_dir", "parse_yaml", "resolve", "write_atomically"]
 
 SCENES_DIR = Path(__file__).resolve().parent.parent / "static_scenes"
 """The shipped scenes and their meshes; beside the package, in a checkout and when installed."""
@@ -18,6 +20,8 @@ SCENES_DIR = Path(__file__).resolve().parent.parent / "static_scenes"
 
 def package_dir(name: str) -> Path | None:
     """Return the folder of an importable Python package without importing it, or None."""
+    if "." in name:  # finding a package inside another would import the other
+        return None
     try:
         spec = find_spec(name)
     except (ImportError, ValueError):
@@ -50,10 +54,57 @@ def resolve(reference: str, folder: Path) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
+class _Loader(yaml.SafeLoader):
+    """Plain data only, and no key twice."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict:
+        mapping = super().construct_mapping(node, deep=deep)
+        if len(mapping) != len(node.value):
+            keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+            raise ValueError(f"the key {next(k for k in keys if keys.count(k) > 1)!r} twice")
+        return mapping
+
+
+MOST_NODES = 1_000_000
+"""Values in a YAML document once its aliases are written out; aliases can blow a small file up."""
+
+
+def parse_yaml(text: str) -> Any:
+    """Parse a YAML document of plain data.
+
+    Raises:
+        ValueError: it is not one; the text says why, in one line.
+    """
+    try:
+        content = yaml.load(text, Loader=_Loader)
+        if _nodes(content, {}) > MOST_NODES:
+            raise ValueError("aliases that stand for too much")
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    except Exception as error:  # the parser raises whatever a malformed scalar makes Python raise
+        raise ValueError(" ".join(f"{error or type(error).__name__}".split())) from error
+    return content
+
+
+def _nodes(value: Any, known: dict[int, int]) -> int:
+    """Count the values in plain data as if every alias were written out."""
+    if not isinstance(value, (dict, list)):
+        return 1
+    if id(value) not in known:
+        known[id(value)] = MOST_NODES + 1  # what holds itself never ends
+        parts = value.values() if isinstance(value, dict) else value
+        known[id(value)] = 1 + sum(_nodes(part, known) for part in parts)
+    return known[id(value)]
+
+
 @contextmanager
 def write_atomically(path: Path) -> Iterator[IO[bytes]]:
     """Open a temporary file beside ``path`` that takes its name once the block succeeded."""
-    path = Path(path)
+    path = Path(path).resolve()  # a link keeps pointing to what it points to
+    if path.exists() and not path.is_file():  # a device or a pipe has no name to be taken over
+        with path.open("wb") as file:
+            yield file
+        return
     mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:

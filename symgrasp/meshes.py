@@ -9,7 +9,7 @@ import trimesh
 
 from symgrasp.errors import MeshError
 
-__all__ = ["read_mesh"]
+__all__ = ["depth_inside", "read_mesh"]
 
 
 def read_mesh(path: Path, field: str = "mesh") -> trimesh.Trimesh:
@@ -33,3 +33,23 @@ def read_mesh(path: Path, field: str = "mesh") -> trimesh.Trimesh:
     if not np.isfinite(mesh.vertices).all():
         raise MeshError(path, field, "NaN or infinite", "finite vertices")
     return mesh
+
+
+def depth_inside(mesh: trimesh.Trimesh, point: np.ndarray) -> float:
+    """Return how deep (m) a point (3,) lies inside a closed mesh, 0 outside.
+
+    The solid angles of all triangles seen from the point add up to a full sphere inside, and to
+    nothing outside.
+    """
+    if not ((point >= mesh.bounds[0]) & (point <= mesh.bounds[1])).all():
+        return 0.0
+    corners = mesh.triangles - point
+    a, b, c = np.moveaxis(corners, 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = [np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a))]
+    angles = 2 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
+    if abs(angles.sum()) < 2 * np.pi:
+        return 0.0
+    nearest = trimesh.triangles.closest_point(mesh.triangles, np.tile(point, (len(corners), 1)))
+    return float(np.linalg.norm(nearest - point, axis=1).min())

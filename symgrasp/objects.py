@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import yaml
-
 from symgrasp.errors import ProfileError, one_of
-from symgrasp.files import SCENES_DIR
+from symgrasp.files import SCENES_DIR, parse_yaml
 from symgrasp.mesh_io import MESH_ENDINGS
 from symgrasp.profile import Profile
 
@@ -51,10 +49,10 @@ def load_object(name: str | Path, scale: float = 1.0) -> tuple[str, Profile]:
 def _read(path: Path) -> tuple[str, Profile]:
     """Read the name and the profile of an object from a YAML file."""
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = parse_yaml(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise ProfileError(path, "file", str(error), "a text file that can be read") from error
-    except (yaml.YAMLError, ValueError) as error:
+    except ValueError as error:
         raise ProfileError(path, "file", str(error), "a YAML document") from error
     if not isinstance(content, dict):
         raise ProfileError(path, "file", content, "a YAML mapping with name and profile")

@@ -66,14 +66,15 @@ def plan_sequential(
     with BulletWorld(scene) as world:
         all_maps = _all_maps(world, tasks, known, progress)
         chosen = [all_maps[k, name] for k in range(len(tasks))]
-        entries = []
+        entries: list[PlanTask] = []
         for visits in _visits(world, tasks, chosen, method):
             part = [tasks[k] for k in visits]
             part_maps = {(i, name): chosen[k] for i, k in enumerate(visits)}
             if method == "first":
                 entries += _first(world, part, part_maps, name)
-            else:
-                entries += _hold_best(world, part, part_maps, None)[0]
+            else:  # where it is set down, the object stays as it was turned
+                turned = entries[-1].delta if entries else 0.0
+                entries += _hold_best(world, part, part_maps, None, turned)[0]
     return _plan(scene, "sequential", Planner(algorithm=method), entries)
 
 
@@ -146,6 +147,10 @@ def plan_handover(
     index = {task.name: k for k, task in enumerate(tasks)}
     known = {(index[task], arm): m for (task, arm), m in (maps or {}).items()}
     with BulletWorld(scene) as world:
+        for before, after in pairwise(tasks):
+            if not set(before.arms) & set(after.arms) and not world.rests(before.T_world_object):
+                expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
+                raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
         all_maps = _all_maps(world, tasks, known, progress)
         entries, planner = _hold_best(world, tasks, all_maps, progress)
     return _plan(scene, "handover", planner, entries)
@@ -196,9 +201,17 @@ def _first(world: BulletWorld, tasks: Sequence[Task], maps: Maps, arm: str) -> l
 
 
 def _hold_best(
-    world: BulletWorld, tasks: Sequence[Task], maps: Maps, progress: Progress | None
+    world: BulletWorld,
+    tasks: Sequence[Task],
+    maps: Maps,
+    progress: Progress | None,
+    turned: float = 0.0,
 ) -> tuple[list[PlanTask], Planner]:
-    """Find the best grasps for a sequence, with configurations in which nothing collides."""
+    """Find the best grasps for a sequence, with configurations in which nothing collides.
+
+    Turning the object and all grasps on it by the same angle changes nothing, so the object can
+    stand in the first task as it is ``turned`` (rad, whole cells) already.
+    """
     runs = hold_runs([task.arms for task in tasks])
     grid = next(iter(maps.values())).manifold
     search = HoldingSearch(maps, runs, PrintGaps([world.scene.arm(run.arm) for run in runs], grid))
@@ -215,14 +228,15 @@ def _hold_best(
         if steps is None:
             continue
         entries = []
+        common = round(turned / grid.dtheta) - steps[0][0]
         for k, (task, (turn, postures)) in enumerate(zip(tasks, steps, strict=True)):
             cells = _cells_in(runs, holding.cells, k, task)
-            turned = [_turned(cell, turn, grid.angles) for cell in cells]
             holds = [
-                (posture, maps[k, arm], at, cell)
-                for arm, posture, at, cell in zip(task.arms, postures, turned, cells, strict=True)
+                (posture, maps[k, arm], _turned(cell, turn, grid.angles), _turned(cell, -common, grid.angles))
+                for arm, posture, cell in zip(task.arms, postures, cells, strict=True)
             ]
-            entries.append(_task_entry(world, task, float(wrap(turn * grid.dtheta)), holds))
+            delta = float(wrap((turn + common) * grid.dtheta))
+            entries.append(_task_entry(world, task, delta, holds))
         checks = sum(desk.body_checks for desk in desks)
         statistics = {"placements": tried, "body_checks": checks}
         return entries, Planner(algorithm="exact", statistics=statistics)

@@ -25,6 +25,9 @@ from symgrasp.poses import Array, from_rotation, inverse, rotation_about
 
 __all__ = ["Arm", "Joint", "Robot", "RobotModel"]
 
+LARGEST_LIMIT = 1e4
+"""No joint turns or slides further than this (rad or m)."""
+
 MOVING = ("revolute", "continuous", "prismatic")
 
 
@@ -144,6 +147,8 @@ class RobotModel:
                 if j.limit is None or j.limit.lower is None or j.limit.upper is None:
                     raise UrdfError(self.path, f"joint {j.name}: limit", None, "a lower and an upper limit")
                 lower, upper = float(j.limit.lower), float(j.limit.upper)
+                if not -LARGEST_LIMIT <= lower <= upper <= LARGEST_LIMIT:
+                    raise UrdfError(self.path, f"joint {j.name}: limit", [lower, upper], "lower <= upper")
         return Joint(
             j.name, j.type, links.index(j.parent), links.index(j.child), origin, axis, lower, upper,
             source, ratio, offset,

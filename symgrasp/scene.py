@@ -10,11 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from symgrasp.errors import SceneError, one_of
-from symgrasp.files import SCENES_DIR
+from symgrasp.files import SCENES_DIR, parse_yaml
 from symgrasp.manifold import Manifold
 from symgrasp.profile import Profile
 from symgrasp.robot import Arm, Robot
@@ -63,7 +62,7 @@ class Scene:
             path = shipped[str(scene)]
         try:
             text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, ValueError) as error:
             raise SceneError(path, "file", str(path), f"a readable text file ({error})") from error
         return Scene.parse(text, source=str(path), folder=path.parent)
 
@@ -75,10 +74,9 @@ class Scene:
             SceneError, UrdfError, ProfileError: as `load`.
         """
         try:
-            content = yaml.safe_load(text)
-        except (yaml.YAMLError, ValueError) as error:
-            reason = " ".join(str(error).split())
-            raise SceneError(source, "file", reason, "a YAML document") from error
+            content = parse_yaml(text)
+        except ValueError as error:
+            raise SceneError(source, "file", str(error), "a YAML document") from error
         if not isinstance(content, dict):
             raise SceneError(source, "file", content, "a YAML mapping with schema_version, name, robots, …")
         return Scene.from_content(content, source, folder)

@@ -25,9 +25,12 @@ __all__ = [
     "scene_schema",
 ]
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+LARGEST = 1e4
+"""No number in a scene is larger: metres, degrees and factors stay far below."""
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 Vector = tuple[Number, Number, Number]
 
@@ -212,10 +215,10 @@ class MapSettings(_Strict):
     heights: Annotated[int, Field(ge=1, le=1024)] = 48
     angles: Annotated[int, Field(ge=1, le=1024)] = 96
     redundancy: Annotated[int, Field(ge=1, le=1024)] = 32
-    approach: NotNegative = 0.0
+    approach: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
     """length (m) of the straight radial retreat that must be free as well"""
-    margin: NotNegative = 0.0
-    """distance (m) that bodies must keep"""
+    margin: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
+    """distance (m) to keep from obstacles and other robots"""
 
 
 class SceneFile(_Strict):

@@ -77,6 +77,7 @@ def verify(plan: Plan) -> Report:
     report.expect(set(plan.robots) == set(scene.robots), f"robots: the scene has {sorted(scene.robots)}")
     _check_order(plan, scene, report)
     with BulletWorld(scene) as world:
+        _check_grasps_stay(plan, world, report)
         for k, task in enumerate(plan.tasks):
             where = f"tasks[{k}] ({task.name})"
             if _check_poses(task, where, scene, report):
@@ -112,15 +113,22 @@ def _check_order(plan: Plan, scene: Scene, report: Report) -> None:
         report.expect(
             names == list(scene.tasks), f"tasks: {names}, but the scene asks for {list(scene.tasks)}"
         )
+
+
+def _check_grasps_stay(plan: Plan, world: BulletWorld, report: Report) -> None:
+    """Check that every arm keeps its grasp, unless the object stands while it is grasped anew."""
     for k, (before, after) in enumerate(pairwise(plan.tasks), start=1):
-        if before.name == after.name:  # set down and grasped anew
-            same = before.object_pose == after.object_pose
-            report.expect(same, f"tasks[{k}] ({after.name}): the object moved while nobody held it")
-            continue
+        where = f"tasks[{k}] ({after.name})"
         grasps = {hold.arm: (hold.grasp, hold.opening) for hold in before.holds}
-        for hold in after.holds:
-            kept = grasps.get(hold.arm, (hold.grasp, hold.opening)) == (hold.grasp, hold.opening)
-            report.expect(kept, f"tasks[{k}] ({after.name}): {hold.arm} changed its grasp on the way")
+        kept = [grasps[h.arm] == (h.grasp, h.opening) for h in after.holds if h.arm in grasps]
+        if all(kept) and kept:
+            continue
+        old, new = before.object_pose_turned.array(), after.object_pose_turned.array()
+        if before.name == after.name or not kept:
+            _same_pose(old, new, f"{where}: the object moved while nobody held it", report)
+            report.expect(world.rests(old), f"{where}: the object is let go where nothing holds it up")
+        else:
+            report.expect(False, f"{where}: an arm changed its grasp on the way")
 
 
 def _without_set_downs(plan: Plan) -> Iterator[str]:

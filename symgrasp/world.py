@@ -18,10 +18,11 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike
 
-from symgrasp.errors import SceneError, SymgraspError, UrdfError
-from symgrasp.meshes import read_mesh
+from symgrasp.errors import MeshError, SceneError, SymgraspError, UrdfError
+from symgrasp.meshes import depth_inside, read_mesh
 from symgrasp.poses import Array, axis_frame, from_position_quat, quat_wxyz, wxyz_to_xyzw, xyzw_to_wxyz
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm, Robot, RobotModel
@@ -55,6 +56,9 @@ __all__ = ["Body", "BulletWorld", "Collision", "Shape", "check_tasks"]
 
 RESTING_DEPTH = 1e-3
 """How deep (m) an object may sink into what it stands on and still count as resting."""
+
+MOST_TRIANGLES = 60_000
+"""More than this PyBullet does not take in one mesh."""
 
 SELF_SAMPLES = 2000
 """Random configurations that tell which links of a robot always or never collide."""
@@ -110,6 +114,9 @@ class Shape(NamedTuple):
     slack: float
 
 
+_KEPT_AT_A_DISTANCE = (Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION)
+
+
 class _Query(NamedTuple):
     """One closest-points call: all links of two bodies, or two links."""
 
@@ -145,13 +152,18 @@ class BulletWorld:
             self._links: dict[int, tuple[str, ...]] = {}  # body → names of links -1, 0, 1, …
             self._names: dict[int, str] = {}
             self._robots = {r.name: self._load_robot(r) for r in scene.robots.values()}
+            self._solids: list[tuple[str, trimesh.Trimesh]] = []  # closed meshes, in the world
             self._obstacles = [self._load_obstacle(o) for o in scene.obstacles]
             self._object = self._load_object()
             self._joints = {name: self._movable(name) for name in self._robots}
             self._queries = {arm.name: self._arm_queries(arm) for arm in scene.arms.values()}
+            self._parked_queries = {name: self._parked(name) for name in self._robots}
             self.set_object(scene.task().T_world_object)
             for name in self._robots:
                 self.park(name)
+        except pybullet.error as error:
+            self.close()
+            raise SceneError(scene.source, "bodies", str(error), "shapes that PyBullet can make") from error
         except BaseException:
             self.close()
             raise
@@ -211,10 +223,19 @@ class BulletWorld:
         """Keep the true surface: hollow meshes stay hollow.
 
         An arm inside a closed mesh would go unnoticed by its surface alone, but an arm hangs
-        together and on its base, so some moving link crosses the surface.
+        together and on its base, so some moving link crosses the surface. The object does not, so
+        for closed meshes it is asked whether they hold its middle.
         """
         assert o.path is not None
         mesh = read_mesh(o.path, f"obstacle {o.name}")
+        if len(mesh.faces) > MOST_TRIANGLES:
+            expected = f"at most {MOST_TRIANGLES} triangles; simplify the mesh"
+            raise MeshError(o.path, f"obstacle {o.name}", f"{len(mesh.faces)} triangles", expected)
+        solid = mesh.copy()
+        solid.merge_vertices()  # STL repeats every corner
+        if solid.is_watertight:
+            solid.apply_transform(o.T_world_obstacle)
+            self._solids.append((o.name, solid))
         return pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
             vertices=mesh.vertices.tolist(),
@@ -274,11 +295,18 @@ class BulletWorld:
         ]
         return queries
 
+    def _parked(self, name: str) -> list[_Query]:
+        """List what is checked for a robot that holds nothing: the object, and the other robots."""
+        body = self._robots[name]
+        queries = [_Query(Reason.OBJECT_COLLISION, body, piece) for piece in self._object]
+        others = [other for other in self._robots.values() if other != body]
+        return queries + [_Query(Reason.ROBOT_COLLISION, body, other) for other in others]
+
     # -- state ------------------------------------------------------------------------------
 
     def set_object(self, T_world_object: ArrayLike) -> None:
         """Place the object by its origin and axis; its spin about the axis does not matter."""
-        pose = axis_frame(T_world_object)
+        pose = self._object_pose = axis_frame(T_world_object)
         for body in self._object:
             pybullet.resetBasePositionAndOrientation(
                 body, pose[:3, 3].tolist(), _xyzw(pose), physicsClientId=self._client
@@ -402,7 +430,8 @@ class BulletWorld:
     def collisions(self, arms: Sequence[Arm]) -> list[Collision]:
         """Return all collisions of several arms at once, deepest first.
 
-        Of a robot with several arms, the touch links of all of them may touch the object.
+        Of a robot with several arms, the touch links of all of them may touch the object. Robots
+        without any of these arms are taken to be parked, and must be free of the object as well.
         """
         touch = {(a.robot.name, link) for a in arms for link in a.hand.touch_links}
         found = {
@@ -412,24 +441,56 @@ class BulletWorld:
             for c in self._ask(query)
             if not (c.reason == Reason.OBJECT_COLLISION and c.a in touch)
         }
+        busy = {arm.robot.name for arm in arms}
+        for name, queries in self._parked_queries.items():
+            if name not in busy:
+                found |= {(frozenset((c.a, c.b)), c.reason): c for q in queries for c in self._ask(q)}
         return sorted(found.values(), key=lambda c: -c.depth)
 
-    def object_contacts(self) -> list[Collision]:
-        """Return the obstacles that the object is inside of, deepest first (depth in metres)."""
+    def object_contacts(self, margin: float = 0.0) -> list[Collision]:
+        """Return the obstacles that the object is inside of, or within ``margin`` (m) of, deepest first."""
         found = [
             c
             for piece in self._object
             for obstacle in self._obstacles
-            for c in self._ask(_Query(Reason.SCENE_COLLISION, piece, obstacle))
+            for c in self._ask(_Query(Reason.SCENE_COLLISION, piece, obstacle), margin)
         ]
+        found += self._engulfed()
         return sorted(found, key=lambda c: -c.depth)
 
+    def object_in_robots(self, holders: Sequence[str]) -> list[Collision]:
+        """Return the links of other robots than the ``holders`` that the object is inside of."""
+        return [
+            c._replace(a=c.b, b=c.a)
+            for name, queries in self._parked_queries.items()
+            if name not in holders
+            for query in queries
+            if query.reason == Reason.OBJECT_COLLISION
+            for c in self._ask(query)
+        ]
+
+    def _engulfed(self) -> list[Collision]:
+        """Return the closed meshes that hold the object's middle: their surface alone would not tell."""
+        profile = self.scene.profile
+        middle = self._object_pose @ [0.0, 0.0, 0.5 * (profile.h_min + profile.h_max), 1.0]
+        found = []
+        for name, mesh in self._solids:
+            depth = depth_inside(mesh, middle[:3])
+            if depth > 0:
+                names = (Body(self.scene.file.object.name, ""), Body(name, ""))
+                found.append(Collision(Reason.SCENE_COLLISION, *names, depth))
+        return found
+
     def rests(self, T_world_object: ArrayLike) -> bool:
-        """Whether the object stands on something at a pose; leaves it there."""
+        """Whether the object stands on something at a pose: lowered by 3 mm, it would sink into it."""
+        pose = np.array(T_world_object, dtype=float)
+        self.set_object(pose)
+        before = max((c.depth for c in self.object_contacts()), default=0.0)
+        pose[2, 3] -= 0.003
+        self.set_object(pose)
+        after = max((c.depth for c in self.object_contacts()), default=0.0)
         self.set_object(T_world_object)
-        support = [self._ask(_Query(Reason.SCENE_COLLISION, piece, o), RESTING_DEPTH)
-                   for piece in self._object for o in self._obstacles]  # fmt: skip
-        return any(support)
+        return after > before + 0.0015
 
     def clearance(self, arm: Arm, limit: float) -> float:
         """Return the smallest distance (m) of all pairs that are checked for an arm, at most ``limit``."""
@@ -437,7 +498,10 @@ class BulletWorld:
         return min(gaps, default=limit)
 
     def _ask(self, query: _Query, margin: float | None = None) -> list[Collision]:
-        margin = self.margin if margin is None else margin
+        if margin is None:
+            # A margin is kept from what the arm must not touch; the hand is close to the object by
+            # design, and some links are always close to each other.
+            margin = self.margin if query.reason in _KEPT_AT_A_DISTANCE else 0.0
         links = () if query.link_a is None else (query.link_a, query.link_b)
         points = pybullet.getClosestPoints(query.a, query.b, margin, *links, physicsClientId=self._client)
         return [
@@ -459,16 +523,17 @@ def check_tasks(scene: Scene) -> None:
         SceneError: it is not; names both bodies and the depth.
     """
     with BulletWorld(scene) as world:
-        world.margin = 0.0
         for i, task in enumerate(scene.tasks.values()):
             world.set_object(task.T_world_object)
-            for c in world.object_contacts()[:1]:
+            holders = [scene.arm(name).robot.name for name in task.arms]
+            contacts = [*world.object_contacts(), *world.object_in_robots(holders)]
+            for c in sorted(contacts, key=lambda c: -c.depth)[:1]:
                 if c.depth > RESTING_DEPTH:
                     raise SceneError(
                         scene.source,
                         f"tasks[{i}].pose",
                         task.name,
-                        f"a pose outside of every obstacle; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
+                        f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
                     )
 
 
@@ -500,13 +565,16 @@ def _load_urdf(client: int, model: RobotModel, pose: Array) -> int:
     with tempfile.NamedTemporaryFile(suffix=".urdf") as file:
         file.write(model.collision_urdf())
         file.flush()
-        body = pybullet.loadURDF(
-            file.name,
-            basePosition=pose[:3, 3].tolist(),
-            baseOrientation=_xyzw(pose),
-            useFixedBase=True,
-            physicsClientId=client,
-        )
+        try:
+            body = pybullet.loadURDF(
+                file.name,
+                basePosition=pose[:3, 3].tolist(),
+                baseOrientation=_xyzw(pose),
+                useFixedBase=True,
+                physicsClientId=client,
+            )
+        except pybullet.error as error:
+            raise UrdfError(model.path, "urdf", str(error), "a URDF that PyBullet can load") from error
     for i, link in enumerate(_link_names(client, body)):
         shapes = pybullet.getCollisionShapeData(body, i - 1, physicsClientId=client)
         if model.has_shape(link) and not shapes:

@@ -216,6 +216,21 @@ def test_progress_and_cancel():
         create_map(scene, progress=stop)
 
 
+def test_a_cancelled_map_leaves_no_trace():
+    """In the world of a map that was stopped half-way, the next map is what it is in a new world."""
+    scene = load_small("log_two_robots")
+
+    def stop(share):
+        if share > 0.4:
+            raise Cancelled
+
+    with BulletWorld(scene) as world:
+        with pytest.raises(Cancelled):
+            create_map(scene, "left", world=world, progress=stop)
+        again = create_map(scene, "right", world=world)
+    assert np.array_equal(again.reason, create_map(scene, "right").reason)
+
+
 def test_a_world_can_be_used_again():
     scene = load_small("pick_pour_place")
     with BulletWorld(scene) as world:

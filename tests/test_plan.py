@@ -264,6 +264,9 @@ def test_a_regrasp_where_one_grasp_does_not_do():
     assert [task.name for task in plan.tasks] == ["pick", "place", "place", "pour", "place"]
     grasps = [task.holds[0].grasp for task in plan.tasks]
     assert grasps[0] == grasps[1] != grasps[2] == grasps[3] == grasps[4]
+    down, up = (plan.tasks[k].object_pose_turned.array() for k in (1, 2))
+    np.testing.assert_allclose(down, up, atol=1e-9)  # nobody turns it while it stands
+    assert [f for f in verify(plan).failures if "margin" not in f] == []
 
 
 def test_progress_grows_to_the_end():

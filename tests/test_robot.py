@@ -119,6 +119,13 @@ def test_a_hand_that_is_not_on_the_robot(panda, change, message):
     [
         ("<robot", "valid URDF"),
         ("<robot name='r'/>", "valid URDF"),
+        ("<robot name='r'><link name='a'/><link name='a'/></robot>", "not used twice"),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><joint name='j' type='fixed'>"
+            "<parent link='a'/><child link='b'/></joint><joint name='j' type='fixed'><parent link='a'/>"
+            "<child link='c'/></joint></robot>",
+            "joint name: 'j'",
+        ),
         ("<robot name='r'><link name='a'/><link name='b'/></robot>", "2 root links"),
         (
             "<robot name='r'><link name='a'><visual><geometry><mesh filename='no.stl'/></geometry>"

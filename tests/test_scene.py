@@ -157,11 +157,20 @@ def robot(change):
     return lambda c: c["robots"][0].update(change)
 
 
+BOMB = "a0: &a0 [x, x]\n" + "".join(f"a{k}: &a{k} [*a{k - 1}, *a{k - 1}]\n" for k in range(1, 40))
+
 BAD = [
     ("a: [1,\n b: }", SceneError, "file", "YAML document"),
     ("\x00", SceneError, "file", "YAML document"),
     ("- 1", SceneError, "file", "mapping"),
     ("", SceneError, "file", "mapping"),
+    ("a: !!bool foo", SceneError, "file", "YAML document"),
+    ("a: 1\na: 2", SceneError, "file", "YAML document"),
+    ("[" * 3000, SceneError, "file", "YAML document"),
+    (BOMB, SceneError, "file", "YAML document"),
+    (lambda c: c["map"].update(approach=1e300), SceneError, "map.approach", "less than or equal"),
+    (lambda c: c["tasks"][0]["pose"].update(quat_wxyz=[1e308, 1e308, 0, 0]), SceneError,
+     "tasks[0].pose.quat_wxyz[0]", "less than or equal"),
     (lambda c: c.update(extra=1), SceneError, "extra", "spelling"),
     (robot({"tol": "x"}), SceneError, "robots[0].tol", "spelling"),
     (lambda c: c.pop("object"), SceneError, "object", "required"),

@@ -50,8 +50,7 @@ def test_distances_are_those_of_the_shapes(content, tmp_path):
     scene = Scene.load(write_scene(tmp_path, content))
     gaps = {"box": 0.015, "cylinder": 0.01, "ball": 0.01, "mesh": 0.02}
     with BulletWorld(scene) as world:
-        world.margin = 0.05
-        found = {c.b.body: world.margin - c.depth for c in reversed(world.object_contacts())}
+        found = {c.b.body: 0.05 - c.depth for c in reversed(world.object_contacts(0.05))}
         for name, gap in gaps.items():
             assert found[name] == pytest.approx(gap, abs=2e-4), name  # the body exceeds the object by 0.22 %
 
@@ -168,17 +167,47 @@ def test_answers_do_not_depend_on_what_was_asked_before():
     assert first == again
 
 
-def test_margin_is_a_distance_to_keep():
+def test_margin_is_a_distance_to_keep_from_obstacles():
+    """The arm over the table: blocked just beyond its true distance, by nothing but the table."""
     scene = load_small("bottle_on_table")
     arm = scene.arm()
     with BulletWorld(scene) as world:
+        world.set_object(translation([0, 0, 5]))
         world.set_arm(arm, arm.home, 0.08)
-        gap = world.clearance(arm, 1.0)
-        assert 0 < gap < 1.0
+        world.margin = 0.5
+        hit = world.first_collision(arm)
+        assert hit is not None
+        assert hit.reason == Reason.SCENE_COLLISION
+        gap = 0.5 - hit.depth
         world.margin = gap - 1e-6
         assert world.first_collision(arm) is None
         world.margin = gap + 1e-6
         assert world.first_collision(arm) is not None
+
+
+def test_a_closed_mesh_around_the_object_is_noticed(content, tmp_path):
+    trimesh.creation.box((0.2, 0.2, 0.5)).export(tmp_path / "crate.stl")
+    crate = {"name": "crate", "mesh": "crate.stl", "pose": {"position": [0.55, 0, 0.15]}}
+    content["obstacles"] = [crate]
+    with pytest.raises(SceneError, match=r"bottle is 100.0 mm inside crate"):
+        check_tasks(Scene.load(write_scene(tmp_path, content)))
+
+
+def test_a_parked_robot_in_the_object_is_noticed(content, tmp_path):
+    robot = content["robots"][0]
+    content["robots"].append({**robot, "name": "other", "base": {"position": [0.55, 0, 0]}})
+    content["obstacles"] = []
+    with pytest.raises(SceneError, match="mm inside other/panda_link"):
+        check_tasks(Scene.load(write_scene(tmp_path, content)))
+
+
+def test_resting_is_standing_on_something():
+    scene = load_small("bottle_on_table")
+    with BulletWorld(scene) as world:
+        assert world.rests(scene.task().T_world_object)
+        assert not world.rests(translation([0.55, 0, 0.1]))
+        beside = translation([0.62 - 0.125 - 0.0376, -0.26, 0.15])  # touches the parcel from the side
+        assert not world.rests(beside)
 
 
 def test_worlds_do_not_disturb_each_other():
