@@ -23,6 +23,12 @@ from symgrasp.profile import Profile
 MUG = Path(package_dir("pybullet_data") or "") / "objects/mug.obj"
 
 
+def joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    mesh = trimesh.util.concatenate(parts)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
+
+
 def ball(r: float, rows: int) -> list[tuple[float, float]]:
     angles = np.linspace(0.0, np.pi, rows + 1)[1:-1]
     middle = [(r * np.sin(a), r - r * np.cos(a)) for a in angles]
@@ -295,7 +301,7 @@ def test_tolerance_grows_with_the_object(tmp_path):
 def knob(offset: float) -> trimesh.Trimesh:
     top = trimesh.creation.cylinder(0.006, 0.02, sections=24)
     top.apply_translation([offset, 0, 0.055])
-    return trimesh.util.concatenate([trimesh.creation.cylinder(0.03, 0.1, sections=48), top])
+    return joined([trimesh.creation.cylinder(0.03, 0.1, sections=48), top])
 
 
 def slanted() -> trimesh.Trimesh:
@@ -359,7 +365,7 @@ def test_bad_tolerances(tmp_path, tolerance):
 
 @pytest.mark.parametrize("offset", [[0.1, 0, 0], [0.05, 0.05, 0.01], [0, 0, 0.2], [0, 0.0665, 0]])
 def test_bodies_apart_are_refused(tmp_path, offset):
-    pair = trimesh.util.concatenate([CAN, CAN.copy().apply_translation(offset)])
+    pair = joined([CAN, CAN.copy().apply_translation(offset)])
     assert "2" in refused(save(tmp_path, pair), "bodies")
 
 
@@ -368,7 +374,7 @@ def test_parts_that_touch_or_enclose_are_one_body(tmp_path):
     stacked = trimesh.creation.cylinder(0.02, 0.05, sections=32).apply_translation([0, 0, 0.0825])
     # Touches the body only by way of the one below it.
     higher = trimesh.creation.cylinder(0.025, 0.05, sections=32).apply_translation([0, 0, 0.1325])
-    found = measure_mesh(save(tmp_path, trimesh.util.concatenate([CAN, inside, stacked, higher])))
+    found = measure_mesh(save(tmp_path, joined([CAN, inside, stacked, higher])))
     assert found.points[-1] == pytest.approx([0.215, 0.025], abs=2e-5)
 
 
@@ -443,7 +449,8 @@ def test_cuts_are_those_of_a_plane(seed):
     mesh.vertices += 0.003 * rng.standard_normal(mesh.vertices.shape) + 0.01
     cuts = cut(mesh.vertices, mesh.faces, 7)
     for j, angle in enumerate(column_angles(7)):
-        lines = trimesh.intersections.mesh_plane(mesh, [-np.sin(angle), np.cos(angle), 0], [0, 0, 0])
+        normal = [-np.sin(angle), np.cos(angle), 0]
+        lines = np.asarray(trimesh.intersections.mesh_plane(mesh, normal, [0, 0, 0]))
         out = lines @ [np.cos(angle), np.sin(angle), 0]
         # Both keep the same part of the plane: compare the lengths of what lies beyond the axis.
         share = np.clip(out.max(axis=1) / np.maximum(np.ptp(out, axis=1), 1e-300), 0, 1)
@@ -503,13 +510,13 @@ def axis_errors(knots: list[tuple[float, float]], facets: int, noise: float, see
 def test_many_facets_average_the_noise():
     # Two rings of 256 vertices, 0.2 mm off at random, 115 mm apart: 0.2 √2 √2 / √256 / 115 rad each way.
     expected = np.rad2deg(2e-4 * 2 / np.sqrt(256) / 0.115)
-    assert np.sqrt(np.mean(axis_errors(STRAIGHT["cylinder"], 256, 2e-4, 8) ** 2)) < 2 * expected
+    assert np.sqrt(np.mean(axis_errors(STRAIGHT["cylinder"], 256, 2e-4, 5) ** 2)) < 2.5 * expected
 
 
 def test_a_lid_is_held_level_by_its_faces():
     radii = np.linspace(0, 0.04, 20)
     lid = [*((r, 0.0) for r in radii), *((r, 0.006) for r in radii[::-1])]
-    assert axis_errors(lid, 64, 2e-4, 10).max() < 0.05
+    assert axis_errors(lid, 64, 2e-4, 5).max() < 0.04
 
 
 def test_a_frustum_without_principal_axes_is_found_by_its_normals():
