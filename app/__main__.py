@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import logging
 import socket
@@ -56,7 +57,8 @@ def serve(scene: str, host: str, port: int) -> None:
         if session:
             session.close()
 
-    print(f"symgrasp: http://{host}:{port}", flush=True)
+    shown = f"[{host}]" if ":" in host else host
+    print(f"symgrasp: http://{shown}:{port}", flush=True)
     try:
         threading.Event().wait()
     except KeyboardInterrupt:
@@ -72,13 +74,15 @@ def _check_free(host: str, port: int) -> None:
         raise InputError("command line", "--port", port, "a port from 1 to 65535")
     try:
         family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    except socket.gaierror as error:
+    except (socket.gaierror, UnicodeError) as error:
         raise InputError("command line", "--host", host, "an address of this machine") from error
     with socket.socket(family, kind) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(address)
         except OSError as error:
+            if error.errno == errno.EADDRNOTAVAIL:
+                raise InputError("command line", "--host", host, "an address of this machine") from error
             raise _busy(port, (error.strerror or str(error)).lower()) from error
 
 
