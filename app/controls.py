@@ -189,13 +189,13 @@ class Controls:
             self.sequential = gui.add_button(
                 "One grasp for all tasks",
                 icon=viser.Icon.ROUTE,
-                hint="Sequential planner: the grasp with most room in its worst task",
+                hint="The grasp with most room in its worst task",
             )
             self.sequential.on_click(lambda _: self.actions.plan("sequential"))
             self.bimanual = gui.add_button(
                 "All arms together",
                 icon=viser.Icon.USERS,
-                hint="Bimanual planner: the hands as far apart as the maps allow",
+                hint="Hands as far apart as the maps allow",
             )
             self.bimanual.on_click(lambda _: self.actions.plan("bimanual"))
             self.plan_text = gui.add_html("")
