@@ -90,6 +90,9 @@ class RobotModel:
         except Exception as error:  # the parser raises whatever its XML library raises
             raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
         self._collisions = {link.name: list(link.collisions) for link in urdf.robot.links}
+        for link, shapes in self._collisions.items():
+            for shape in shapes:
+                _check_shape(self.path, link, shape)
         self._hulls: dict[str, tuple[Array, ...]] = {}
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
         self.joints, self.link_names = self._build_tree(urdf, root)
@@ -253,6 +256,29 @@ class RobotModel:
                 moments = {"ixx": "1", "ixy": "0", "ixz": "0", "iyy": "1", "iyz": "0", "izz": "1"}
                 ET.SubElement(inertial, "inertia", moments)
         return ET.tostring(root)
+
+
+def _check_shape(path: Path, link: str, shape: yourdfpy.Collision) -> None:
+    """Check the sizes of a collision shape; a mesh may be mirrored by a negative scale.
+
+    Raises:
+        UrdfError: a size is not a positive number, or a scale is zero or none.
+    """
+    geometry = shape.geometry
+    if geometry is None:
+        raise UrdfError(path, f"link {link}: collision", None, "a geometry")
+    sizes: list[float] = []
+    if geometry.box is not None:
+        sizes = list(np.ravel(geometry.box.size))
+    elif geometry.cylinder is not None:
+        sizes = [geometry.cylinder.radius, geometry.cylinder.length]
+    elif geometry.sphere is not None:
+        sizes = [geometry.sphere.radius]
+    elif geometry.mesh is not None and geometry.mesh.scale is not None:
+        sizes = list(np.abs(np.ravel(geometry.mesh.scale)))
+    if not all(0 < size < LARGEST_LIMIT for size in sizes):
+        shown = [float(size) for size in sizes]
+        raise UrdfError(path, f"link {link}: collision", shown, "sizes that are positive numbers")
 
 
 def _root_link(urdf: yourdfpy.URDF) -> str:

@@ -119,6 +119,16 @@ def test_a_hand_that_is_not_on_the_robot(panda, change, message):
     [
         ("<robot", "valid URDF"),
         ("<robot name='r'/>", "valid URDF"),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><box size='-1 1 1'/></geometry></collision>"
+            "</link></robot>",
+            "sizes that are positive",
+        ),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><sphere radius='nan'/></geometry>"
+            "</collision></link></robot>",
+            "sizes that are positive",
+        ),
         ("<robot name='r'><link name='a'/><link name='a'/></robot>", "not used twice"),
         (
             "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><joint name='j' type='fixed'>"
