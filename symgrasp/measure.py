@@ -222,9 +222,9 @@ def _round_end(curve: Array, rings: Array, end: Array) -> Array:
     columns = np.column_stack([np.ones_like(rings), rings**2])
     root = np.sqrt(rings)
     (apex, bend), *_ = np.linalg.lstsq(columns * root[:, None], end * root, rcond=None)
-    r = np.linspace(0.0, rings[-1], 12)
-    beyond = (curve[:, 0] > apex + bend * r[-1] ** 2) & (np.maximum.accumulate(curve[:, 1]) > r[-1])
-    if bend <= 0 or not beyond.any():
+    r, rise = np.linspace(0.0, rings[-1], 12), bend * rings[-1] ** 2
+    beyond = (curve[:, 0] > apex + rise) & (np.maximum.accumulate(curve[:, 1]) > rings[-1])
+    if len(rings) < 3 or rise < 10 * EDGE or not beyond.any():
         return curve
     return np.concatenate([np.column_stack([apex + bend * r**2, r]), curve[beyond]])
 

@@ -48,10 +48,12 @@ def simplify(outline: Array, tolerance: float) -> Array:
     stretches = [(0, len(outline) - 1)]
     while stretches:
         first, last = stretches.pop()
-        ends = [first, last]
-        error = np.abs(r[first : last + 1] - np.interp(h[first : last + 1], h[ends], r[ends]))
-        worst = first + int(np.argmax(error))
-        if error[worst - first] > tolerance:
+        if last - first < 2:
+            continue
+        ends, between = [first, last], slice(first + 1, last)
+        error = np.abs(r[between] - np.interp(h[between], h[ends], r[ends]))
+        worst = first + 1 + int(np.argmax(error))
+        if error[worst - first - 1] > tolerance:
             kept[worst] = True
             stretches += [(first, worst), (worst, last)]
     return outline[kept]

@@ -481,6 +481,10 @@ def test_simplified_profiles_stay_within_the_tolerance(steps, tolerance):
     assert len(simplify(np.column_stack([outline[:, 0], 2 * outline[:, 0]]), tolerance)) == 2
 
 
+def test_knots_at_one_height_end_the_simplification():
+    assert len(simplify(np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]]), 0.1)) >= 2
+
+
 def test_distances_outside_an_outline():
     outline = np.array([[0.0, 1.0], [2.0, 1.0], [2.00001, 3.0], [4.0, 3.0]])
     points = [[1, 1.5], [1, 0.8], [-0.25, 0.5], [0.125, 0.25], [1.9, 2.0], [5, 0.0], [3, 0.0]]
