@@ -73,12 +73,13 @@ class Judge:
             sample, branch = int(solutions.sample[k]), int(solutions.branch[k])
             fate, collision = Reason.JOINT_LIMITS, None
             if solutions.inside[k]:
-                fate, collision = self._try(T_base_tool, q, sample, opening)
+                fate, collision = self.fate(T_base_tool, q, sample, opening)
             yield Candidate(q, float(self.ik.phi[sample]), sample, branch, fate, collision)
 
-    def _try(
+    def fate(
         self, T_base_tool: Array, q: Array, sample: int, opening: float
     ) -> tuple[Reason, Collision | None]:
+        """Return at which stage a candidate inside the limits fails, or FEASIBLE, and its collision."""
         self.world.set_arm(self.arm, q, opening)
         collision = self.world.first_collision(self.arm)
         if collision:

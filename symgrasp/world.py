@@ -52,7 +52,7 @@ def _silenced() -> Iterator[None]:
 with _silenced():  # it prints its build time
     import pybullet
 
-__all__ = ["Body", "BulletWorld", "Collision", "Shape", "check_tasks"]
+__all__ = ["Body", "BulletWorld", "Collision", "Shape", "check_tasks", "checked_self_pairs"]
 
 RESTING_DEPTH = 1e-3
 """How deep (m) an object may sink into what it stands on and still count as resting."""
@@ -284,7 +284,7 @@ class BulletWorld:
         touch = frozenset(index[link] for link in arm.hand.touch_links)
         queries = [
             _Query(Reason.SELF_COLLISION, body, body, index[a], index[b])
-            for a, b in _checked_self_pairs(robot.model)
+            for a, b in checked_self_pairs(robot.model)
         ]
         queries += [_Query(Reason.OBJECT_COLLISION, body, piece, skip_a=touch) for piece in self._object]
         queries += [_Query(Reason.SCENE_COLLISION, body, o, skip_a=mount) for o in self._obstacles]
@@ -589,7 +589,7 @@ def _link_names(client: int, body: int) -> list[str]:
 
 
 @lru_cache(maxsize=32)
-def _checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
+def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
     """Return the pairs of a robot's links that can collide, but need not.
 
     Left out are neighbours, pairs that overlap in every one of many random configurations (a

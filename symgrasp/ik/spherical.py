@@ -222,7 +222,7 @@ def _meeting(h: Array, o: Array) -> Array | None:
 # -- compiled -------------------------------------------------------------------------------
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy", parallel=True)
 def _solve_batch(geometry, joint, limits, forward, T):
     m, n, samples = T.shape[0], limits.shape[1], len(geometry)
     q = np.empty((m, samples, BRANCHES, n))
@@ -234,7 +234,7 @@ def _solve_batch(geometry, joint, limits, forward, T):
     return q, exists, inside
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solve_range(geometry, joint, limits, forward, T, first, last):
     n = limits.shape[1]
     q = np.empty((last - first, BRANCHES, n))
@@ -247,7 +247,7 @@ def _solve_range(geometry, joint, limits, forward, T, first, last):
     return q, exists, inside
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, inside):
     """Solve one pose (4, 4) at redundancy sample k.
 
@@ -260,6 +260,9 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
         q: (BRANCHES, n) receives the joint values.
         exists: (BRANCHES,) receives which branches reach the pose.
         inside: (BRANCHES,) receives which do so inside the limits.
+
+    Returns:
+        Whether the middle joint can bring S and W as far apart as the pose has them.
     """
     for b in range(BRANCHES):
         exists[b] = False
@@ -272,7 +275,7 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
     middle, length, part = _vec(g, _MIDDLE)
     swing = _swing((-0.5 * _dot(t, t) - part) / length)
     if swing < 0.0:
-        return
+        return False
     for i in range(2):
         q4 = _turned(limits, joint[3], -(middle + swing) if i == 0 else swing - middle)
         if inside_only and not _within(limits, joint[3], q4):
@@ -283,9 +286,10 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
         if exists[i] and _misses(forward, q[i], T):
             exists[i] = False
             inside[i] = False
+    return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _swing(cosine):
     """Return the arc cosine, or -1 where there is none."""
     rest = 1.0 - cosine * cosine
@@ -294,7 +298,7 @@ def _swing(cosine):
     return math.atan2(math.sqrt(max(rest, 0.0)), cosine)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside):
     """Subproblem 2: R5⁻¹ u = R6 t."""
     h5, h6 = _vec(g, _H + 12), _vec(g, _H + 15)
@@ -324,7 +328,7 @@ def _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside):
         _triple(g, joint, limits, R, q4, q5, q6, 4 * i + 2 * j, inside_only, q, exists, inside)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _triple(g, joint, limits, R, q4, q5, q6, branch, inside_only, q, exists, inside):
     """Subproblem 4: R1 R2 R3 = M with M = R_G R6⁻¹ R5⁻¹ R4⁻¹, so h1ᵀ R2 h3 = h1ᵀ M h3."""
     h1, h2, h3 = _vec(g, _H), _vec(g, _H + 3), _vec(g, _H + 6)
@@ -369,7 +373,7 @@ def _triple(g, joint, limits, R, q4, q5, q6, branch, inside_only, q, exists, ins
         inside[branch + i] = fits
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _motion(g, backwards, T):
     """Return G as nested tuples (rotation, position), read from the end with the triple."""
     p0 = _vec(g, _P0)
@@ -395,12 +399,12 @@ def _motion(g, backwards, T):
     return R, p
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _row3(T, i, g, j):
     return T[i, 0] * g[_R0 + 3 * j] + T[i, 1] * g[_R0 + 3 * j + 1] + T[i, 2] * g[_R0 + 3 * j + 2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _times(R, v):
     """Return R v."""
     return (
@@ -410,18 +414,18 @@ def _times(R, v):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _turned(limits, joint, value):
     """Take the full turns that bring a joint nearest to the middle of its limits."""
     return value + 2.0 * math.pi * math.floor((limits[2, joint] - value) / (2.0 * math.pi) + 0.5)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _within(limits, joint, value):
     return limits[0, joint] <= value <= limits[1, joint]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _misses(forward, q, T):
     """Whether forward kinematics is further from the pose than the tolerances allow."""
     n = q.shape[0]
@@ -438,7 +442,7 @@ def _misses(forward, q, T):
     return not (math.sqrt(_dot(d, d)) <= forward[2 * n + 4, 0] and turn <= forward[2 * n + 4, 1])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _turn(axis, s, c, v):
     """Rotate v about a unit axis by the angle of that sine and cosine (Rodrigues)."""
     along = _dot(axis, v) * (1.0 - c)
@@ -450,13 +454,13 @@ def _turn(axis, s, c, v):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _angle(axis, a, b):
     """Subproblem 1: the angle about an axis that turns a into b."""
     return math.atan2(_dot(axis, _cross(a, b)), _dot(a, b) - _dot(axis, a) * _dot(axis, b))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _perpendicular(v):
     """Return a unit vector across v."""
     w = (0.0, -v[2], v[1]) if abs(v[0]) < 0.6 else (v[2], 0.0, -v[0])
@@ -464,7 +468,7 @@ def _perpendicular(v):
     return (w[0] / length, w[1] / length, w[2] / length)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _back(R, v):
     """Return Rᵀ v."""
     return (
@@ -474,36 +478,36 @@ def _back(R, v):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _row(a, i):
     return (a[i, 0], a[i, 1], a[i, 2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _column(a, i, j):
     return (a[i, j], a[i + 1, j], a[i + 2, j])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _vec(a, i):
     return (a[i], a[i + 1], a[i + 2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _plus(a, b):
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _minus(a, b):
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

@@ -1,0 +1,309 @@
+"""The exact engine: the maps of Algorithm 1, two orders of magnitude faster.
+
+Certificates (see `symgrasp.engine.kernel`) decide all but a few candidates; those go to PyBullet,
+through the very functions of the reference. So a cell is feasible here exactly when it is there.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, nullcontext
+from types import TracebackType
+from typing import Self
+
+import numba
+import numpy as np
+
+from symgrasp.candidates import RETREAT_STEP, Judge
+from symgrasp.engine import search
+from symgrasp.engine.rig import Rig, can_rig, rig
+from symgrasp.engine.solids import pose_rows
+from symgrasp.feasibility import FeasibilityMap, Progress
+from symgrasp.fit import fit
+from symgrasp.ik import SphericalIK, solver_for
+from symgrasp.manifold import ROLLS, Manifold
+from symgrasp.poses import Array, axis_frame, inverse
+from symgrasp.reason import Reason
+from symgrasp.robot import Arm
+from symgrasp.scene import Scene
+from symgrasp.scene_build import Task
+from symgrasp.world import Body, BulletWorld, Collision
+
+__all__ = ["ExactEngine", "create_map_exact"]
+
+PARTS = 4
+"""Parts of a search for each thread, so that none waits long for the last."""
+
+
+class ExactEngine:
+    """Computes the maps of one arm in one scene, for any pose of the object.
+
+    What belongs to the scene (pieces, their tree, the robot's geometry) is built once. Use it in a
+    ``with`` block, or close it: it holds a `BulletWorld` unless it was given one.
+
+    Args:
+        scene: the scene.
+        arm: name of the arm; the first if None.
+        manifold: another grid than the scene's.
+        world: a world of this scene's robots and obstacles to use.
+
+    Raises:
+        SceneError: there is no such arm.
+        UrdfError: the arm has no closed-form inverse kinematics.
+        NotImplementedError: the arm is not of the kinds the engine knows; see `knows`.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        arm: str | None = None,
+        manifold: Manifold | None = None,
+        world: BulletWorld | None = None,
+    ) -> None:
+        self.scene, self.arm = scene, scene.arm(arm)
+        self.manifold = manifold or scene.manifold
+        ik = solver_for(self.arm, scene.settings.redundancy)
+        if not isinstance(ik, SphericalIK) or not can_rig(self.arm):
+            raise NotImplementedError(f"arm {self.arm.name}: not of a kind that the exact engine knows")
+        self.ik = ik
+        with ExitStack() as stack:
+            self.world = stack.enter_context(nullcontext(world) if world else BulletWorld(scene))
+            hand, radii = self.arm.hand, self.manifold.profile.radius(self.manifold.h)
+            self._opening = np.array([hand.opening(float(r)) for r in radii])
+            self._fit = [fit(hand, self.manifold.profile, float(h)) for h in self.manifold.h]
+            self._order = _spread(len(ik.phi))
+            self._rig: Rig = rig(self.world, self.arm, self._opening)
+            self._close = stack.pop_all()
+
+    @staticmethod
+    def knows(arm: Arm) -> bool:
+        """Whether the engine can compute the maps of an arm."""
+        return isinstance(solver_for(arm, 1), SphericalIK) and can_rig(arm)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the world, unless it was given."""
+        self._close.close()
+
+    def map(self, task: Task | str | None = None, progress: Progress | None = None) -> FeasibilityMap:
+        """Compute the map of a task, which need not be one of the scene's.
+
+        Args:
+            task: the task or its name; the scene's first if None.
+            progress: told when all is done; may raise `Cancelled`.
+        """
+        the_task = task if isinstance(task, Task) else self.scene.task(task)
+        T_base_tool = inverse(self.arm.robot.T_world_base) @ self.manifold.tool_poses(
+            the_task.T_world_object, self.arm.hand.finger_depth
+        )
+        world = self.world
+        world.margin = self.scene.settings.margin
+        world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
+        world.set_object(the_task.T_world_object)
+        draft = Draft(self)
+        rows = np.array([row for row, stage in enumerate(self._fit) if stage is None], dtype=np.int64)
+        if len(rows):
+            self._search(draft, rows, T_base_tool, the_task.T_world_object)
+        world.set_arms(())
+        if progress:
+            progress(1.0)
+        return draft.finish(the_task)
+
+    def _blocked(self) -> Collision | None:
+        """Return a collision of links that the arm does not move: it spoils every candidate."""
+        name, moving = self.arm.robot.name, self._rig.moving
+        for c in self.world.collisions([self.arm]):
+            own = [body.link for body in (c.a, c.b) if body.body == name]
+            if own and not moving.intersection(own):
+                return c
+        return None
+
+    def _search(self, draft: Draft, rows: np.ndarray, T_base_tool: Array, T_world_object: Array) -> None:
+        pose = self._rig.pose.copy()
+        pose[self._rig.body.objects] = pose_rows(axis_frame(T_world_object))
+        blocked = self._blocked()
+        goals = search.Goals(
+            order=self._order,
+            T_world_base=np.ascontiguousarray(self.arm.robot.T_world_base),
+            T_base_tool=np.ascontiguousarray(T_base_tool[:, rows].reshape(-1, 4, 4)),
+            row=np.tile(rows, len(ROLLS)),
+            retreat=_retreat(self.scene.settings.approach),
+            margin=float(self.scene.settings.margin),
+            blocked=blocked is not None,
+            parts=PARTS * numba.get_num_threads(),
+        )
+        found = search.search(self.ik.chain, self._rig.body, self._rig.solids, self._rig.tree, pose, goals)
+        roll, row, column = np.indices((len(ROLLS), len(rows), self.manifold.angles)).reshape(3, -1)
+        cells = (roll, rows[row], column)
+        draft.take(found, cells, blocked)
+        for i in np.flatnonzero(found.status == search.OPEN):
+            cell = tuple(int(part[i]) for part in cells)
+            self._decide(draft, cell, goals.T_base_tool[i], self._listed(found, int(i), goals.T_base_tool[i]))
+
+    def _listed(self, found: search.Found, i: int, T_base_tool: Array) -> list[tuple[Array, int, int]]:
+        """Return the undecided candidates of an open cell, or all inside the limits where they are many."""
+        count = int(found.open_count[i])
+        if count <= search.OPEN_KEPT:
+            picks = found.open_pick[i]
+            return [(found.open_q[i, j], int(picks[j, 0]), int(picks[j, 1])) for j in range(count)]
+        s = self.ik.solve(T_base_tool)
+        return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
+
+    def _decide(
+        self, draft: Draft, cell: tuple[int, ...], T_base_tool: Array, listed: list[tuple[Array, int, int]]
+    ) -> None:
+        """Let PyBullet decide the candidates of an open cell."""
+        judge = Judge(self.world, self.arm, self.ik, self.scene.settings.approach)
+        before: Collision | None = None
+        for q, sample, branch in listed:
+            draft.asked += 1
+            fate, collision = judge.fate(T_base_tool, q, sample, float(self._opening[cell[1]]))
+            if fate == Reason.FEASIBLE:
+                draft.feasible(cell, q, sample, branch)
+                return
+            if fate > draft.reason[cell]:
+                draft.collides(cell, fate, collision)
+            if collision and self._fixed(collision):
+                if before and _same(before, collision):
+                    return  # and it would be for all others, because the tool pose alone decides it
+                before = collision
+
+    def _fixed(self, collision: Collision) -> bool:
+        """Whether a collision is one of bodies that the tool pose alone places."""
+        name = self.arm.robot.name
+        own = [body.link for body in (collision.a, collision.b) if body.body == name]
+        return self._rig.with_tool.issuperset(link for link in own if link in self._rig.moving)
+
+
+def _same(a: Collision, b: Collision) -> bool:
+    return (a.a, a.b) == (b.a, b.b) and min(a.depth, b.depth) > 1e-6 and abs(a.depth - b.depth) < 1e-7
+
+
+class Draft:
+    """The arrays of a map while it is being computed."""
+
+    def __init__(self, engine: ExactEngine) -> None:
+        grid, dof = engine.manifold, engine.arm.dof
+        shape = (len(ROLLS), grid.heights, grid.angles)
+        self.engine = engine
+        self.asked = 0
+        self.reason = np.zeros(shape, dtype=np.uint8)
+        for row, stage in enumerate(engine._fit):
+            self.reason[:, row] = Reason.UNREACHABLE if stage is None else stage
+        self.q = np.full((*shape, dof), np.nan)
+        self.sample = np.full(shape, -1, dtype=np.int16)
+        self.branch = np.full(shape, -1, dtype=np.int16)
+        self.pair = np.full((*shape, 2), -1, dtype=np.int16)
+        self.depth = np.full(shape, np.nan)
+        self.clearance = np.full(shape, np.nan)
+        names = engine._rig.names
+        self.bodies = list(dict.fromkeys(str(name) for name in names))
+        index = {name: k for k, name in enumerate(self.bodies)}
+        self._body = np.array([index[str(name)] for name in names])
+        self._reason = np.array([self._collision(name) for name in names])
+
+    def _collision(self, hit: Body) -> Reason:
+        """Return what a collision with a body is called."""
+        scene = self.engine.scene
+        if hit.body == self.engine.arm.robot.name:
+            return Reason.SELF_COLLISION
+        if hit.body in scene.robots:
+            return Reason.ROBOT_COLLISION
+        return Reason.OBJECT_COLLISION if hit.body == scene.file.object.name else Reason.SCENE_COLLISION
+
+    def take(self, found: search.Found, cells: tuple[np.ndarray, ...], blocked: Collision | None) -> None:
+        status, pair, depth, q, pick, clearance = found[:6]
+        self.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, Reason.UNREACHABLE)
+        at = tuple(part[status == search.FEASIBLE] for part in cells)
+        self.reason[at] = Reason.FEASIBLE
+        self.q[at] = q[status == search.FEASIBLE]
+        self.sample[at], self.branch[at] = pick[status == search.FEASIBLE].T
+        self.clearance[at] = clearance[status == search.FEASIBLE]
+        hit = (status == search.HIT) | (status == search.BLOCKED) | (status == search.OPEN)
+        named = hit & (pair[:, 0] >= 0)
+        at = tuple(part[named] for part in cells)
+        self.reason[at] = self._reason[pair[named, 1]]
+        self.pair[at] = self._body[pair[named]]
+        self.depth[at] = depth[named]
+        self.reason[tuple(part[status == search.BLOCKED] for part in cells)] = Reason.APPROACH_BLOCKED
+        if blocked is not None:
+            for cell in zip(*(part[hit] for part in cells), strict=True):
+                self.collides(cell, blocked.reason, blocked)
+
+    def feasible(self, cell: tuple[int, ...], q: Array, sample: int, branch: int) -> None:
+        self.reason[cell], self.clearance[cell] = Reason.FEASIBLE, 0.0
+        self.q[cell], self.sample[cell], self.branch[cell] = q, sample, branch
+        self.pair[cell], self.depth[cell] = -1, np.nan
+
+    def collides(self, cell: tuple[int, ...], reason: Reason, collision: Collision | None) -> None:
+        self.reason[cell] = reason
+        self.pair[cell], self.depth[cell] = -1, np.nan
+        if collision:
+            for body in map(str, collision[1:3]):
+                if body not in self.bodies:
+                    self.bodies.append(body)
+            self.pair[cell] = [self.bodies.index(str(body)) for body in collision[1:3]]
+            self.depth[cell] = collision.depth
+
+    def finish(self, task: Task) -> FeasibilityMap:
+        engine = self.engine
+        return FeasibilityMap(
+            scene=engine.scene.name,
+            arm=engine.arm.name,
+            task=task.name,
+            T_world_object=task.T_world_object,
+            manifold=engine.manifold,
+            reason=self.reason,
+            q=self.q,
+            sample=self.sample,
+            branch=self.branch,
+            phi=engine.ik.phi,
+            opening=engine._opening,
+            bodies=tuple(self.bodies),
+            pair=self.pair,
+            depth=self.depth,
+        )
+
+
+def create_map_exact(
+    scene: Scene,
+    arm: str | None = None,
+    task: str | None = None,
+    *,
+    manifold: Manifold | None = None,
+    world: BulletWorld | None = None,
+    progress: Progress | None = None,
+) -> FeasibilityMap:
+    """Compute the map of an arm and a task with the exact engine; as `symgrasp.feasibility.create_map`."""
+    the_task = scene.task(task)
+    with ExactEngine(scene, arm or the_task.arms[0], manifold, world) as engine:
+        return engine.map(the_task, progress)
+
+
+def _spread(count: int) -> np.ndarray:
+    """Return the indices below ``count``, each far from those before it (van der Corput's sequence).
+
+    Neighbouring redundancy values mostly share their fate, so the next try should be elsewhere.
+    """
+    order: dict[int, None] = {}
+    k = 0
+    while len(order) < count:
+        k += 1
+        value, base, rest = 0.0, 0.5, k
+        while rest:
+            value += base * (rest % 2)
+            base, rest = 0.5 * base, rest // 2
+        order.setdefault(int(value * count))
+    return np.array(list(order), dtype=np.int64)
+
+
+def _retreat(approach: float) -> Array:
+    """Return the displacements (s,) along the approach that a retreat goes through, as the reference does."""
+    steps = int(np.ceil(approach / RETREAT_STEP - 1e-9))
+    return np.array([-approach * (k + 1) / steps for k in range(steps)])

@@ -1,0 +1,141 @@
+"""Convex pieces packed into arrays: what the compiled distance computation works on.
+
+A piece is the convex hull of its vertices, blown up by a ball (its rounding); or, revolved, the hull
+of the circles that its vertices (r, 0, h) draw about its own z. The shape that PyBullet has may fall
+short of the piece by its slack, and never exceeds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from symgrasp.poses import Array
+
+__all__ = ["SEEDS", "Piece", "Solids", "pack", "pose_rows"]
+
+BRUTE = 12
+"""Up to this many vertices are searched one by one; more are climbed along the edges of the hull."""
+
+SEED_GRID = 4
+"""Climbs start from the best vertex for the nearest of this many by this many directions on each
+face of a cube."""
+
+SEEDS = 6 * SEED_GRID * SEED_GRID
+
+
+class Piece(NamedTuple):
+    """A convex piece in the frame of what it moves with.
+
+    Attributes:
+        vertices: (n, 3) corners.
+        rounding: radius (m) of the ball around it.
+        slack: by how much (m) the true shape may fall short; inf where nothing is known.
+        revolved: whether the vertices are turned about z.
+    """
+
+    vertices: Array
+    rounding: float = 0.0
+    slack: float = 0.0
+    revolved: bool = False
+
+
+class Solids(NamedTuple):
+    """Many pieces, as numba wants them. V vertices in all, P pieces.
+
+    Attributes:
+        vertices: (V, 3).
+        edge_start: (V + 1,) where the neighbours of each vertex begin in ``edges``.
+        edges: neighbours of the vertices on their hull.
+        seeds: (S, SEEDS) vertices to begin a climb at; see `SEED_GRID`.
+        ranges: (P, 3) first vertex, end of the vertices, and row of ``seeds`` or -1.
+        size: (P, 9) rounding, slack, whether revolved, and centre and half extents of the box around
+            it without its rounding.
+    """
+
+    vertices: Array
+    edge_start: np.ndarray
+    edges: np.ndarray
+    seeds: np.ndarray
+    ranges: np.ndarray
+    size: Array
+
+
+def pack(pieces: Sequence[Piece]) -> Solids:
+    """Pack pieces into arrays."""
+    vertices: list[Array] = []
+    starts: list[np.ndarray] = []
+    edges: list[np.ndarray] = []
+    seeds: list[np.ndarray] = []
+    index, size = np.zeros((len(pieces), 3), dtype=np.int32), np.zeros((len(pieces), 9))
+    first = edge = 0
+    for k, piece in enumerate(pieces):
+        corners, triangles = (piece.vertices, None) if piece.revolved else _hull(piece.vertices)
+        row = -1
+        if triangles is not None:
+            row = len(seeds)
+            seeds.append(first + (corners @ _seed_directions().T).argmax(axis=0))
+        count, neighbours = _neighbours(len(corners), triangles)
+        starts.append(edge + np.concatenate([[0], np.cumsum(count)[:-1]]))
+        edges.append(first + neighbours)
+        vertices.append(corners)
+        index[k] = first, first + len(corners), row
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        if piece.revolved:
+            low[:2], high[:2] = -high[0], high[0]
+        size[k] = [piece.rounding, piece.slack, piece.revolved, *(0.5 * (low + high)), *(0.5 * (high - low))]
+        first, edge = first + len(corners), edge + len(neighbours)
+    return Solids(
+        np.concatenate(vertices) if vertices else np.zeros((0, 3)),
+        np.concatenate([*starts, [edge]]).astype(np.uint32),
+        np.concatenate([*edges, np.zeros(0)]).astype(np.uint32),
+        np.array(seeds, dtype=np.uint32).reshape(-1, SEEDS),
+        index,
+        size,
+    )
+
+
+def pose_rows(poses: Array) -> Array:
+    """Write poses (..., 4, 4) as rows (..., 12): the rotation's rows, then the position."""
+    poses = np.asarray(poses, dtype=float)
+    rotation = poses[..., :3, :3].reshape(*poses.shape[:-2], 9)
+    return np.concatenate([rotation, poses[..., :3, 3]], axis=-1)
+
+
+def _hull(points: Array) -> tuple[Array, np.ndarray | None]:
+    """Return the corners of a hull and, where it is worth climbing, its triangles."""
+    points = np.unique(np.asarray(points, dtype=float), axis=0)
+    if len(points) <= BRUTE:
+        return points, None
+    try:
+        hull = ConvexHull(points)
+    except QhullError:  # flat: there is no surface to climb on
+        return points, None
+    order = np.full(len(points), -1)
+    order[hull.vertices] = np.arange(len(hull.vertices))
+    return points[hull.vertices], order[hull.simplices]
+
+
+def _neighbours(count: int, triangles: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the number of neighbours of each vertex, and all neighbours in the same order."""
+    if triangles is None:
+        return np.zeros(count, dtype=int), np.zeros(0, dtype=int)
+    sides = np.concatenate([triangles[:, [i, j]] for i in range(3) for j in range(3) if i != j])
+    sides = np.unique(sides, axis=0)
+    return np.bincount(sides[:, 0], minlength=count), sides[:, 1]
+
+
+def _seed_directions() -> Array:
+    """Return the middles (SEEDS, 3) of the cube's cells, in the order `seed` counts them."""
+    middle = (np.arange(SEED_GRID) + 0.5) / SEED_GRID * 2.0 - 1.0
+    u, v = (part.ravel() for part in np.meshgrid(middle, middle, indexing="ij"))
+    faces = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            face = np.zeros((len(u), 3))
+            face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = sign, u, v
+            faces.append(face)
+    return np.concatenate(faces)
