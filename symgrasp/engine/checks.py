@@ -91,7 +91,7 @@ class Scratch(NamedTuple):
     depth: Array
 
 
-@njit(**FAST)
+@njit(cache=True)
 def new_scratch(pose, solids, joints):
     """Return scratch with all pieces where they stand."""
     own = pose.copy()
@@ -132,7 +132,8 @@ def place_arm(body, solids, scratch, q):
     frames = scratch.frames
     for j in range(len(q) - 1):
         if j == 0:
-            frames[0] = body.joint_origin[0]
+            for i in range(12):
+                frames[0, i] = body.joint_origin[0, i]
         else:
             _compose(frames[j - 1], body.joint_origin[j], frames[j])
         _spin(frames[j], body.joint_axis[j], q[j])
@@ -179,11 +180,7 @@ def check_round(body, solids, scratch, gap):
             gap = _against_object(body, solids, scratch, g, gap, -math.inf)
             if gap == -math.inf:
                 return gap
-    for i in range(len(body.hand_pairs)):
-        gap = _pair(solids, scratch, body.hand_pairs[i, 0], body.hand_pairs[i, 1], 0.0, gap, -math.inf)
-        if gap == -math.inf:
-            return gap
-    return gap
+    return _pairs(solids, scratch, body.hand_pairs, 0, len(body.hand_pairs), gap, -math.inf)
 
 
 @njit(**FAST)
@@ -193,11 +190,7 @@ def check_hand(body, solids, tree, scratch, margin, gap):
         gap = _against_rest(solids, tree, scratch, g, margin, gap, -math.inf)
         if gap == -math.inf:
             return gap
-    for i in range(len(body.base_pairs)):
-        gap = _pair(solids, scratch, body.base_pairs[i, 0], body.base_pairs[i, 1], 0.0, gap, -math.inf)
-        if gap == -math.inf:
-            return gap
-    return gap
+    return _pairs(solids, scratch, body.base_pairs, 0, len(body.base_pairs), gap, -math.inf)
 
 
 @njit(**FAST)
@@ -220,10 +213,9 @@ def check_arm(body, solids, tree, scratch, margin, gap, best):
             hit[2], hit[3] = hit[0], hit[1]
             return after
         gap = _against_object(body, solids, scratch, k, after, best)
-        for i in range(body.arm_pair_start[k], body.arm_pair_start[k + 1]):
-            if gap == -math.inf:
-                break
-            gap = _pair(solids, scratch, body.arm_pairs[i, 0], body.arm_pairs[i, 1], 0.0, gap, best)
+        if gap > -math.inf:
+            start = body.arm_pair_start
+            gap = _pairs(solids, scratch, body.arm_pairs, start[k], start[k + 1], gap, best)
         if gap == -math.inf:
             scratch.depth[1] = 0.0
             hit[2], hit[3] = hit[0], hit[1]
@@ -233,27 +225,37 @@ def check_arm(body, solids, tree, scratch, margin, gap, best):
 
 @njit(**FAST)
 def _against_object(body, solids, scratch, k, gap, best):
-    for i in range(len(body.objects)):
-        gap = _pair(solids, scratch, k, body.objects[i], 0.0, gap, best)
-        if gap == -math.inf:
-            return gap
+    box = scratch.box
+    for i in body.objects:
+        if not _far(box, k, i, box, max(gap, FREE_BAND)):
+            gap = _pair(solids, scratch, k, i, 0.0, gap, best)
+            if gap == -math.inf:
+                return gap
+    return gap
+
+
+@njit(**FAST)
+def _pairs(solids, scratch, pairs, first, end, gap, best):
+    box = scratch.box
+    for i in range(first, end):
+        a, b = pairs[i, 0], pairs[i, 1]
+        if not _far(box, a, b, box, max(gap, FREE_BAND)):
+            gap = _pair(solids, scratch, a, b, 0.0, gap, best)
+            if gap == -math.inf:
+                return gap
     return gap
 
 
 @njit(**FAST)
 def _against_rest(solids, tree, scratch, k, margin, gap, best):
-    own, box = scratch.box, tree.box
+    own, box, skip, piece = scratch.box, tree.box, tree.skip, tree.piece
     node = 0
-    while node < len(tree.skip):
-        reach = max(gap, margin + FREE_BAND)
-        apart = False
-        for i in range(3):
-            apart = apart or own[k, i] > box[node, 3 + i] + reach or box[node, i] > own[k, 3 + i] + reach
-        if apart:
-            node = tree.skip[node]
+    while node < len(skip):
+        if _far(own, k, node, box, max(gap, margin + FREE_BAND)):
+            node = skip[node]
             continue
-        if tree.piece[node] >= 0:
-            gap = _pair(solids, scratch, k, tree.piece[node], margin, gap, best)
+        if piece[node] >= 0:
+            gap = _pair(solids, scratch, k, piece[node], margin, gap, best)
             if gap == -math.inf:
                 return gap
         node += 1
@@ -261,14 +263,24 @@ def _against_rest(solids, tree, scratch, k, margin, gap, best):
 
 
 @njit(**FAST)
+def _far(box, a, b, other, reach):
+    """Whether box a of some and box b of others are further apart than ``reach``."""
+    return (
+        box[a, 0] > other[b, 3] + reach
+        or other[b, 0] > box[a, 3] + reach
+        or box[a, 1] > other[b, 4] + reach
+        or other[b, 1] > box[a, 4] + reach
+        or box[a, 2] > other[b, 5] + reach
+        or other[b, 2] > box[a, 5] + reach
+    )
+
+
+@njit(**FAST)
 def _pair(solids, scratch, a, b, margin, gap, best):
-    """Check a pair of pieces that must keep a margin (m)."""
-    box, size = scratch.box, solids.size
+    """Check a pair of pieces, whose boxes are near, that must keep a margin (m)."""
+    size = solids.size
     sure = margin + FREE_BAND
     reach = max(gap, sure)
-    for i in range(3):
-        if box[a, i] > box[b, 3 + i] + reach or box[b, i] > box[a, 3 + i] + reach:
-            return gap
     if _boxes_apart(size, scratch.pose, a, b, reach):
         return gap
     bar = max(best, margin - HIT_BAND - size[a, 1] - size[b, 1])

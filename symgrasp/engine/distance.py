@@ -26,8 +26,10 @@ from symgrasp.engine.solids import SEED_GRID
 
 __all__ = ["FAST", "distance_bounds"]
 
-FAST: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
-"""How to compile what may round as it likes: products and sums may be fused."""
+FAST: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+"""How to compile what may round as it likes: products and sums may be fused. Without the last entry
+numba counts references to every array of every call, which costs more than the calls; nothing here
+makes arrays, so there is nothing to count."""
 
 STEPS = 40
 """Steps before giving up; the bounds stand as they are."""

@@ -11,7 +11,7 @@ Whatever is found for a cell depends on its tool pose alone, not on its neighbou
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -26,7 +26,7 @@ from symgrasp.engine.checks import (
     place_arm,
     place_hand,
 )
-from symgrasp.ik.spherical import BRANCHES, branches_at
+from symgrasp.ik.spherical import BRANCHES, STRICT, branches_at
 from symgrasp.poses import Array
 
 __all__ = [
@@ -50,9 +50,6 @@ OPEN_KEPT = 6
 
 UNREACHABLE, LIMITS, HIT, BLOCKED, OPEN, FEASIBLE = 0, 1, 2, 3, 4, 5
 """What became of a cell: BLOCKED on the retreat; OPEN means PyBullet must decide."""
-
-STRICT: dict[str, Any] = {"cache": True, "error_model": "numpy"}
-"""How to compile what must round as the reference does."""
 
 
 class Goals(NamedTuple):
@@ -120,15 +117,16 @@ class _Around(NamedTuple):
 
 
 class _Branches(NamedTuple):
-    """Scratch for `branches_at`: at the grasp and on the retreat."""
+    """Scratch for `branches_at`, at the grasp and on the retreat; where the retreat is, and its tool pose."""
 
     q: Array
     exists: np.ndarray
     inside: np.ndarray
     at: Array
+    T: Array
 
 
-@njit(parallel=True, **STRICT)
+@njit(cache=True, error_model="numpy", parallel=True)
 def search(chain, body, solids, tree, pose, goals):
     """Search cells.
 
@@ -160,8 +158,9 @@ def search(chain, body, solids, tree, pose, goals):
     )
     for part in prange(goals.parts):
         scratch = new_scratch(pose, solids, n)
+        T = np.empty((4, 4))
         for run in range(part, runs, goals.parts):
-            _go_around(body, solids, scratch, goals, run, m // runs, around)
+            _go_around(body, solids, scratch, goals, run, m // runs, T, around)
     for part in prange(goals.parts):
         scratch = new_scratch(pose, solids, n)
         branches = _Branches(
@@ -169,6 +168,7 @@ def search(chain, body, solids, tree, pose, goals):
             np.empty((2, BRANCHES), dtype=np.bool_),
             np.empty((2, BRANCHES), dtype=np.bool_),
             np.empty(n),
+            np.empty((4, 4)),
         )
         # Dealt out like cards, so that every part has its share of easy and of hard cells.
         for cell in range(part, m, goals.parts):
@@ -177,15 +177,13 @@ def search(chain, body, solids, tree, pose, goals):
 
 
 @njit(**STRICT)
-def _go_around(body, solids, scratch, goals, run, length, around):
-    T = goals.T_base_tool[run * length].copy()
+def _go_around(body, solids, scratch, goals, run, length, T, around):
     for step in range(1 + len(goals.retreat)):
-        if step:
-            _step(goals.T_base_tool[run * length], goals.retreat[step - 1], T)
+        _step(goals.T_base_tool[run * length], goals.retreat[step - 1] if step else 0.0, T)
         place_hand(body, solids, scratch, goals.T_world_base, T, goals.row[run])
         around.gap[run, step] = check_round(body, solids, scratch, CLEARANCE_LIMIT)
         if around.gap[run, step] == -math.inf:
-            around.hit[run, step] = scratch.hit[:2]
+            around.hit[run, step, 0], around.hit[run, step, 1] = scratch.hit[0], scratch.hit[1]
             around.depth[run, step] = scratch.depth[0]
 
 
@@ -231,7 +229,7 @@ def _cell(chain, body, solids, tree, scratch, branches, goals, around, cell, fou
                 if not steps_known:
                     steps_known, steps_free = (
                         True,
-                        _hand_retreats(body, solids, tree, scratch, goals, around, run, T),
+                        _hand_retreats(body, solids, tree, scratch, branches, goals, around, run, T),
                     )
                 verdict = _retreats(
                     chain, body, solids, tree, scratch, branches, goals, around, run, T, k, b, steps_free
@@ -248,7 +246,7 @@ def _cell(chain, body, solids, tree, scratch, branches, goals, around, cell, fou
                 _list(found, cell, q[b], k, b)
             elif gap > best:
                 best = gap
-                found.q[cell] = q[b]
+                _copy(q[b], found.q[cell])
                 found.pick[cell, 0], found.pick[cell, 1] = k, b
         if best > -math.inf and best >= hand:
             break
@@ -272,7 +270,7 @@ def _list(found, cell, q, k, b):
     kept = found.open_count[cell]
     found.open_count[cell] += 1
     if kept < OPEN_KEPT:
-        found.open_q[cell, kept] = q
+        _copy(q, found.open_q[cell, kept])
         found.open_pick[cell, kept, 0], found.open_pick[cell, kept, 1] = k, b
 
 
@@ -281,10 +279,10 @@ def _hand(body, solids, tree, scratch, goals, around, run, step, T):
     """Place what is fixed to the tool; return its clearance (m), UNDECIDED, or -inf."""
     place_hand(body, solids, scratch, goals.T_world_base, T, goals.row[run])
     if goals.blocked:
-        scratch.hit[:2] = -1
+        scratch.hit[0] = -1
         return -math.inf
     if around.gap[run, step] == -math.inf:
-        scratch.hit[:2] = around.hit[run, step]
+        scratch.hit[0], scratch.hit[1] = around.hit[run, step, 0], around.hit[run, step, 1]
         scratch.depth[0] = around.depth[run, step]
         return -math.inf
     return check_hand(body, solids, tree, scratch, goals.margin, around.gap[run, step])
@@ -295,8 +293,9 @@ def _reaches(chain, T, q, exists, inside):
     """Whether any branch reaches a pose, inside the limits or not."""
     for k in range(len(chain.geometry)):
         branches_at(chain.geometry, chain.joint, chain.limits, chain.forward, k, T, False, q, exists, inside)
-        if exists.any():
-            return True
+        for b in range(BRANCHES):
+            if exists[b]:
+                return True
     return False
 
 
@@ -304,9 +303,9 @@ def _reaches(chain, T, q, exists, inside):
 
 
 @njit(**STRICT)
-def _hand_retreats(body, solids, tree, scratch, goals, around, run, T):
+def _hand_retreats(body, solids, tree, scratch, branches, goals, around, run, T):
     """Whether what is fixed to the tool is certified free at every step of the retreat."""
-    moved = T.copy()
+    moved = branches.T
     for s in range(len(goals.retreat)):
         _step(T, goals.retreat[s], moved)
         if _hand(body, solids, tree, scratch, goals, around, run, s + 1, moved) <= UNDECIDED:
@@ -318,12 +317,12 @@ def _hand_retreats(body, solids, tree, scratch, goals, around, run, T):
 def _retreats(chain, body, solids, tree, scratch, branches, goals, around, run, T, k, b, hand_free):
     """Follow a candidate along the retreat, as `symgrasp.candidates.Judge`: FEASIBLE, BLOCKED or OPEN."""
     q, exists, inside, at = branches.q[1], branches.exists[1], branches.inside[1], branches.at
-    moved = T.copy()
-    at[:] = branches.q[0][b]
+    moved = branches.T
+    _copy(branches.q[0][b], at)
     verdict = FEASIBLE
     for s in range(len(goals.retreat)):
         _step(T, goals.retreat[s], moved)
-        scratch.hit[:] = -1
+        scratch.hit[0] = scratch.hit[2] = -1
         branches_at(
             chain.geometry, chain.joint, chain.limits, chain.forward, k, moved, True, q, exists, inside
         )
@@ -366,5 +365,11 @@ def _follow(limits, q, inside, at):
                 nearest, least = b, turn
     if nearest < 0 or least > RETREAT_TURN:
         return False
-    at[:] = q[nearest]
+    _copy(q[nearest], at)
     return True
+
+
+@njit(**STRICT)
+def _copy(row, out):
+    for j in range(len(row)):
+        out[j] = row[j]

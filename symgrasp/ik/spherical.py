@@ -19,7 +19,7 @@ depend on what else is in the batch.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -28,7 +28,7 @@ from symgrasp.ik.closed_form import ClosedFormIK, Solutions, Tolerance
 from symgrasp.poses import Array, rotation_about
 from symgrasp.robot import Arm
 
-__all__ = ["BRANCHES", "Chain", "SphericalIK", "branches_at"]
+__all__ = ["BRANCHES", "STRICT", "Chain", "SphericalIK", "branches_at"]
 
 BRANCHES = 8
 """Branches of the closed form: two for the middle joint, times two for the pair, times two."""
@@ -42,6 +42,10 @@ PARALLEL = 1e-6
 GRAZE = 1e-12
 """By how much (of one, or m²) a square root may fall below zero and count as zero: at the edge of
 the reach both branches are one, and rounding decides."""
+
+STRICT: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+"""How to compile: plain IEEE arithmetic. The last entry spares the counting of references to arrays,
+of which nothing below makes any."""
 
 
 class Chain(NamedTuple):
@@ -247,7 +251,7 @@ def _solve_range(geometry, joint, limits, forward, T, first, last):
     return q, exists, inside
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, inside):
     """Solve one pose (4, 4) at redundancy sample k.
 
@@ -289,7 +293,7 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _swing(cosine):
     """Return the arc cosine, or -1 where there is none."""
     rest = 1.0 - cosine * cosine
@@ -298,7 +302,7 @@ def _swing(cosine):
     return math.atan2(math.sqrt(max(rest, 0.0)), cosine)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside):
     """Subproblem 2: R5⁻¹ u = R6 t."""
     h5, h6 = _vec(g, _H + 12), _vec(g, _H + 15)
@@ -328,7 +332,7 @@ def _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside):
         _triple(g, joint, limits, R, q4, q5, q6, 4 * i + 2 * j, inside_only, q, exists, inside)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _triple(g, joint, limits, R, q4, q5, q6, branch, inside_only, q, exists, inside):
     """Subproblem 4: R1 R2 R3 = M with M = R_G R6⁻¹ R5⁻¹ R4⁻¹, so h1ᵀ R2 h3 = h1ᵀ M h3."""
     h1, h2, h3 = _vec(g, _H), _vec(g, _H + 3), _vec(g, _H + 6)
@@ -373,7 +377,7 @@ def _triple(g, joint, limits, R, q4, q5, q6, branch, inside_only, q, exists, ins
         inside[branch + i] = fits
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _motion(g, backwards, T):
     """Return G as nested tuples (rotation, position), read from the end with the triple."""
     p0 = _vec(g, _P0)
@@ -399,12 +403,12 @@ def _motion(g, backwards, T):
     return R, p
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _row3(T, i, g, j):
     return T[i, 0] * g[_R0 + 3 * j] + T[i, 1] * g[_R0 + 3 * j + 1] + T[i, 2] * g[_R0 + 3 * j + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _times(R, v):
     """Return R v."""
     return (
@@ -414,18 +418,18 @@ def _times(R, v):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _turned(limits, joint, value):
     """Take the full turns that bring a joint nearest to the middle of its limits."""
     return value + 2.0 * math.pi * math.floor((limits[2, joint] - value) / (2.0 * math.pi) + 0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _within(limits, joint, value):
     return limits[0, joint] <= value <= limits[1, joint]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _misses(forward, q, T):
     """Whether forward kinematics is further from the pose than the tolerances allow."""
     n = q.shape[0]
@@ -442,7 +446,7 @@ def _misses(forward, q, T):
     return not (math.sqrt(_dot(d, d)) <= forward[2 * n + 4, 0] and turn <= forward[2 * n + 4, 1])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _turn(axis, s, c, v):
     """Rotate v about a unit axis by the angle of that sine and cosine (Rodrigues)."""
     along = _dot(axis, v) * (1.0 - c)
@@ -454,13 +458,13 @@ def _turn(axis, s, c, v):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _angle(axis, a, b):
     """Subproblem 1: the angle about an axis that turns a into b."""
     return math.atan2(_dot(axis, _cross(a, b)), _dot(a, b) - _dot(axis, a) * _dot(axis, b))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _perpendicular(v):
     """Return a unit vector across v."""
     w = (0.0, -v[2], v[1]) if abs(v[0]) < 0.6 else (v[2], 0.0, -v[0])
@@ -468,7 +472,7 @@ def _perpendicular(v):
     return (w[0] / length, w[1] / length, w[2] / length)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _back(R, v):
     """Return Rᵀ v."""
     return (
@@ -478,36 +482,36 @@ def _back(R, v):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _row(a, i):
     return (a[i, 0], a[i, 1], a[i, 2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _column(a, i, j):
     return (a[i, j], a[i + 1, j], a[i + 2, j])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _vec(a, i):
     return (a[i], a[i + 1], a[i + 2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _plus(a, b):
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _minus(a, b):
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**STRICT)
 def _cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
