@@ -7,6 +7,7 @@ import json
 import numpy as np
 
 from symgrasp import bench
+from symgrasp.bench import planners
 from symgrasp.cli import main
 
 
@@ -15,7 +16,7 @@ def figures(found) -> dict[str, bench.Figure]:
 
 
 def test_two_hands_exact_never_misses_what_climbing_finds():
-    found = figures(bench.several_hands(pairs=6))
+    found = figures(planners.several_hands(pairs=6))
     exact = np.array(found["two hands, complete search: success"].values)
     climb = np.array(found["two hands, hill climbing as printed: success"].values)
     assert len(exact) == len(climb) == 6
@@ -38,8 +39,8 @@ def test_on_the_command_line(monkeypatch, tmp_path, capsys):
 
 
 def test_a_long_sequence_and_sampling_are_measured():
-    (sequence,) = bench.long_sequence(tasks=6, runs=2)
+    (sequence,) = planners.long_sequence(tasks=6, runs=2)
     assert len(sequence.values) == 2
-    success, ratio = bench.without_the_manifold(runs=2)
+    success, ratio = planners.without_the_manifold(runs=2)
     assert set(success.values) <= {0.0, 1.0}
     assert len(ratio.values) == 2

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
+from symgrasp.bench.figures import Figure
 from symgrasp.candidates import Judge
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility import Cell, FeasibilityMap, create_map
@@ -29,49 +26,14 @@ from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
 from symgrasp.world import BulletWorld, Collision
 
-__all__ = ["Figure", "report", "run"]
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A measured quantity.
-
-    Attributes:
-        name: what was measured.
-        unit: its unit; ``×`` for a ratio.
-        values: one value a run.
-    """
-
-    name: str
-    unit: str
-    values: tuple[float, ...]
-
-    def line(self) -> str:
-        """Say median and spread."""
-        low, middle, high = np.quantile(self.values, [0.0, 0.5, 1.0])
-        spread = f"{low:.3g} to {high:.3g}" if len(self.values) > 1 else "one run"
-        return f"{self.name:64} {middle:9.3g} {self.unit:3} ({spread})"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figure as plain data."""
-        return {"name": self.name, "unit": self.unit, "values": list(self.values)}
+__all__ = ["long_sequence", "run", "several_hands", "without_the_manifold"]
 
 
 def run() -> Iterator[Figure]:
-    """Measure everything, a figure at a time."""
+    """Measure the planners, a figure at a time."""
     yield from long_sequence(tasks=50, runs=10)
     yield from without_the_manifold(runs=10)
     yield from several_hands(pairs=20)
-
-
-def report(figures: Sequence[Figure]) -> dict[str, Any]:
-    """Return figures and the machine they were measured on as plain data for JSON."""
-    machine = {
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "cpus": os.cpu_count(),
-    }
-    return {"machine": machine, "figures": [figure.to_dict() for figure in figures]}
 
 
 def long_sequence(tasks: int, runs: int) -> Iterator[Figure]:

@@ -1,0 +1,15 @@
+"""The software measured against what one would do otherwise, as ratios inside one run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from symgrasp.bench import planners
+from symgrasp.bench.figures import Figure, report
+
+__all__ = ["Figure", "report", "run"]
+
+
+def run() -> Iterator[Figure]:
+    """Measure everything, a figure at a time."""
+    yield from planners.run()

@@ -1,0 +1,48 @@
+"""What a benchmark measured, to print and to keep."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Figure", "report"]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A measured quantity.
+
+    Attributes:
+        name: what was measured.
+        unit: its unit; ``×`` for a ratio.
+        values: one value a run.
+    """
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+
+    def line(self) -> str:
+        """Say median and spread."""
+        low, middle, high = np.quantile(self.values, [0.0, 0.5, 1.0])
+        spread = f"{low:.3g} to {high:.3g}" if len(self.values) > 1 else "one run"
+        return f"{self.name:64} {middle:9.3g} {self.unit:3} ({spread})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figure as plain data."""
+        return {"name": self.name, "unit": self.unit, "values": list(self.values)}
+
+
+def report(figures: Sequence[Figure]) -> dict[str, Any]:
+    """Return figures and the machine they were measured on as plain data for JSON."""
+    machine = {
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "cpus": os.cpu_count(),
+    }
+    return {"machine": machine, "figures": [figure.to_dict() for figure in figures]}
