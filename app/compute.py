@@ -11,8 +11,9 @@ import numpy as np
 from app.meshes import link_visuals
 from app.things import OWN, Thing, from_library
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
-from symgrasp.feasibility import FeasibilityMap, Progress, create_map
+from symgrasp.feasibility import FeasibilityMap, Progress
 from symgrasp.manifold import ROLLS
+from symgrasp.maps import MapMaker
 from symgrasp.meshes import read_mesh
 from symgrasp.plan import Hold, Plan
 from symgrasp.planning import plan_bimanual, plan_sequential
@@ -99,33 +100,32 @@ class Workbench:
 
     def __init__(self, store: Store) -> None:
         self.store = store
-        self._world: BulletWorld | None = None
+        self._maker: MapMaker | None = None
 
     def close(self) -> None:
         """Free the physics world."""
-        if self._world:
-            self._world.close()
-            self._world = None
+        if self._maker:
+            self._maker.world.close()
+            self._maker = None
 
-    def world(self, scene: Scene) -> BulletWorld:
-        """Return a world with the scene's robots, obstacles and object; its tasks do not matter."""
-        old = self._world
-        shared = ("robots", "obstacles", "profile")
+    def maker(self, scene: Scene) -> MapMaker:
+        """Return a map maker for the scene's robots, obstacles and object; its tasks do not matter."""
+        old = self._maker
+        shared = ("robots", "obstacles", "profile", "settings")
         if old and all(getattr(old.scene, part) is getattr(scene, part) for part in shared):
             return old
         self.close()
-        self._world = BulletWorld(scene)
-        return self._world
+        self._maker = MapMaker(BulletWorld(scene), scene)
+        return self._maker
 
     def map(self, request: MapRequest, progress: Progress) -> MapResult:
         """Return the map of a request, computed unless it is known."""
         known = self.store.map(request)
         if known:
             return known
-        scene = request.moved_scene()
-        world = self.world(scene)
-        contacts = self._contacts(world, request)
-        the_map = create_map(scene, request.arm, request.task, world=world, progress=progress)
+        maker = self.maker(request.scene)
+        contacts = self._contacts(maker.world, request)
+        the_map = maker.map(request.arm, request.moved_task(), progress=progress)
         result = MapResult(request, the_map, contacts)
         self.store.keep(result)
         return result
@@ -135,9 +135,8 @@ class Workbench:
         world.set_object(request.T_world_object)
         deepest: dict[str, str] = {}
         for c in world.object_contacts():
-            depth = c.depth - world.margin
-            if depth > RESTING_DEPTH:
-                deepest.setdefault(c.b.body, f"{c.a.body} is {1e3 * depth:.0f} mm inside {c.b.body}")
+            if c.depth > RESTING_DEPTH:
+                deepest.setdefault(c.b.body, f"{c.a.body} is {1e3 * c.depth:.0f} mm inside {c.b.body}")
         return tuple(deepest.values())
 
     def sequential(

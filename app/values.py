@@ -93,6 +93,10 @@ class MapRequest:
         """The base pose (4, 4)."""
         return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
 
+    def moved_task(self) -> Task:
+        """Return the task, moved there."""
+        return Task(self.task, self.scene.task(self.task).arms, self.T_world_object)
+
     def moved_scene(self) -> Scene:
         """Return the scene with the task moved there."""
         return moved(self.scene, {self.task: self.pose} if self.pose else {})

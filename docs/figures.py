@@ -12,8 +12,8 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, sync_playwright
 
-from symgrasp.feasibility import create_map
 from symgrasp.files import write_atomically
+from symgrasp.maps import create_map
 from symgrasp.scene import Scene
 from tests.e2e.conftest import FLAGS, HOW_TO_GET_IT
 from tests.e2e.page import GraspPage

@@ -142,7 +142,7 @@ def _scenes(args: argparse.Namespace) -> int:
 
 
 def _map(args: argparse.Namespace) -> int:
-    from symgrasp.feasibility import create_map
+    from symgrasp.maps import create_map
 
     if args.out:
         _check_folder(args.out)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,28 +13,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symgrasp import pictures
-from symgrasp.candidates import Candidate, Judge
 from symgrasp.errors import MapError, ProfileError
 from symgrasp.files import write_atomically
-from symgrasp.fit import fit
-from symgrasp.ik import ClosedFormIK
 from symgrasp.manifold import ROLLS, Manifold
-from symgrasp.poses import Array, inverse, rotation_z
+from symgrasp.poses import Array, rotation_z
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
-from symgrasp.robot import Arm
-from symgrasp.scene import Scene
-from symgrasp.world import BulletWorld
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Cell", "FeasibilityMap", "Margin", "Progress", "Witness", "create_map"]
+__all__ = ["CLEARANCE_LIMIT", "Cell", "FeasibilityMap", "Margin", "Progress", "Witness"]
 
 Progress = Callable[[float], None]
 """Told the finished share (0 to 1) of a long computation; may raise `Cancelled` to stop it."""
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+
+CLEARANCE_LIMIT = 0.05
+"""Clearances above this (m) are all the same."""
 
 
 class Cell(NamedTuple):
@@ -55,6 +51,8 @@ class Witness(NamedTuple):
         sample: its index.
         branch: branch of the closed form.
         opening: opening of the hand (m).
+        clearance: distance (m) that all bodies which must not touch have at least; 0 where only that
+            they do not touch is known.
     """
 
     q: Array
@@ -62,6 +60,7 @@ class Witness(NamedTuple):
     sample: int
     branch: int
     opening: float
+    clearance: float
 
 
 class Margin(NamedTuple):
@@ -92,6 +91,9 @@ class FeasibilityMap:
         q: (R, H, A, n) joint values of the witnesses, NaN where infeasible.
         sample: (R, H, A) int16 redundancy sample of the witness, -1 where infeasible.
         branch: (R, H, A) int16 branch of the witness, -1 where infeasible.
+        clearance: (R, H, A) distance (m) that all bodies which must not touch have at the witness at
+            least, at most `CLEARANCE_LIMIT`; NaN where infeasible. The reference, which only asks
+            whether bodies touch, has 0.
         phi: (K,) redundancy samples (rad).
         opening: (H,) opening of the hand (m).
         bodies: names of bodies.
@@ -109,6 +111,7 @@ class FeasibilityMap:
     q: Array
     sample: np.ndarray
     branch: np.ndarray
+    clearance: Array
     phi: Array
     opening: Array
     bodies: tuple[str, ...]
@@ -116,7 +119,7 @@ class FeasibilityMap:
     depth: Array
 
     def __post_init__(self) -> None:
-        for name in ("T_world_object", "reason", "q", "sample", "branch", "phi", "opening", "pair", "depth"):
+        for name in _ARRAYS:
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -138,6 +141,7 @@ class FeasibilityMap:
             sample,
             int(self.branch[cell]),
             float(self.opening[cell.row]),
+            float(self.clearance[cell]),
         )
 
     def why(self, cell: Cell | tuple[int, int, int]) -> str:
@@ -185,7 +189,7 @@ class FeasibilityMap:
         manifold, k = self.manifold.shift(delta)
         rolled = {
             name: np.roll(getattr(self, name), -k, axis=2)
-            for name in ("reason", "q", "sample", "branch", "pair", "depth")
+            for name in ("reason", "q", "sample", "branch", "clearance", "pair", "depth")
         }
         turned = self.T_world_object @ rotation_z(delta)
         return replace(self, T_world_object=turned, manifold=manifold, **rolled)
@@ -199,6 +203,7 @@ class FeasibilityMap:
             q=np.where(drop[..., None], np.nan, self.q),
             sample=np.where(drop, -1, self.sample),
             branch=np.where(drop, -1, self.branch),
+            clearance=np.where(drop, np.nan, self.clearance),
         )
 
     def plot(self) -> Figure:
@@ -226,7 +231,11 @@ class FeasibilityMap:
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the map as plain data for JSON: the grid, and by roll, height and angle the reasons."""
+        """Return the map as plain data for JSON.
+
+        The grid, and by roll, height and angle: the reason, and in m and rad the clearance (null where
+        infeasible) and the margins.
+        """
         return {
             **self._meta(),
             "T_world_object": self.T_world_object.tolist(),
@@ -237,6 +246,9 @@ class FeasibilityMap:
             "opening": self.opening.tolist(),
             "reasons": [r.name for r in Reason],
             "reason": self.reason.tolist(),
+            "clearance": _listed(self.clearance),
+            "margin_along": self.margins[..., 0].tolist(),
+            "margin_around": self.margins[..., 1].tolist(),
         }
 
     def to_npz(self) -> bytes:
@@ -274,7 +286,7 @@ class FeasibilityMap:
                 Profile(data.pop("profile"), str(path)), meta["heights"], meta["angles"], meta["theta_start"]
             )
             shape = (len(ROLLS), manifold.heights, manifold.angles)
-            for name in ("reason", "sample", "branch", "depth"):
+            for name in ("reason", "sample", "branch", "clearance", "depth"):
                 if data[name].shape != shape:
                     raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
             names = {key: meta[key] for key in ("scene", "arm", "task")}
@@ -283,127 +295,17 @@ class FeasibilityMap:
             raise MapError(path, "meta", str(error), "a map written by symgrasp") from error
 
 
+def _listed(values: Array) -> list[Any]:
+    """Return an array as lists with None for NaN, which JSON does not have."""
+    return np.where(np.isnan(values), None, values.astype(object)).tolist()
+
+
 def _run_length(feasible: np.ndarray, axis: int) -> np.ndarray:
     """Count along an axis how many cells ago the last infeasible one was (0 for itself)."""
     position = np.arange(1, feasible.shape[axis] + 1).reshape([-1 if k == axis else 1 for k in range(3)])
     return position - np.maximum.accumulate(np.where(feasible, 0, position), axis=axis)
 
 
-_ARRAYS = ("T_world_object", "reason", "q", "sample", "branch", "phi", "opening", "pair", "depth")
-
-
-def create_map(
-    scene: Scene,
-    arm: str | None = None,
-    task: str | None = None,
-    *,
-    manifold: Manifold | None = None,
-    world: BulletWorld | None = None,
-    progress: Progress | None = None,
-) -> FeasibilityMap:
-    """Compute the feasibility map of an arm and a task: Algorithm 1 of the paper.
-
-    Args:
-        scene: the scene.
-        arm: name of the arm; the task's first if None.
-        task: name of the task; the scene's first if None.
-        manifold: another grid than the scene's.
-        world: a world of this scene's robots and obstacles to use again; one is made if None.
-        progress: told the finished share after every row; may raise `Cancelled`.
-
-    Raises:
-        SceneError: there is no such arm or task.
-        UrdfError: the arm has no closed-form inverse kinematics.
-    """
-    the_task = scene.task(task)
-    the_arm = scene.arm(arm or the_task.arms[0])
-    grid = manifold or scene.manifold
-    ik = ClosedFormIK(the_arm, scene.settings.redundancy)
-    draft = _Draft(grid, the_arm, ik)
-    T_base_world = inverse(the_arm.robot.T_world_base)
-    T_base_tool = T_base_world @ grid.tool_poses(the_task.T_world_object, the_arm.hand.finger_depth)
-
-    with nullcontext(world) if world else BulletWorld(scene) as W:
-        W.margin = scene.settings.margin
-        W.set_arms(())  # a map that was cancelled in this world may have left an arm elsewhere
-        W.set_object(the_task.T_world_object)
-        judge = Judge(W, the_arm, ik, scene.settings.approach)
-        for row, h in enumerate(grid.h):
-            stage = fit(the_arm.hand, grid.profile, h)
-            for roll, column in np.ndindex(len(ROLLS), grid.angles):
-                cell = Cell(roll, row, column)
-                if stage is not None:
-                    draft.reason[cell] = stage
-                    continue
-                candidates = judge.candidates(T_base_tool[cell], draft.opening[row])
-                draft.record(cell, *_verdict(candidates))
-            if progress:
-                progress((row + 1) / grid.heights)
-    return draft.finish(scene.name, the_task.name, the_task.T_world_object)
-
-
-def _verdict(candidates: Iterable[Candidate]) -> tuple[Reason, Candidate | None]:
-    """Return the furthest stage of the candidates of a cell, and the one that reached it.
-
-    The first feasible one ends the search; of those that collide at the same stage, the one that
-    came closest to being free counts.
-    """
-    reached, best = Reason.UNREACHABLE, None
-    for candidate in candidates:
-        if candidate.fate == Reason.FEASIBLE:
-            return candidate.fate, candidate
-        if candidate.fate > reached or (candidate.fate == reached and _shallower(candidate, best)):
-            reached, best = candidate.fate, candidate
-    return reached, best
-
-
-def _shallower(candidate: Candidate, other: Candidate | None) -> bool:
-    if candidate.collision is None:
-        return False
-    return other is None or other.collision is None or candidate.collision.depth < other.collision.depth
-
-
-class _Draft:
-    """The arrays of a map while it is being computed."""
-
-    def __init__(self, grid: Manifold, arm: Arm, ik: ClosedFormIK) -> None:
-        shape = (len(ROLLS), grid.heights, grid.angles)
-        self.grid, self.arm, self.ik = grid, arm, ik
-        self.opening = np.array([arm.hand.opening(r) for r in grid.profile.radius(grid.h)])
-        self.reason = np.zeros(shape, dtype=np.uint8)
-        self.q = np.full((*shape, arm.dof), np.nan)
-        self.sample = np.full(shape, -1, dtype=np.int16)
-        self.branch = np.full(shape, -1, dtype=np.int16)
-        self.pair = np.full((*shape, 2), -1, dtype=np.int16)
-        self.depth = np.full(shape, np.nan)
-        self.bodies: dict[str, int] = {}
-
-    def record(self, cell: Cell, reason: Reason, candidate: Candidate | None) -> None:
-        self.reason[cell] = reason
-        if candidate is None:
-            return
-        if reason == Reason.FEASIBLE:
-            self.q[cell] = candidate.q
-            self.sample[cell], self.branch[cell] = candidate.sample, candidate.branch
-        elif candidate.collision:
-            pair = (candidate.collision.a, candidate.collision.b)
-            self.pair[cell] = [self._body(str(body)) for body in pair]
-            self.depth[cell] = candidate.collision.depth
-
-    def _body(self, name: str) -> int:
-        return self.bodies.setdefault(name, len(self.bodies))
-
-    def finish(self, scene: str, task: str, T_world_object: Array) -> FeasibilityMap:
-        return FeasibilityMap(
-            scene=scene,
-            arm=self.arm.name,
-            task=task,
-            T_world_object=T_world_object,
-            manifold=self.grid,
-            bodies=tuple(self.bodies),
-            phi=self.ik.phi,
-            **{
-                name: getattr(self, name)
-                for name in ("reason", "q", "sample", "branch", "opening", "pair", "depth")
-            },
-        )
+_ARRAYS = (
+    "T_world_object", "reason", "q", "sample", "branch", "clearance", "phi", "opening", "pair", "depth",
+)  # fmt: skip

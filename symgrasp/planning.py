@@ -11,8 +11,9 @@ from typing import Literal
 import numpy as np
 
 from symgrasp.errors import NoPlanError, SceneError
-from symgrasp.feasibility import Cell, FeasibilityMap, Progress, create_map
+from symgrasp.feasibility import Cell, FeasibilityMap, Progress
 from symgrasp.manifold import ROLLS, grasp_to_tool, wrap
+from symgrasp.maps import MapMaker
 from symgrasp.plan import CLEARANCE_LIMIT, Grasp, Hold, Plan, Planner, PlanTask, Pose, SceneRecord
 from symgrasp.planners.bimanual import Climb, hill_climb
 from symgrasp.planners.conflicts import explain_conflict, fewest_regrasps
@@ -159,12 +160,11 @@ def plan_handover(
 def _all_maps(world: BulletWorld, tasks: Sequence[Task], known: Maps, progress: Progress | None) -> Maps:
     """Return the maps of all arms in all tasks, computing those that are not known."""
     keys = [(k, arm) for k, task in enumerate(tasks) for arm in task.arms]
+    maker = MapMaker(world, world.scene)
     maps: Maps = {}
     for done, (k, arm) in enumerate(keys):
         step = (lambda share, done=done: progress((done + share) / len(keys))) if progress else None
-        maps[k, arm] = known.get((k, arm)) or create_map(
-            world.scene, arm, tasks[k].name, world=world, progress=step
-        )
+        maps[k, arm] = known.get((k, arm)) or maker.map(arm, tasks[k], progress=step)
     return maps
 
 

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from symgrasp.engine import exact
 from symgrasp.errors import Cancelled, MapError
-from symgrasp.feasibility import Cell, FeasibilityMap, create_map
+from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.ik import ClosedFormIK
 from symgrasp.manifold import ROLLS
+from symgrasp.maps import create_map
 from symgrasp.poses import from_position_rpy, inverse, pose_error, rotation_z, translation
 from symgrasp.reason import Reason
 from symgrasp.scene import Scene
@@ -74,7 +76,7 @@ def test_the_map_by_brute_force():
     scene = load_small("pick_pour_place", 6, 8, 4)
     arm = scene.arm()
     for task in scene.tasks.values():
-        m = create_map(scene, task=task.name)
+        m = create_map(scene, task=task.name, method="reference")
         ik = ClosedFormIK(arm, 4)
         with BulletWorld(scene) as world:
             world.set_object(task.T_world_object)
@@ -202,10 +204,13 @@ def test_the_other_robot_is_an_obstacle():
     assert not (after.feasible & ~before.feasible).any()
 
 
-def test_progress_and_cancel():
+@pytest.mark.parametrize("method", ["exact", "reference"])
+def test_progress_and_cancel(method, monkeypatch):
+    monkeypatch.setattr(exact, "AT_ONCE", 100)
     shares = []
     scene = load_small("soda_can")
-    create_map(scene, progress=shares.append)
+    create_map(scene, method=method, progress=shares.append)
+    assert len(shares) > 2
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
 
@@ -213,11 +218,13 @@ def test_progress_and_cancel():
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        create_map(scene, progress=stop)
+        create_map(scene, method=method, progress=stop)
 
 
-def test_a_cancelled_map_leaves_no_trace():
+@pytest.mark.parametrize("method", ["exact", "reference"])
+def test_a_cancelled_map_leaves_no_trace(method, monkeypatch):
     """In the world of a map that was stopped half-way, the next map is what it is in a new world."""
+    monkeypatch.setattr(exact, "AT_ONCE", 100)
     scene = load_small("log_two_robots")
 
     def stop(share):
@@ -226,8 +233,8 @@ def test_a_cancelled_map_leaves_no_trace():
 
     with BulletWorld(scene) as world:
         with pytest.raises(Cancelled):
-            create_map(scene, "left", world=world, progress=stop)
-        again = create_map(scene, "right", world=world)
+            create_map(scene, "left", method=method, world=world, progress=stop)
+        again = create_map(scene, "right", method=method, world=world)
     assert np.array_equal(again.reason, create_map(scene, "right").reason)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from symgrasp.errors import NoPlanError, PlanError, SceneError
-from symgrasp.feasibility import create_map
 from symgrasp.manifold import grasp_to_tool
+from symgrasp.maps import create_map
 from symgrasp.plan import Plan, plan_schema
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.postures import Postures

@@ -10,10 +10,11 @@ import numpy as np
 from symgrasp.bench.figures import Figure
 from symgrasp.candidates import Judge
 from symgrasp.errors import NoPlanError
-from symgrasp.feasibility import Cell, FeasibilityMap, create_map
+from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.fit import fit
 from symgrasp.ik import ClosedFormIK
 from symgrasp.manifold import ROLLS, grasp_to_tool
+from symgrasp.maps import create_map
 from symgrasp.planners.bimanual import hill_climb
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch, hold_runs

@@ -1,5 +1,5 @@
 """The exact fast path to the maps of Algorithm 1: certificates first, PyBullet for what they leave open."""
 
-from symgrasp.engine.exact import ExactEngine, create_map_exact
+from symgrasp.engine.exact import ExactEngine
 
-__all__ = ["ExactEngine", "create_map_exact"]
+__all__ = ["ExactEngine"]

@@ -18,7 +18,7 @@ from symgrasp.engine.tree import box_of
 from symgrasp.poses import Array
 
 __all__ = [
-    "CLEARANCE_LIMIT", "UNDECIDED", "Body", "Scratch", "check_arm", "check_hand", "check_round",
+    "UNDECIDED", "Body", "Scratch", "check_arm", "check_hand", "check_round",
     "new_scratch", "place_arm", "place_hand",
 ]  # fmt: skip
 
@@ -32,9 +32,6 @@ has found the nearest points. The worst of 100,000 pairs near touching was off b
 
 UNDECIDED = -1e9
 """Stands for the clearance (m) of what is neither certified free nor certified colliding."""
-
-CLEARANCE_LIMIT = 0.05
-"""Clearances above this (m) are all the same."""
 
 
 class Body(NamedTuple):

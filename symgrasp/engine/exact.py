@@ -1,14 +1,12 @@
 """The exact engine: the maps of Algorithm 1, two orders of magnitude faster.
 
-Certificates (see `symgrasp.engine.kernel`) decide all but a few candidates; those go to PyBullet,
+Certificates (see `symgrasp.engine.checks`) decide all but a few candidates; those go to PyBullet,
 through the very functions of the reference. So a cell is feasible here exactly when it is there.
 """
 
 from __future__ import annotations
 
-from contextlib import ExitStack, nullcontext
-from types import TracebackType
-from typing import Self
+import threading
 
 import numba
 import numpy as np
@@ -28,92 +26,92 @@ from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
 from symgrasp.world import Body, BulletWorld, Collision
 
-__all__ = ["ExactEngine", "create_map_exact"]
+__all__ = ["ExactEngine"]
 
 PARTS = 4
 """Parts of a search for each thread, so that none waits long for the last."""
+
+AT_ONCE = 100_000
+"""Cells times redundancy samples that are searched before progress is told: some 50 ms."""
+
+_ALL_CORES = threading.Lock()
+"""Of numba's thread pools, one does not bear two parallel searches at once, and none is faster for it."""
 
 
 class ExactEngine:
     """Computes the maps of one arm in one scene, for any pose of the object.
 
-    What belongs to the scene (pieces, their tree, the robot's geometry) is built once. Use it in a
-    ``with`` block, or close it: it holds a `BulletWorld` unless it was given one.
+    What belongs to the scene (pieces, their tree, the robot's geometry) is built once.
 
     Args:
-        scene: the scene.
-        arm: name of the arm; the first if None.
-        manifold: another grid than the scene's.
-        world: a world of this scene's robots and obstacles to use.
+        world: a world of the scene's robots, obstacles and object.
+        scene: the scene, for its settings.
+        arm: the arm.
+        manifold: the grid; maps may be asked for others with the same heights.
 
     Raises:
-        SceneError: there is no such arm.
         UrdfError: the arm has no closed-form inverse kinematics.
         NotImplementedError: the arm is not of the kinds the engine knows; see `knows`.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        arm: str | None = None,
-        manifold: Manifold | None = None,
-        world: BulletWorld | None = None,
-    ) -> None:
-        self.scene, self.arm = scene, scene.arm(arm)
-        self.manifold = manifold or scene.manifold
-        ik = solver_for(self.arm, scene.settings.redundancy)
-        if not isinstance(ik, SphericalIK) or not can_rig(self.arm):
-            raise NotImplementedError(f"arm {self.arm.name}: not of a kind that the exact engine knows")
+    def __init__(self, world: BulletWorld, scene: Scene, arm: Arm, manifold: Manifold) -> None:
+        self.world, self.scene, self.arm, self.manifold = world, scene, arm, manifold
+        ik = solver_for(arm, scene.settings.redundancy)
+        if not isinstance(ik, SphericalIK) or not can_rig(arm):
+            raise NotImplementedError(f"arm {arm.name}: not of a kind that the exact engine knows")
         self.ik = ik
-        with ExitStack() as stack:
-            self.world = stack.enter_context(nullcontext(world) if world else BulletWorld(scene))
-            hand, radii = self.arm.hand, self.manifold.profile.radius(self.manifold.h)
-            self._opening = np.array([hand.opening(float(r)) for r in radii])
-            self._fit = [fit(hand, self.manifold.profile, float(h)) for h in self.manifold.h]
-            self._order = _spread(len(ik.phi))
-            self._rig: Rig = rig(self.world, self.arm, self._opening)
-            self._close = stack.pop_all()
+        radii = manifold.profile.radius(manifold.h)
+        self._opening = np.array([arm.hand.opening(float(r)) for r in radii])
+        self._fit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
+        self._order = _spread(len(ik.phi))
+        world.set_arms([(arm, arm.home, float(self._opening[0]))])
+        self._rig: Rig = rig(world, arm, self._opening)
 
     @staticmethod
     def knows(arm: Arm) -> bool:
-        """Whether the engine can compute the maps of an arm."""
+        """Whether the engine can compute the maps of an arm; others are left to Algorithm 1.
+
+        Raises:
+            UrdfError: the arm has no closed-form inverse kinematics.
+        """
         return isinstance(solver_for(arm, 1), SphericalIK) and can_rig(arm)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Free the world, unless it was given."""
-        self._close.close()
-
-    def map(self, task: Task | str | None = None, progress: Progress | None = None) -> FeasibilityMap:
-        """Compute the map of a task, which need not be one of the scene's.
+    def map(
+        self, task: Task, manifold: Manifold | None = None, progress: Progress | None = None
+    ) -> FeasibilityMap:
+        """Compute the map of a task.
 
         Args:
-            task: the task or its name; the scene's first if None.
-            progress: told when all is done; may raise `Cancelled`.
+            task: the task; it need not be one of the scene's.
+            manifold: another grid than the engine's, with the same heights.
+            progress: told the finished share; may raise `Cancelled`.
+
+        Raises:
+            ValueError: the grid has other heights.
         """
-        the_task = task if isinstance(task, Task) else self.scene.task(task)
-        T_base_tool = inverse(self.arm.robot.T_world_base) @ self.manifold.tool_poses(
-            the_task.T_world_object, self.arm.hand.finger_depth
+        grid = manifold or self.manifold
+        if not np.array_equal(grid.h, self.manifold.h):
+            raise ValueError("the exact engine was built for a grid with other heights")
+        T_base_tool = inverse(self.arm.robot.T_world_base) @ grid.tool_poses(
+            task.T_world_object, self.arm.hand.finger_depth
         )
         world = self.world
         world.margin = self.scene.settings.margin
         world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
-        world.set_object(the_task.T_world_object)
-        draft = Draft(self)
+        world.set_object(task.T_world_object)
+        draft = Draft(self, grid)
+        blocked = self._blocked()
         rows = np.array([row for row, stage in enumerate(self._fit) if stage is None], dtype=np.int64)
-        if len(rows):
-            self._search(draft, rows, T_base_tool, the_task.T_world_object)
+        at_once = max(1, AT_ONCE // (len(ROLLS) * grid.angles * len(self.ik.phi)))
+        for first in range(0, len(rows), at_once):
+            part = rows[first : first + at_once]
+            self._search(draft, part, T_base_tool, task.T_world_object, blocked)
+            if progress:
+                progress((first + len(part)) / len(rows))
         world.set_arms(())
-        if progress:
+        if progress and not len(rows):
             progress(1.0)
-        return draft.finish(the_task)
+        return draft.finish(task)
 
     def _blocked(self) -> Collision | None:
         """Return a collision of links that the arm does not move: it spoils every candidate."""
@@ -124,10 +122,17 @@ class ExactEngine:
                 return c
         return None
 
-    def _search(self, draft: Draft, rows: np.ndarray, T_base_tool: Array, T_world_object: Array) -> None:
+    def _search(
+        self,
+        draft: Draft,
+        rows: np.ndarray,
+        T_base_tool: Array,
+        T_world_object: Array,
+        blocked: Collision | None,
+    ) -> None:
+        """Search some rows of the map."""
         pose = self._rig.pose.copy()
         pose[self._rig.body.objects] = pose_rows(axis_frame(T_world_object))
-        blocked = self._blocked()
         goals = search.Goals(
             order=self._order,
             T_world_base=np.ascontiguousarray(self.arm.robot.T_world_base),
@@ -138,8 +143,11 @@ class ExactEngine:
             blocked=blocked is not None,
             parts=PARTS * numba.get_num_threads(),
         )
-        found = search.search(self.ik.chain, self._rig.body, self._rig.solids, self._rig.tree, pose, goals)
-        roll, row, column = np.indices((len(ROLLS), len(rows), self.manifold.angles)).reshape(3, -1)
+        with _ALL_CORES:
+            found = search.search(
+                self.ik.chain, self._rig.body, self._rig.solids, self._rig.tree, pose, goals
+            )
+        roll, row, column = np.indices((len(ROLLS), len(rows), draft.grid.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
         draft.take(found, cells, blocked)
         for i in np.flatnonzero(found.status == search.OPEN):
@@ -188,10 +196,9 @@ def _same(a: Collision, b: Collision) -> bool:
 class Draft:
     """The arrays of a map while it is being computed."""
 
-    def __init__(self, engine: ExactEngine) -> None:
-        grid, dof = engine.manifold, engine.arm.dof
-        shape = (len(ROLLS), grid.heights, grid.angles)
-        self.engine = engine
+    def __init__(self, engine: ExactEngine, grid: Manifold) -> None:
+        dof, shape = engine.arm.dof, (len(ROLLS), grid.heights, grid.angles)
+        self.engine, self.grid = engine, grid
         self.asked = 0
         self.reason = np.zeros(shape, dtype=np.uint8)
         for row, stage in enumerate(engine._fit):
@@ -258,32 +265,18 @@ class Draft:
             arm=engine.arm.name,
             task=task.name,
             T_world_object=task.T_world_object,
-            manifold=engine.manifold,
+            manifold=self.grid,
             reason=self.reason,
             q=self.q,
             sample=self.sample,
             branch=self.branch,
+            clearance=self.clearance,
             phi=engine.ik.phi,
             opening=engine._opening,
             bodies=tuple(self.bodies),
             pair=self.pair,
             depth=self.depth,
         )
-
-
-def create_map_exact(
-    scene: Scene,
-    arm: str | None = None,
-    task: str | None = None,
-    *,
-    manifold: Manifold | None = None,
-    world: BulletWorld | None = None,
-    progress: Progress | None = None,
-) -> FeasibilityMap:
-    """Compute the map of an arm and a task with the exact engine; as `symgrasp.feasibility.create_map`."""
-    the_task = scene.task(task)
-    with ExactEngine(scene, arm or the_task.arms[0], manifold, world) as engine:
-        return engine.map(the_task, progress)
 
 
 def _spread(count: int) -> np.ndarray:

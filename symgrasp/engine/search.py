@@ -17,7 +17,6 @@ import numpy as np
 from numba import njit, prange
 
 from symgrasp.engine.checks import (
-    CLEARANCE_LIMIT,
     UNDECIDED,
     check_arm,
     check_hand,
@@ -26,6 +25,7 @@ from symgrasp.engine.checks import (
     place_arm,
     place_hand,
 )
+from symgrasp.feasibility import CLEARANCE_LIMIT
 from symgrasp.ik.spherical import BRANCHES, STRICT, branches_at
 from symgrasp.poses import Array
 
@@ -126,7 +126,7 @@ class _Branches(NamedTuple):
     T: Array
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, error_model="numpy", parallel=True, nogil=True)
 def search(chain, body, solids, tree, pose, goals):
     """Search cells.
 

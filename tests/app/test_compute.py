@@ -11,7 +11,7 @@ from app.state import State
 from app.things import OWN
 from app.values import MapRequest, MapResult
 from symgrasp.errors import Cancelled, SymgraspError
-from symgrasp.feasibility import create_map
+from symgrasp.maps import MapMaker, create_map
 from tests.app.test_state import small_map
 from tests.conftest import SHIPPED, load_small, write_scene
 
@@ -42,7 +42,7 @@ def test_the_map_is_that_of_the_library(bench):
 def test_a_known_map_is_not_computed_again(bench, monkeypatch):
     request = State.of(load_small("soda_can"), "").request
     first = bench.map(request, quiet)
-    monkeypatch.setattr(compute, "create_map", None)
+    monkeypatch.setattr(MapMaker, "map", None)
     assert bench.map(request, quiet) is first
     assert Workbench(bench.store).map(request, quiet) is first
 
@@ -59,12 +59,13 @@ def test_only_so_many_maps_are_kept(monkeypatch):
 
 def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(bench):
     bottle = load_small("bottle_on_table")
-    world = bench.world(bottle)
-    assert bench.world(State.of(bottle, "").move(x=0.5).moved_scene()) is world
+    maker = bench.maker(bottle)
+    assert bench.maker(State.of(bottle, "").move(x=0.5).moved_scene()) is maker
     can = load_small("soda_can")
-    assert bench.world(can) is not world
-    world = bench.world(can)
-    assert bench.world(can.with_object("other", bottle.profile)) is not world
+    assert bench.maker(can) is not maker
+    maker = bench.maker(can)
+    assert bench.maker(can.with_object("other", bottle.profile)) is not maker
+    assert bench.maker(can.with_settings(margin=0.01)) is not maker
 
 
 def test_progress_may_stop_it(bench):

@@ -17,7 +17,7 @@ from app.readout import grasp_html, map_title, notes_html, plan_line, status_htm
 from app.state import State
 from app.values import MapResult
 from symgrasp.errors import InputError
-from symgrasp.feasibility import create_map
+from symgrasp.maps import create_map
 from symgrasp.scene import Scene
 from tests.app.test_state import opened, with_plan
 from tests.conftest import load_small, write_scene

@@ -20,8 +20,8 @@ from app.state import State
 from app.things import OWN, from_library
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice
 from symgrasp.errors import SymgraspError
-from symgrasp.feasibility import create_map
 from symgrasp.manifold import ROLLS, wrap
+from symgrasp.maps import create_map
 from symgrasp.poses import pose_error, rotation_about, rotation_z
 from symgrasp.reason import Reason
 from tests.conftest import load_small

@@ -19,8 +19,9 @@ from app.stage import viewpoint
 from app.state import State
 from app.things import from_mesh
 from app.values import RollChoice
-from symgrasp.feasibility import FeasibilityMap, create_map
+from symgrasp.feasibility import FeasibilityMap
 from symgrasp.manifold import grasp_to_tool
+from symgrasp.maps import create_map
 from symgrasp.objects import load_object
 from symgrasp.plan import Plan, plan_schema
 from symgrasp.poses import pose_error

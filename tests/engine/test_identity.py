@@ -2,31 +2,55 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 
-from symgrasp.engine import create_map_exact
-from symgrasp.feasibility import create_map
-from symgrasp.reason import Reason
+from symgrasp.maps import MapMaker
 from symgrasp.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import SHIPPED
+from tests.engine.identity import assert_same, assert_true
+from tests.engine.random_scenes import random_scene
+
+SEEDS = 320
+AT_ONCE = 20
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_shipped_scenes_have_the_same_map(name):
-    """Feasible cells and the reasons up to the joint limits; every witness is free in PyBullet."""
+def test_shipped_scenes_have_the_same_maps_at_full_grid(name):
+    """Every task with every arm that holds the object in it."""
     scene = Scene.load(name)
-    task = scene.task()
-    arm = scene.arm(task.arms[0])
-    reference, exact = create_map(scene), create_map_exact(scene)
-    assert np.array_equal(exact.feasible, reference.feasible)
-    early = (reference.reason <= Reason.JOINT_LIMITS) | (exact.reason <= Reason.JOINT_LIMITS)
-    assert np.array_equal(exact.reason[early], reference.reason[early])
     with BulletWorld(scene) as world:
-        world.set_object(task.T_world_object)
-        for cell in np.argwhere(exact.feasible)[::7]:
-            witness = exact.witness(tuple(cell))
-            assert witness is not None
-            world.set_arm(arm, witness.q, witness.opening)
-            assert world.first_collision(arm) is None
+        maker = MapMaker(world, scene)
+        for task in scene.tasks.values():
+            for arm in task.arms:
+                exact = maker.map(arm, task)
+                assert_same(exact, maker.map(arm, task, method="reference"))
+                cells = np.argwhere(exact.reason > 3)[::37]
+                assert_true(world, scene, scene.arm(arm), exact, cells)
+
+
+@pytest.mark.parametrize("first", range(0, SEEDS, AT_ONCE))
+def test_random_scenes_have_the_same_maps(first, tmp_path_factory):
+    for seed in range(first, first + AT_ONCE):
+        content = random_scene(seed)
+        try:
+            check(content)
+        except AssertionError as error:
+            path = Path(tmp_path_factory.getbasetemp()) / f"{content['name']}.yaml"
+            path.write_text(yaml.safe_dump(content))
+            raise AssertionError(f"{content['name']}, saved as {path}: {error}") from error
+
+
+def check(content):
+    scene = Scene.from_content(content)
+    task = scene.task()
+    with BulletWorld(scene) as world:
+        maker = MapMaker(world, scene)
+        for arm in task.arms:
+            exact = maker.map(arm, task)
+            assert_same(exact, maker.map(arm, task, method="reference"))
+            assert_true(world, scene, scene.arm(arm), exact)

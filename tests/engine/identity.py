@@ -1,0 +1,85 @@
+"""What it means that two ways of computing a map agree, with PyBullet as the judge of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from symgrasp.candidates import Judge
+from symgrasp.feasibility import Cell, FeasibilityMap
+from symgrasp.ik import ClosedFormIK
+from symgrasp.poses import inverse
+from symgrasp.reason import Reason
+from symgrasp.robot import Arm
+from symgrasp.scene import Scene
+from symgrasp.world import BulletWorld
+
+TOLERANCE = 1e-6
+
+
+def assert_same(exact: FeasibilityMap, reference: FeasibilityMap) -> None:
+    """The feasible cells are identical, and so are the reasons up to JOINT_LIMITS."""
+    assert np.array_equal(exact.feasible, reference.feasible)
+    early = (reference.reason <= Reason.JOINT_LIMITS) | (exact.reason <= Reason.JOINT_LIMITS)
+    assert np.array_equal(exact.reason[early], reference.reason[early])
+
+
+def assert_true(
+    world: BulletWorld, scene: Scene, arm: Arm, m: FeasibilityMap, cells: Iterable[np.ndarray] | None = None
+) -> None:
+    """Every witness is free, with the clearance it promises; every collision is true of a candidate.
+
+    Args:
+        world: a world of the scene.
+        scene: the scene.
+        arm: the map's arm.
+        m: the map.
+        cells: the cells to check; all of them if None.
+    """
+    ik = ClosedFormIK(arm, scene.settings.redundancy)  # EAIK: the engine has another solver
+    judge = Judge(world, arm, ik, scene.settings.approach)
+    tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
+    world.margin = scene.settings.margin
+    world.set_arms(())
+    world.set_object(m.T_world_object)
+    for index in np.argwhere(m.reason >= Reason.SELF_COLLISION) if cells is None else cells:
+        cell = Cell(*index)
+        if m.feasible[cell]:
+            _check_witness(world, arm, judge, m, cell, tools[cell])
+        else:
+            _check_collision(world, arm, judge, m, cell, tools[cell])
+
+
+def _check_witness(
+    world: BulletWorld, arm: Arm, judge: Judge, m: FeasibilityMap, cell: Cell, T_base_tool: np.ndarray
+) -> None:
+    witness = m.witness(cell)
+    assert witness is not None
+    assert np.allclose(arm.tool_pose(witness.q), T_base_tool, atol=TOLERANCE)
+    fate, _ = judge.fate(T_base_tool, witness.q, witness.sample, witness.opening)
+    assert fate == Reason.FEASIBLE
+    world.set_arm(arm, witness.q, witness.opening)
+    assert 0 <= witness.clearance <= world.clearance(arm, 0.1) + TOLERANCE
+
+
+def _check_collision(
+    world: BulletWorld, arm: Arm, judge: Judge, m: FeasibilityMap, cell: Cell, T_base_tool: np.ndarray
+) -> None:
+    """Some candidate comes to the collision that the map names."""
+    reason, opening = Reason(int(m.reason[cell])), float(m.opening[cell.row])
+    solutions = judge.ik.solve(T_base_tool)
+    inside = np.flatnonzero(solutions.inside)
+    if reason == Reason.APPROACH_BLOCKED:
+        fates = (
+            judge.fate(T_base_tool, solutions.q[k], int(solutions.sample[k]), opening)[0] for k in inside
+        )
+        assert reason in fates
+        return
+    names = {m.bodies[k] for k in m.pair[cell]}
+    for k in inside:
+        world.set_arm(arm, solutions.q[k], opening)
+        for c in world.collisions([arm]):
+            if c.reason == reason and {str(c.a), str(c.b)} == names and c.depth >= m.depth[cell] - TOLERANCE:
+                return
+    raise AssertionError(f"no candidate of {cell} comes to this: {m.why(cell)}")

@@ -1,0 +1,71 @@
+"""Scenes at random, as the content of scene files: what fails can be saved and looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import yaml
+
+from symgrasp.files import SCENES_DIR
+from symgrasp.hand import HANDS
+
+BASES = ("bottle_on_table", "soda_can", "log_iiwa_and_panda", "handover_between_robots", "log_four_robots")
+"""Shipped scenes whose robots are used."""
+
+MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
+
+
+def random_scene(seed: int) -> dict[str, Any]:
+    """Return a scene with a small grid; robots reach the object mostly, and things are in the way."""
+    rng = np.random.default_rng(seed)
+    content = yaml.safe_load((SCENES_DIR / f"{rng.choice(BASES)}.yaml").read_text())
+    content["name"], content["description"] = f"random_{seed}", "Drawn at random"
+    for robot in content["robots"]:
+        base = robot.setdefault("base", {"position": [0, 0, 0]})
+        base["position"] = (np.array(base["position"]) + rng.normal(0, 0.08, 3)).round(4).tolist()
+        turn = np.array(base.pop("rpy_deg", [0, 0, 0])) + rng.normal(0, 12, 3) * rng.choice([0, 1])
+        base["rpy_deg"] = turn.round(3).tolist()
+        if "mount" in robot:
+            robot["hand"] = str(rng.choice(MOUNTABLE))
+    content["object"] = {"name": "thing", "profile": _profile(rng)}
+    for task in content["tasks"]:
+        pose = task["pose"]
+        pose["position"] = (np.array(pose["position"]) + rng.normal(0, 0.1, 3)).round(4).tolist()
+        turn = np.array(pose.pop("rpy_deg", [0, 0, 0])) + rng.normal(0, 40, 3) * rng.choice([0, 1])
+        pose["rpy_deg"] = turn.round(3).tolist()
+    centre = np.array(content["tasks"][0]["pose"]["position"])
+    content["obstacles"] = [_obstacle(rng, k, centre) for k in range(rng.integers(0, 7))]
+    content["map"] = {
+        "heights": int(rng.integers(2, 6)),
+        "angles": int(rng.integers(4, 9)),
+        "redundancy": int(rng.integers(2, 8)),
+        "margin": float(rng.choice([0.0, 0.0, 0.005, 0.02])),
+        "approach": float(rng.choice([0.0, 0.0, 0.03, 0.1])),
+    }
+    return content
+
+
+def _profile(rng: np.random.Generator) -> list[list[float]]:
+    heights = np.linspace(0, rng.uniform(0.08, 0.5), rng.integers(2, 6))
+    radii = rng.uniform(0.012, 0.045, len(heights))
+    return np.column_stack([heights, radii]).round(4).tolist()
+
+
+def _obstacle(rng: np.random.Generator, k: int, centre: np.ndarray) -> dict[str, Any]:
+    shapes: list[Callable[[], dict[str, Any]]] = [
+        lambda: {"box": rng.uniform(0.02, 0.5, 3).round(4).tolist()},
+        lambda: {
+            "cylinder": {
+                "radius": round(rng.uniform(0.01, 0.15), 4),
+                "height": round(rng.uniform(0.05, 0.6), 4),
+            }
+        },
+        lambda: {"sphere": {"radius": round(rng.uniform(0.02, 0.15), 4)}},
+    ]
+    pose = {
+        "position": (centre + rng.normal(0, 0.25, 3)).round(4).tolist(),
+        "rpy_deg": rng.uniform(-180, 180, 3).round(3).tolist(),
+    }
+    return {"name": f"obstacle{k}", **shapes[rng.integers(len(shapes))](), "pose": pose}
