@@ -297,7 +297,9 @@ class FeasibilityMap:
 
 def _listed(values: Array) -> list[Any]:
     """Return an array as lists with None for NaN, which JSON does not have."""
-    return np.where(np.isnan(values), None, values.astype(object)).tolist()
+    listed = values.astype(object)
+    listed[np.isnan(values)] = None
+    return listed.tolist()
 
 
 def _run_length(feasible: np.ndarray, axis: int) -> np.ndarray:

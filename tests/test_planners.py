@@ -44,6 +44,7 @@ def map_of(feasible: np.ndarray, name: str = "task", grid: Manifold = GRID) -> F
         q=np.zeros((*shape, 7)),
         sample=np.zeros(shape, dtype=np.int16),
         branch=np.zeros(shape, dtype=np.int16),
+        clearance=np.where(feasible, 0.01, np.nan),
         phi=np.zeros(1),
         opening=np.zeros(grid.heights),
         bodies=(),
