@@ -235,7 +235,7 @@ def test_a_cancelled_map_leaves_no_trace(method, monkeypatch):
         with pytest.raises(Cancelled):
             create_map(scene, "left", method=method, world=world, progress=stop)
         again = create_map(scene, "right", method=method, world=world)
-    assert np.array_equal(again.reason, create_map(scene, "right").reason)
+    assert np.array_equal(again.reason, create_map(scene, "right", method=method).reason)
 
 
 def test_a_world_can_be_used_again():
