@@ -434,18 +434,21 @@ class BulletWorld:
         without any of these arms are taken to be parked, and must be free of the object as well.
         """
         touch = {(a.robot.name, link) for a in arms for link in a.hand.touch_links}
-        found = {
-            (frozenset((c.a, c.b)), c.reason): c
+        found = [
+            c
             for arm in arms
             for query in self._queries[arm.name]
             for c in self._ask(query)
             if not (c.reason == Reason.OBJECT_COLLISION and c.a in touch)
-        }
+        ]
         busy = {arm.robot.name for arm in arms}
         for name, queries in self._parked_queries.items():
             if name not in busy:
-                found |= {(frozenset((c.a, c.b)), c.reason): c for q in queries for c in self._ask(q)}
-        return sorted(found.values(), key=lambda c: -c.depth)
+                found += [c for query in queries for c in self._ask(query)]
+        deepest: dict[object, Collision] = {}
+        for c in sorted(found, key=lambda c: -c.depth):
+            deepest.setdefault((frozenset((c.a, c.b)), c.reason), c)
+        return list(deepest.values())
 
     def object_contacts(self, margin: float = 0.0) -> list[Collision]:
         """Return the obstacles that the object is inside of, or within ``margin`` (m) of, deepest first."""
@@ -494,8 +497,11 @@ class BulletWorld:
 
     def clearance(self, arm: Arm, limit: float) -> float:
         """Return the smallest distance (m) of all pairs that are checked for an arm, at most ``limit``."""
-        gaps = [limit - c.depth for query in self._queries[arm.name] for c in self._ask(query, limit)]
-        return min(gaps, default=limit)
+        return min((limit - c.depth for c in self.near(arm, limit)), default=limit)
+
+    def near(self, arm: Arm, distance: float) -> list[Collision]:
+        """Return the pairs checked for an arm that are closer than a distance (m), as if it were a margin."""
+        return [c for query in self._queries[arm.name] for c in self._ask(query, distance)]
 
     def _ask(self, query: _Query, margin: float | None = None) -> list[Collision]:
         if margin is None:

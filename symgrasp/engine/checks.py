@@ -18,13 +18,14 @@ from symgrasp.engine.tree import box_of
 from symgrasp.poses import Array
 
 __all__ = [
-    "UNDECIDED", "Body", "Scratch", "check_arm", "check_hand", "check_round",
+    "HIT_BAND", "UNDECIDED", "Body", "Scratch", "check_arm", "check_hand", "check_round",
     "new_scratch", "place_arm", "place_hand",
 ]  # fmt: skip
 
-FREE_BAND = 1e-6
+FREE_BAND = 1e-5
 """A gap that exceeds the margin by this (m) is free for PyBullet too: its distances are those of two
-points of the pieces, never below the true ones but for rounding."""
+points of the pieces, never below the true ones but for rounding. The worst of 100,000 random pairs was
+off by 2 µm."""
 
 HIT_BAND = 5e-4
 """A gap that is below the margin by this (m) is a collision for PyBullet too: it may stop before it
@@ -280,10 +281,11 @@ def _pair(solids, scratch, a, b, margin, gap, best):
     reach = max(gap, sure)
     if _boxes_apart(size, scratch.pose, a, b, reach):
         return gap
-    bar = max(best, margin - HIT_BAND - size[a, 1] - size[b, 1])
+    slack = size[a, 1] + size[b, 1]
+    bar = max(best, margin - HIT_BAND - slack)
     lower, upper = distance_bounds(solids, scratch.pose, a, b, reach, sure, bar, scratch.simplex)
     if upper < bar:
-        scratch.hit[0], scratch.hit[1], scratch.depth[0] = a, b, margin - upper
+        scratch.hit[0], scratch.hit[1], scratch.depth[0] = a, b, margin - upper - slack
         return -math.inf
     return min(gap, lower) if lower >= sure else UNDECIDED
 

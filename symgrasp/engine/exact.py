@@ -7,15 +7,17 @@ through the very functions of the reference. So a cell is feasible here exactly 
 from __future__ import annotations
 
 import threading
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from symgrasp.candidates import RETREAT_STEP, Judge
 from symgrasp.engine import search
+from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.rig import Rig, can_rig, rig
 from symgrasp.engine.solids import pose_rows
-from symgrasp.feasibility import FeasibilityMap, Progress
+from symgrasp.feasibility import CLEARANCE_LIMIT, FeasibilityMap, Progress
 from symgrasp.fit import fit
 from symgrasp.ik import SphericalIK, solver_for
 from symgrasp.manifold import ROLLS, Manifold
@@ -36,6 +38,18 @@ AT_ONCE = 100_000
 
 _ALL_CORES = threading.Lock()
 """Of numba's thread pools, one does not bear two parallel searches at once, and none is faster for it."""
+
+
+class _Still(NamedTuple):
+    """What is so whatever the arm does.
+
+    Attributes:
+        gap: distance (m) of the bodies that it does not move at least, at most `CLEARANCE_LIMIT`.
+        blocked: a collision of them, which spoils every candidate.
+    """
+
+    gap: float
+    blocked: Collision | None
 
 
 class ExactEngine:
@@ -100,12 +114,12 @@ class ExactEngine:
         world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
         world.set_object(task.T_world_object)
         draft = Draft(self, grid)
-        blocked = self._blocked()
+        still = self._still()
         rows = np.array([row for row, stage in enumerate(self._fit) if stage is None], dtype=np.int64)
         at_once = max(1, AT_ONCE // (len(ROLLS) * grid.angles * len(self.ik.phi)))
         for first in range(0, len(rows), at_once):
             part = rows[first : first + at_once]
-            self._search(draft, part, T_base_tool, task.T_world_object, blocked)
+            self._search(draft, part, T_base_tool, task.T_world_object, still)
             if progress:
                 progress((first + len(part)) / len(rows))
         world.set_arms(())
@@ -113,14 +127,19 @@ class ExactEngine:
             progress(1.0)
         return draft.finish(task)
 
-    def _blocked(self) -> Collision | None:
-        """Return a collision of links that the arm does not move: it spoils every candidate."""
-        name, moving = self.arm.robot.name, self._rig.moving
+    def _still(self) -> _Still:
+        """Ask how far apart the bodies are that the arm does not move: it is the same for all candidates."""
+        name, moving, limit = self.arm.robot.name, self._rig.moving, CLEARANCE_LIMIT
+        gap, blocked = limit, None
+        for near in self.world.near(self.arm, limit):
+            own = [body.link for body in (near.a, near.b) if body.body == name]
+            if own and not moving.intersection(own):
+                gap = min(gap, limit - near.depth - HIT_BAND)
         for c in self.world.collisions([self.arm]):
             own = [body.link for body in (c.a, c.b) if body.body == name]
             if own and not moving.intersection(own):
-                return c
-        return None
+                blocked = blocked or c
+        return _Still(max(gap, 0.0), blocked)
 
     def _search(
         self,
@@ -128,7 +147,7 @@ class ExactEngine:
         rows: np.ndarray,
         T_base_tool: Array,
         T_world_object: Array,
-        blocked: Collision | None,
+        still: _Still,
     ) -> None:
         """Search some rows of the map."""
         pose = self._rig.pose.copy()
@@ -140,7 +159,8 @@ class ExactEngine:
             row=np.tile(rows, len(ROLLS)),
             retreat=_retreat(self.scene.settings.approach),
             margin=float(self.scene.settings.margin),
-            blocked=blocked is not None,
+            clearance=still.gap,
+            blocked=still.blocked is not None,
             parts=PARTS * numba.get_num_threads(),
         )
         with _ALL_CORES:
@@ -149,8 +169,8 @@ class ExactEngine:
             )
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.grid.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
-        draft.take(found, cells, blocked)
-        for i in np.flatnonzero(found.status == search.OPEN):
+        draft.take(found, cells, still.blocked)
+        for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.open_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             self._decide(draft, cell, goals.T_base_tool[i], self._listed(found, int(i), goals.T_base_tool[i]))
 
@@ -232,7 +252,7 @@ class Draft:
         self.q[at] = q[status == search.FEASIBLE]
         self.sample[at], self.branch[at] = pick[status == search.FEASIBLE].T
         self.clearance[at] = clearance[status == search.FEASIBLE]
-        hit = (status == search.HIT) | (status == search.BLOCKED) | (status == search.OPEN)
+        hit = (status == search.HIT) | (status == search.BLOCKED)
         named = hit & (pair[:, 0] >= 0)
         at = tuple(part[named] for part in cells)
         self.reason[at] = self._reason[pair[named, 1]]

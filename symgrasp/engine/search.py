@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit, prange
 
 from symgrasp.engine.checks import (
+    FREE_BAND,
     UNDECIDED,
     check_arm,
     check_hand,
@@ -25,7 +26,6 @@ from symgrasp.engine.checks import (
     place_arm,
     place_hand,
 )
-from symgrasp.feasibility import CLEARANCE_LIMIT
 from symgrasp.ik.spherical import BRANCHES, STRICT, branches_at
 from symgrasp.poses import Array
 
@@ -34,7 +34,6 @@ __all__ = [
     "FEASIBLE",
     "HIT",
     "LIMITS",
-    "OPEN",
     "OPEN_KEPT",
     "UNREACHABLE",
     "Found",
@@ -49,7 +48,7 @@ OPEN_KEPT = 6
 """Undecided candidates of a cell that are listed; where there are more, all must be gone through."""
 
 UNREACHABLE, LIMITS, HIT, BLOCKED, OPEN, FEASIBLE = 0, 1, 2, 3, 4, 5
-"""What became of a cell: BLOCKED on the retreat; OPEN means PyBullet must decide."""
+"""What became of a cell: BLOCKED on the retreat. Of a candidate: OPEN means PyBullet must decide."""
 
 
 class Goals(NamedTuple):
@@ -62,6 +61,7 @@ class Goals(NamedTuple):
         row: (r,) row of each run.
         retreat: (s,) displacements (m) along the approach that must be free as well, in order.
         margin: distance (m) to keep from what stands still.
+        clearance: clearances (m) from this on are all the same.
         blocked: whether what stands still collides already, whatever the arm does.
         parts: number of parts to split the cells into.
     """
@@ -72,6 +72,7 @@ class Goals(NamedTuple):
     row: np.ndarray
     retreat: Array
     margin: float
+    clearance: float
     blocked: bool
     parts: int
 
@@ -80,7 +81,8 @@ class Found(NamedTuple):
     """What was found, for each of m cells.
 
     Attributes:
-        status: (m,) one of the values above.
+        status: (m,) one of the values above, never OPEN: where it is not FEASIBLE and candidates are
+            undecided, it is that of the others.
         pair: (m, 2) pieces of which the first hits the second, -1 where none is known.
         depth: (m,) how much closer (m) than allowed they are at least.
         q: (m, n) of the best candidate.
@@ -181,7 +183,7 @@ def _go_around(body, solids, scratch, goals, run, length, T, around):
     for step in range(1 + len(goals.retreat)):
         _step(goals.T_base_tool[run * length], goals.retreat[step - 1] if step else 0.0, T)
         place_hand(body, solids, scratch, goals.T_world_base, T, goals.row[run])
-        around.gap[run, step] = check_round(body, solids, scratch, CLEARANCE_LIMIT)
+        around.gap[run, step] = check_round(body, solids, scratch, goals.clearance)
         if around.gap[run, step] == -math.inf:
             around.hit[run, step, 0], around.hit[run, step, 1] = scratch.hit[0], scratch.hit[1]
             around.depth[run, step] = scratch.depth[0]
@@ -252,9 +254,7 @@ def _cell(chain, body, solids, tree, scratch, branches, goals, around, cell, fou
             break
     if best > -math.inf:
         found.status[cell] = FEASIBLE
-        found.clearance[cell] = best
-    elif found.open_count[cell]:
-        found.status[cell] = OPEN
+        found.clearance[cell] = max(0.0, best - FREE_BAND)
     elif math.isnan(hand) and swings and _reaches(chain, T, q, exists, inside):
         found.status[cell] = LIMITS
 
