@@ -7,7 +7,8 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from textwrap import indent
@@ -151,7 +152,8 @@ def _map(args: argparse.Namespace) -> int:
     scene = _checked(args.scene)
     task = scene.task(args.task)
     arm = scene.arm(args.arm or task.arms[0])
-    the_map = create_map(scene, arm.name, task.name, progress=_progress(f"map of {task.name}"))
+    with _computing(f"map of {task.name}") as progress:
+        the_map = create_map(scene, arm.name, task.name, progress=progress)
     cells = the_map.reason.size
     print(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
     for reason, count in the_map.counts().items():
@@ -180,13 +182,13 @@ def _plan(args: argparse.Namespace) -> int:
     if method not in methods:
         raise InputError("command line", "--method", method, one_of(methods, method))
     scene = _checked(args.scene)
-    progress = _progress(f"{args.kind} plan")
-    if args.kind == "sequential":
-        plan = plan_sequential(scene, args.arm, method=method, progress=progress)
-    elif args.kind == "bimanual":
-        plan = plan_bimanual(scene, args.task, method=method, seed=args.seed, progress=progress)
-    else:
-        plan = plan_handover(scene, progress=progress)
+    with _computing(f"{args.kind} plan") as progress:
+        if args.kind == "sequential":
+            plan = plan_sequential(scene, args.arm, method=method, progress=progress)
+        elif args.kind == "bimanual":
+            plan = plan_bimanual(scene, args.task, method=method, seed=args.seed, progress=progress)
+        else:
+            plan = plan_handover(scene, progress=progress)
     plan.save(args.out)
     for task in plan.tasks:
         print(f"{task.name}: turn the object by {_deg(task.delta):.1f}°")
@@ -310,16 +312,17 @@ def _natural(text: str) -> int:
     return value
 
 
-def _progress(what: str) -> Callable[[float], None] | None:
-    """Return a callback that shows a running percentage on a terminal."""
-    if not sys.stderr.isatty():
-        return None
+@contextmanager
+def _computing(what: str) -> Iterator[Callable[[float], None] | None]:
+    """Say on stderr that code is compiled, if so; give a callback that shows a percentage on a terminal."""
+    from symgrasp.compiling import COMPILING, telling_of_compiling
 
     def show(share: float) -> None:
         end = "\n" if share >= 1 else ""
         print(f"\r{what}: {100 * share:3.0f} %", end=end, file=sys.stderr, flush=True)
 
-    return show
+    with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
+        yield show if sys.stderr.isatty() else None
 
 
 def _deg(angle: float) -> float:

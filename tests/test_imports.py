@@ -11,7 +11,7 @@ import symgrasp
 
 ROOT = Path(symgrasp.__file__).parent
 ORDER = [
-    "errors", "files", "poses", "meshes", "meridian", "axis", "mesh_io", "outline", "surface",
+    "errors", "files", "compiling", "poses", "meshes", "meridian", "axis", "mesh_io", "outline", "surface",
     "measure", "profile", "objects", "manifold", "assembly", "hand", "handprint", "robot", "gripper",
     "measure_hand", "ik", "scene_file", "scene_build", "scene", "reason", "pictures", "fit",
     "object_report", "world", "candidates", "feasibility", "algorithm1", "engine", "maps", "planners",
