@@ -41,6 +41,10 @@ class Cell(NamedTuple):
     row: int
     column: int
 
+    def turned(self, columns: int, angles: int) -> Cell:
+        """Return the cell so many columns further around a grid of so many angles."""
+        return self._replace(column=(self.column + columns) % angles)
+
 
 class Witness(NamedTuple):
     """A configuration that proves a cell feasible.

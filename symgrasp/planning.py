@@ -17,8 +17,9 @@ from symgrasp.maps import MapMaker
 from symgrasp.plan import CLEARANCE_LIMIT, Grasp, Hold, Plan, Planner, PlanTask, Pose, SceneRecord
 from symgrasp.planners.bimanual import Climb, hill_climb
 from symgrasp.planners.conflicts import explain_conflict, fewest_regrasps
+from symgrasp.planners.free import best_free
 from symgrasp.planners.gaps import PrintGaps
-from symgrasp.planners.holding import HoldingSearch, HoldRun, hold_runs
+from symgrasp.planners.holding import HoldingSearch, hold_runs
 from symgrasp.planners.postures import Posture, Postures
 from symgrasp.planners.sequential import first_common_grasp
 from symgrasp.poses import rotation_z
@@ -212,35 +213,26 @@ def _hold_best(
     Turning the object and all grasps on it by the same angle changes nothing, so the object can
     stand in the first task as it is ``turned`` (rad, whole cells) already.
     """
-    runs = hold_runs([task.arms for task in tasks])
     grid = next(iter(maps.values())).manifold
-    search = HoldingSearch(maps, runs, PrintGaps([world.scene.arm(run.arm) for run in runs], grid))
+    names = [task.arms for task in tasks]
+    holders = [world.scene.arm(run.arm) for run in hold_runs(names)]
+    search = HoldingSearch(maps, names, PrintGaps(holders, grid))
     desks = [
         Postures(world, [world.scene.arm(a) for a in task.arms], [maps[k, a] for a in task.arms])
         for k, task in enumerate(tasks)
     ]
-    tried = 0
-    for holding in search.best_first():
-        tried += 1
-        if progress:
-            progress(1.0)  # how many there are is not known beforehand; this lets the caller cancel
-        steps = _free_turns(search, desks, tasks, runs, holding.cells)
-        if steps is None:
-            continue
-        entries = []
-        common = round(turned / grid.dtheta) - steps[0][0]
-        for k, (task, (turn, postures)) in enumerate(zip(tasks, steps, strict=True)):
-            cells = _cells_in(runs, holding.cells, k, task)
-            holds = [
-                (posture, maps[k, arm], _turned(cell, turn, grid.angles), _turned(cell, -common, grid.angles))
-                for arm, posture, cell in zip(task.arms, postures, cells, strict=True)
-            ]
-            delta = float(wrap((turn + common) * grid.dtheta))
-            entries.append(_task_entry(world, task, delta, holds))
-        checks = sum(desk.body_checks for desk in desks)
-        statistics = {"placements": tried, "body_checks": checks}
-        return entries, Planner(algorithm="exact", statistics=statistics)
-    raise NoPlanError(_why_not(tasks, maps, tried))
+    tried, steps = best_free(search, desks, progress)
+    if steps is None:
+        raise NoPlanError(_why_not(tasks, maps, tried))
+    common = round(turned / grid.dtheta) - steps[0].turn
+    entries = []
+    for task, desk, step in zip(tasks, desks, steps, strict=True):
+        held = zip(step.postures, desk.maps, step.cells, strict=True)
+        holds = [(p, m, cell, cell.turned(-step.turn - common, grid.angles)) for p, m, cell in held]
+        delta = float(wrap((step.turn + common) * grid.dtheta))
+        entries.append(_task_entry(world, task, delta, holds))
+    statistics = {"placements": tried, "body_checks": sum(desk.body_checks for desk in desks)}
+    return entries, Planner(algorithm="exact", statistics=statistics)
 
 
 def _why_not(tasks: Sequence[Task], maps: Maps, tried: int) -> str:
@@ -257,39 +249,6 @@ def _why_not(tasks: Sequence[Task], maps: Maps, tried: int) -> str:
         if not np.logical_and.reduce([m.feasible.any(axis=2) for m in alone]).any():
             return explain_conflict(alone)
     return "no placement exists on this grid: wherever all arms can hold, their handprints share a cell"
-
-
-def _free_turns(
-    search: HoldingSearch,
-    desks: Sequence[Postures],
-    tasks: Sequence[Task],
-    runs: Sequence[HoldRun],
-    grasps: Sequence[Cell],
-) -> list[tuple[int, list[Posture]]] | None:
-    """Return for every task a turn and postures that are free together, or None if a task has none."""
-    steps = []
-    for k, (task, desk) in enumerate(zip(tasks, desks, strict=True)):
-        cells = _cells_in(runs, grasps, k, task)
-        angles = desk.maps[0].manifold.angles
-        for turn in search.turns(grasps, k):
-            postures = desk.find([_turned(cell, turn, angles) for cell in cells])
-            if postures:
-                steps.append((turn, postures))
-                break
-        else:
-            return None
-    return steps
-
-
-def _cells_in(runs: Sequence[HoldRun], grasps: Sequence[Cell], k: int, task: Task) -> list[Cell]:
-    """Return the grasps of the arms of task k, in the task's order."""
-    held = {run.arm: cell for run, cell in zip(runs, grasps, strict=True) if k in run.tasks}
-    return [held[arm] for arm in task.arms]
-
-
-def _turned(cell: Cell, turn: int, angles: int) -> Cell:
-    """Return the cell of the unturned map that a grasp uses once the object is turned."""
-    return cell._replace(column=(cell.column + turn) % angles)
 
 
 def _climb(

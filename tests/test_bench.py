@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
-
 from symgrasp import bench
 from symgrasp.bench import planners
 from symgrasp.cli import main
@@ -16,14 +14,12 @@ def figures(found) -> dict[str, bench.Figure]:
 
 
 def test_two_hands_exact_never_misses_what_climbing_finds():
-    found = figures(planners.several_hands(pairs=6))
-    exact = np.array(found["two hands, complete search: success"].values)
-    climb = np.array(found["two hands, hill climbing as printed: success"].values)
-    assert len(exact) == len(climb) == 6
-    assert (exact >= climb).all()
-    assert exact.any()
-    gained = found["smallest of gap and margins, more than climbing reaches"].values
-    assert min(gained) >= -1e-9
+    found = figures(planners.several_hands(pairs=3))
+    (exact,) = found["two hands, complete search: success"].values
+    (climb,) = found["two hands, hill climbing as printed: success"].values
+    assert exact >= climb > 0
+    assert len(found["two hands, complete search with whole robots"].values) == 6
+    assert min(found["smallest of gap and margins, more than climbing reaches"].values) >= -1e-9
 
 
 def test_on_the_command_line(monkeypatch, tmp_path, capsys):

@@ -67,7 +67,7 @@ def together(maps) -> HoldingSearch:
     """The search for several hands in one task."""
     names = [f"arm {k}" for k in range(len(maps))]
     keyed = {(0, name): m for name, m in zip(names, maps, strict=True)}
-    return HoldingSearch(keyed, hold_runs([names]), small()[2])
+    return HoldingSearch(keyed, [names], small()[2])
 
 
 def apart(cells) -> float:
@@ -114,8 +114,10 @@ def test_all_placements_best_first(seed, size):
     for holding in found:
         assert holding.score == pytest.approx(expected[difference(holding.cells)])
         for turn in search.turns(holding.cells, 0):
-            turned = [c._replace(column=(c.column + turn) % 8) for c in holding.cells]
+            turned = [c.turned(turn.columns, 8) for c in holding.cells]
+            margins = [float(surface_margin(m)[c]) for m, c in zip(maps, turned, strict=True)]
             assert all(m.feasible[c] for m, c in zip(maps, turned, strict=True))
+            assert turn.margin == min(margins)
 
 
 SEQUENCES = [
@@ -165,12 +167,12 @@ def test_sequences_by_trying_all_grasps(seed, tasks, density):
                 if reached <= best:
                     break
             best = max(best, reached)
-    search = HoldingSearch(maps, runs, gaps)
+    search = HoldingSearch(maps, tasks, gaps)
     found = next(search.best_first(), None)
     assert (found is None) == (best < 0)
     if found:
         assert found.score == pytest.approx(best)
-        assert all(search.turns(found.cells, k) for k in range(len(tasks)))
+        assert all(search.turns(found.cells, k) for k in range(len(search.groups)))
 
 
 def test_hold_runs():
@@ -204,7 +206,7 @@ def test_three_hands_on_one_log():
     everything = map_of(np.ones((2, 10, 8), dtype=bool), grid=scene.manifold)
     names = ["a", "b", "c"]
     search = HoldingSearch(
-        {(0, name): everything for name in names}, hold_runs([names]), PrintGaps(arms, scene.manifold)
+        {(0, name): everything for name in names}, [names], PrintGaps(arms, scene.manifold)
     )
     (holding,) = islice(search.best_first(), 1)
     prints = [a.handprint(scene.manifold, c.row, c.roll) for a, c in zip(arms, holding.cells, strict=True)]

@@ -16,7 +16,7 @@ from symgrasp.manifold import Manifold, wrap
 from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
 from symgrasp.planners.conflicts import fewest_regrasps, height_gap, smallest_conflicts
 from symgrasp.planners.gaps import PrintGaps
-from symgrasp.planners.holding import HoldingSearch, hold_runs
+from symgrasp.planners.holding import HoldingSearch
 from symgrasp.planners.sequential import common_grasps, first_common_grasp
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
@@ -89,8 +89,8 @@ def test_first_common_grasp_by_brute_force(maps):
 @settings(max_examples=100, deadline=None)
 def test_best_common_grasp_by_brute_force(maps):
     """No other height, roll and choice of angles has a better worst margin."""
-    runs = hold_runs([["arm"]] * len(maps))
-    search = HoldingSearch({(k, "arm"): m for k, m in enumerate(maps)}, runs, no_gaps())
+    keyed = {(k, "arm"): m for k, m in enumerate(maps)}
+    search = HoldingSearch(keyed, [["arm"]] * len(maps), no_gaps())
     best = 0.0
     for roll, row in product(range(2), range(5)):
         radius = float(GRID.profile.radius(GRID.h[row]))
@@ -105,12 +105,11 @@ def test_best_common_grasp_by_brute_force(maps):
         return
     found = next(search.best_first())
     (grasp,) = found.cells
-    assert search.turns(found.cells, 0)[0] == 0  # the first task needs no turn
     reached = np.inf
     for k, m in enumerate(maps):
-        turn = search.turns(found.cells, k)[0]
+        turn = search.turns(found.cells, k)[0].columns
         assert m.shift(turn * GRID.dtheta).feasible[grasp]
-        cell = grasp._replace(column=(grasp.column + turn) % 12)
+        cell = grasp.turned(turn, 12)
         along, around = m.margin(cell)
         reached = min(reached, along, around * float(GRID.profile.radius(GRID.h[cell.row])))
     assert reached == pytest.approx(best) == found.score

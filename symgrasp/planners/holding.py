@@ -4,26 +4,30 @@ An arm keeps its grasp (h, θ, roll) as long as it holds on, which is a *hold*: 
 tasks. In every task the object may be turned about its axis, the same for all arms in it; that
 turn is a whole number of columns, k. So task by task, all arms in it must be feasible on their own
 maps at ``column + k``, and hold by hold, prints that are on the object together must not share a
-cell. One grasp for a sequence and several hands in one task are the two special cases: one hold
-over all tasks, and one task with a hold for every arm.
+cell. Where nobody holds on from one task to the next, the object stands still, and both tasks have
+one turn. One grasp for a sequence and several hands in one task are the two special cases: one
+hold over all tasks, and one task with a hold for every arm.
 """
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import count
+from functools import cached_property
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.planners.gaps import PrintGaps
+from symgrasp.planners.placements import Problem, explore
 from symgrasp.planners.sequential import check_same_grid, surface_margin
 from symgrasp.poses import Array
 
-__all__ = ["HoldRun", "Holding", "HoldingSearch", "hold_runs"]
+__all__ = ["HoldRun", "Holding", "HoldingSearch", "Turn", "hold_runs", "turn_groups"]
+
+AT_ONCE = 64
+"""Placements of one score that are listed at first; eight times as many whenever more are asked for."""
 
 
 class HoldRun(NamedTuple):
@@ -51,6 +55,20 @@ class Holding(NamedTuple):
     score: float
 
 
+class Turn(NamedTuple):
+    """A turn of the object at which all arms of a group of tasks can hold it.
+
+    Attributes:
+        columns: by how many columns.
+        margin: the smallest margin (m) of those arms.
+        clearance: their smallest clearance (m).
+    """
+
+    columns: int
+    margin: float
+    clearance: float
+
+
 def hold_runs(tasks: Sequence[Sequence[str]]) -> list[HoldRun]:
     """Return the holds of a sequence, in the order in which they begin.
 
@@ -67,109 +85,178 @@ def hold_runs(tasks: Sequence[Sequence[str]]) -> list[HoldRun]:
     return holds
 
 
+def turn_groups(tasks: Sequence[Sequence[str]]) -> list[list[int]]:
+    """Return the tasks, as indices, in groups that have one turn: nobody holds on within a group.
+
+    Args:
+        tasks: for every task the names of the arms in it.
+    """
+    groups: list[list[int]] = []
+    for k, arms in enumerate(tasks):
+        if k and not set(arms) & set(tasks[k - 1]):
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return groups
+
+
 class HoldingSearch:
     """Finds grasps for all holds of a sequence, completely and best first.
 
     Args:
         maps: (index of the task, name of the arm) → map, all over the same grid.
-        holds: the holds.
+        tasks: for every task the names of the arms in it.
         gaps: the gaps between the prints of the holds' arms, in the order of the holds.
 
     Raises:
         InputError: the grids differ.
+
+    Attributes:
+        holds: the holds, in the order in which they begin.
+        groups: the tasks, as indices, in groups that have one turn.
     """
 
     def __init__(
-        self, maps: Mapping[tuple[int, str], FeasibilityMap], holds: Sequence[HoldRun], gaps: PrintGaps
+        self,
+        maps: Mapping[tuple[int, str], FeasibilityMap],
+        tasks: Sequence[Sequence[str]],
+        gaps: PrintGaps,
     ) -> None:
         check_same_grid(list(maps.values()))
-        self.holds, self.gaps = holds, gaps
-        self._margins = {key: np.where(m.feasible, surface_margin(m), -1.0) for key, m in maps.items()}
-        self._shape = next(iter(self._margins.values())).shape
+        self.holds, self.groups, self.gaps = hold_runs(tasks), turn_groups(tasks), gaps
+        self._maps = maps
+        self._shape = next(iter(maps.values())).feasible.shape
+        # By group and hold: margins (L, A) by line and column, the smallest of its tasks'.
+        self._margins: dict[tuple[int, int], Array] = {}
+        for g, group in enumerate(self.groups):
+            for k in group:
+                for h, hold in enumerate(self.holds):
+                    if k in hold.tasks:
+                        m = maps[k, hold.arm]
+                        margin = np.where(m.feasible, surface_margin(m), -1.0).reshape(-1, self._shape[2])
+                        known = self._margins.get((g, h))
+                        self._margins[g, h] = margin if known is None else np.minimum(known, margin)
 
     def best_first(self) -> Iterator[Holding]:
         """Yield every choice of grasps whose prints are apart and that is feasible at some turn of each task.
 
-        Best-first search, one hold after the other: what a partial choice reaches bounds all its
-        completions, so the first is the best, and nothing yielded means that nothing exists.
-        Turning all grasps and tasks of the sequence together changes nothing, so a hold that
-        shares no task with an earlier one keeps one column.
+        In falling order of the score, so the first is the best, and nothing yielded means that
+        nothing exists. Turning all grasps and tasks of the sequence together changes nothing, so
+        the first hold keeps column 0. Of equal scores of a single hold, the larger clearance comes
+        first.
         """
-        tie = count()
-        heap: list[tuple[float, int, int, int, tuple[Cell, ...], np.ndarray, Array]] = []
+        if len(self.holds) == 1:
+            yield from self._lines()
+            return
+        ceiling, best = np.inf, np.empty((1, len(self.holds), 2), dtype=np.int64)
+        while True:
+            found, score = explore(self._problem, -0.5, ceiling, True, best)
+            if not found:
+                return
+            yield self._holding(best[0], score)
+            for place in self._all_of(score):
+                if not np.array_equal(place, best[0]):
+                    yield self._holding(place, score)
+            ceiling = score
 
-        def push(cells: tuple[Cell, ...], order: np.ndarray, scores: Array, position: int) -> None:
-            if position < len(order):
-                # Of equal scores the fuller choice comes first, so that the search goes deep.
-                entry = (-scores[position], -len(cells), next(tie), position, cells, order, scores)
-                heapq.heappush(heap, entry)
+    def turns(self, cells: Sequence[Cell], group: int, enough: float = np.inf) -> list[Turn]:
+        """Return the turns at which all arms of a group of tasks are feasible, best margin first.
 
-        push((), *self._rate((), np.inf), 0)
-        while heap:
-            negative, _, _, position, cells, order, scores = heapq.heappop(heap)
-            push(cells, order, scores, position + 1)
-            cell = Cell(*(int(k) for k in np.unravel_index(order[position], self._shape)))
-            chosen = (*cells, cell)
-            if len(chosen) == len(self.holds):
-                yield Holding(chosen, float(-negative))
-            else:
-                push(chosen, *self._rate(chosen, -negative), 0)
+        Margins from ``enough`` (m) on count as equal; of equal ones, the larger clearance comes first.
+        """
+        margin = np.min(self._turned(self._margins, cells, group), axis=0)
+        clearance = np.min(self._turned(self._clearances, cells, group), axis=0)
+        valid = np.flatnonzero(margin >= 0)
+        order = np.lexsort((-margin[valid], -clearance[valid], -np.minimum(margin[valid], enough)))
+        return [Turn(int(k), float(margin[k]), float(clearance[k])) for k in valid[order]]
 
-    def turns(self, cells: Sequence[Cell], task: int) -> list[int]:
-        """Return the turns k (columns) at which all arms of a task are feasible, best margin first."""
-        rows = self._rows(cells, task)
-        worst = np.min(rows, axis=0)
-        valid = np.flatnonzero(worst >= 0)
-        return valid[np.argsort(-worst[valid], kind="stable")].tolist()
-
-    def _rows(self, cells: Sequence[Cell], task: int) -> list[Array]:
-        """Return for each hold chosen so far that is in a task its margins (A,) by the turn k."""
+    def _turned(
+        self, values: Mapping[tuple[int, int], Array], cells: Sequence[Cell], group: int
+    ) -> list[Array]:
+        """Return for each hold in a group its values (A,) by the turn."""
+        heights = self._shape[1]
         return [
-            np.roll(self._margins[task, hold.arm][cell.roll, cell.row], -cell.column)
-            for hold, cell in zip(self.holds, cells, strict=False)
-            if task in hold.tasks
+            np.roll(values[group, h][cell.roll * heights + cell.row], -cell.column)
+            for h, cell in enumerate(cells)
+            if (group, h) in values
         ]
 
-    def _rate(self, cells: tuple[Cell, ...], score: float) -> tuple[np.ndarray, Array]:
-        """Rate every grasp of the next hold given those before it; returns flat indices and scores."""
-        index = len(cells)
-        hold = self.holds[index]
-        rated = np.full(self._shape, score)
-        for task in hold.tasks:
-            own, others = self._margins[task, hold.arm], self._rows(cells, task)
-            rated = np.minimum(rated, _best_turn(own, np.min(others, axis=0)) if others else _any_turn(own))
-        partners = [k for k, other in enumerate(self.holds[:index]) if set(other.tasks) & set(hold.tasks)]
-        for k in partners:
-            gap = self.gaps.around(k, cells[k].roll, cells[k].row, index)
-            rated = np.minimum(rated, np.roll(gap, cells[k].column, axis=2))
-        if not partners:  # keep the column at which the first task needs no turn
-            first = self._margins[hold.tasks[0], hold.arm].argmax(axis=2)
-            rated = np.where(np.arange(self._shape[2]) == first[..., None], rated, -1.0)
-        flat = rated.ravel()
-        valid = np.flatnonzero(flat >= 0)
-        order = valid[np.argsort(-flat[valid], kind="stable")]
-        return order, flat[order]
+    @cached_property
+    def _clearances(self) -> dict[tuple[int, int], Array]:
+        """By group and hold: clearances (L, A) by line and column."""
+        found: dict[tuple[int, int], Array] = {}
+        for g, h in self._margins:
+            tasks = [k for k in self.groups[g] if k in self.holds[h].tasks]
+            own = [self._maps[k, self.holds[h].arm].clearance.reshape(-1, self._shape[2]) for k in tasks]
+            found[g, h] = np.min(own, axis=0)
+        return found
 
+    @cached_property
+    def _alone(self) -> Array:
+        """(n, L) what each line of each hold reaches at most."""
+        return np.array(
+            [
+                np.min([m.max(axis=1) for (_, other), m in self._margins.items() if other == h], axis=0)
+                for h in range(len(self.holds))
+            ]
+        )
 
-def _any_turn(margins: Array) -> Array:
-    """Return the best margin (R, H, A) over all turns, the same for every column."""
-    return np.broadcast_to(margins.max(axis=2, keepdims=True), margins.shape)
+    def _lines(self) -> Iterator[Holding]:
+        """Yield every line of a single hold; a larger clearance breaks ties."""
+        (alone,) = self._alone
+        lines = np.flatnonzero(alone >= 0)
+        clearance = [
+            min(
+                np.max(self._clearances[key][line], where=margins[line] >= alone[line], initial=0.0)
+                for key, margins in self._margins.items()
+            )
+            for line in lines
+        ]
+        for k in np.lexsort((-np.array(clearance), -alone[lines])):
+            yield self._holding(np.array([[lines[k], 0]]), float(alone[lines[k]]))
 
+    def _all_of(self, score: float) -> Iterator[np.ndarray]:
+        """Yield all placements (n, 2) of a score."""
+        done, room = 0, AT_ONCE
+        while True:
+            places = np.empty((room, len(self.holds), 2), dtype=np.int64)
+            above, below = np.nextafter(score, -np.inf), np.nextafter(score, np.inf)
+            count, _ = explore(self._problem, above, below, False, places)
+            yield from places[done:count]
+            if count < room:
+                return
+            done, room = count, 8 * room
 
-@njit(cache=True)
-def _best_turn(margins, others):
-    """Return for every grasp (R, H, A) the worse of its and the others' margins, at the best turn.
+    def _holding(self, place: np.ndarray, score: float) -> Holding:
+        heights = self._shape[1]
+        cells = (Cell(int(line) // heights, int(line) % heights, int(column)) for line, column in place)
+        return Holding(tuple(cells), float(score))
 
-    Turns are tried by falling margin of the others (A,), so most of them are never looked at.
-    """
-    rolls, heights, angles = margins.shape
-    order = np.argsort(-others)
-    best = np.full(margins.shape, -1.0)
-    for r in range(rolls):
-        for i in range(heights):
-            for j in range(angles):
-                for k in order:
-                    if others[k] <= best[r, i, j]:
-                        break
-                    best[r, i, j] = max(best[r, i, j], min(margins[r, i, (j + k) % angles], others[k]))
-    return best
+    @cached_property
+    def _problem(self) -> Problem:
+        n, (_, _, angles) = len(self.holds), self._shape
+        lines = self._alone.shape[1]
+        shared = [g for g in range(len(self.groups)) if sum(other == g for other, _ in self._margins) > 1]
+        part = np.full((n, len(shared)), -1)
+        margins = []
+        for column, group in enumerate(shared):
+            for h in range(n):
+                if (group, h) in self._margins:
+                    part[h, column] = len(margins)
+                    margins.append(self._margins[group, h])
+        table, rows, gaps = np.full((n, n), -1), [], []
+        for a, b in combinations(range(n), 2):
+            if set(self.holds[a].tasks) & set(self.holds[b].tasks):
+                table[a, b] = len(rows)
+                found = self.gaps.table(a, b)
+                rows.append(found.row + sum(len(g) for g in gaps))
+                gaps.append(found.gaps)
+        return Problem(
+            order=np.argsort(-self._alone, axis=1, kind="stable"),
+            alone=self._alone,
+            part=part,
+            margins=np.array(margins).reshape(-1, lines, angles),
+            table=table,
+            row=np.array(rows, dtype=np.int64).reshape(-1, lines, lines),
+            gaps=np.concatenate([np.empty((0, angles)), *gaps]),
+        )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from symgrasp.candidates import Judge
 from symgrasp.feasibility import Cell, FeasibilityMap
-from symgrasp.ik import ClosedFormIK
+from symgrasp.ik import solver_for
 from symgrasp.manifold import ROLLS, grasp_to_tool
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
@@ -93,4 +93,4 @@ class Postures:
     def _judge_of(self, k: int) -> Judge:
         settings = self.world.scene.settings
         arm = self.arms[k]
-        return Judge(self.world, arm, ClosedFormIK(arm, settings.redundancy), settings.approach)
+        return Judge(self.world, arm, solver_for(arm, settings.redundancy), settings.approach)

@@ -1,0 +1,267 @@
+"""The complete search for grasps that go together, compiled: branch and bound over sets of columns.
+
+A *line* is a roll and a row (roll · heights + row). A placement gives each of n holds a line and a
+column; the first hold's column is 0, since turning all together changes nothing. Its score is the
+smallest of three things: what each line reaches alone, the gaps between prints, and for each group
+of tasks with one turn the margins of all holds in it, at the best turn.
+
+Sets of columns are words of bits. For a floor that the score must exceed, a pair of lines allows
+the columns at which their gap exceeds it, and a group the turns at which the margins do; a hold is
+placed where all earlier ones allow it, and given up as soon as a later one has no place left.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from symgrasp.poses import Array
+
+__all__ = ["Problem", "explore"]
+
+PLAIN: dict[str, Any] = {"cache": True, "error_model": "numpy"}
+
+WORD = 64
+"""Bits of a word."""
+
+
+class Problem(NamedTuple):
+    """What is to be placed: n holds, L lines, A angles, G groups of tasks that several holds share.
+
+    Attributes:
+        order: (n, L) the lines of each hold, most promising first.
+        alone: (n, L) what a line reaches at most, whatever the others do; below 0 if infeasible.
+        part: (n, G) where in ``margins`` a hold's margins in a group are, -1 if it is not in it.
+        margins: (P, L, A) margins (m), below 0 where infeasible.
+        table: (n, n) which of the tables of gaps two holds a < b have, -1 if they never meet.
+        row: (T, L, L) where in ``gaps`` a pair of lines is.
+        gaps: (K, A) gaps (m) by the later hold's column less the earlier one's.
+    """
+
+    order: np.ndarray
+    alone: Array
+    part: np.ndarray
+    margins: Array
+    table: np.ndarray
+    row: np.ndarray
+    gaps: Array
+
+
+class _Sets(NamedTuple):
+    """The columns above the floor, of every line's margins (P · L) and every row of gaps (K).
+
+    Each set is written twice in a row, so that it can be read from any column; it is made when it
+    is first asked for, and again when the floor has changed.
+    """
+
+    margins: np.ndarray
+    margins_made: np.ndarray
+    gaps: np.ndarray
+    gaps_made: np.ndarray
+
+
+@njit(**PLAIN)
+def explore(problem, floor, ceiling, improve, cells):
+    """Find placements whose score is above a floor and below a ceiling.
+
+    Args:
+        problem: what is to be placed.
+        floor: what the score must exceed.
+        ceiling: what the score must stay below.
+        improve: raise the floor to each score that is found, so that the last is the best.
+        cells: (m, n, 2) receives lines and columns: the best, or the first m that are found.
+
+    Returns:
+        How many were found (at most m, or 1 where the best is sought), and the last one's score.
+    """
+    holds, lines = problem.order.shape
+    angles, groups = problem.gaps.shape[1], problem.part.shape[1]
+    words = (angles + WORD - 1) // WORD
+    sets, made = _new_sets(problem, words), 0
+    # By depth: where in its order a hold is, and the columns of that line still to be tried; the
+    # columns that earlier holds allow it; the turns that they leave each group; what they reach.
+    at = np.full(holds, -1)
+    columns = np.zeros((holds, words), np.uint64)
+    allowed = np.empty((holds, holds, lines, words), np.uint64)
+    turns = np.empty((holds + 1, groups, words), np.uint64)
+    reached = np.full(holds + 1, np.inf)
+    place = np.zeros((holds, 2), np.int64)
+    for w in range(words):
+        allowed[0, 0, :, w] = 1 if w == 0 else 0
+        allowed[0, 1:, :, w] = _full(angles, w)
+        turns[0, :, w] = _full(angles, w)
+    count, score, depth = 0, floor, 0
+    while depth >= 0:
+        column = _take_first(columns[depth])
+        if column < 0:
+            at[depth] += 1
+            line = problem.order[depth, min(at[depth], lines - 1)]
+            if at[depth] == lines or min(problem.alone[depth, line], reached[depth]) <= floor:
+                at[depth] = -1  # the lines that follow are no better
+                depth -= 1
+            else:
+                columns[depth] = allowed[depth, depth, line]
+            continue
+        line = problem.order[depth, at[depth]]
+        place[depth, 0], place[depth, 1] = line, column
+        here = min(reached[depth], problem.alone[depth, line], _gap(problem, place, depth))
+        if here <= floor or not _turn(problem, sets, made, floor, place, depth, turns):
+            continue
+        if depth < holds - 1:
+            reached[depth + 1] = here
+            if _narrow(problem, sets, made, floor, place, depth, allowed):
+                depth += 1
+            continue
+        here = min(here, _together(problem, place, turns[holds]))
+        if not floor < here < ceiling:
+            continue
+        score = here
+        cells[count] = place
+        if improve:
+            floor = here
+            made += 1
+            for d in range(holds):  # above the new floor fewer turns are left
+                _turn(problem, sets, made, floor, place, d, turns)
+        else:
+            count += 1
+            if count == len(cells):
+                break
+    return max(count, min(made, 1)), score
+
+
+@njit(**PLAIN)
+def _gap(problem, place, depth):
+    """Return the smallest gap from a hold to those before it."""
+    smallest = np.inf
+    for other in range(depth):
+        table = problem.table[other, depth]
+        if table >= 0:
+            gaps = problem.gaps[problem.row[table, place[other, 0], place[depth, 0]]]
+            smallest = min(smallest, gaps[(place[depth, 1] - place[other, 1]) % len(gaps)])
+    return smallest
+
+
+@njit(**PLAIN)
+def _turn(problem, sets, made, floor, place, depth, turns):
+    """Leave each group the turns at which the hold is above the floor as well; tell whether all have one."""
+    line, column = place[depth]
+    for g in range(problem.part.shape[1]):
+        part = problem.part[depth, g]
+        if part < 0:
+            turns[depth + 1, g] = turns[depth, g]
+            continue
+        i = part * problem.order.shape[1] + line
+        if sets.margins_made[i] != made:
+            _fill(sets.margins[i], problem.margins[part, line], floor)
+            sets.margins_made[i] = made
+        if not _meet(turns[depth, g], sets.margins[i], column, turns[depth + 1, g]):
+            return False
+    return True
+
+
+@njit(**PLAIN)
+def _narrow(problem, sets, made, floor, place, depth, allowed):
+    """Leave each later hold the columns that the hold allows; tell whether all have one."""
+    holds, lines = problem.order.shape
+    angles = problem.gaps.shape[1]
+    for other in range(depth + 1, holds):
+        table, any_left = problem.table[depth, other], False
+        for k in range(lines):
+            line = problem.order[other, k]
+            if problem.alone[other, line] <= floor:
+                break
+            before, after = allowed[depth, other, line], allowed[depth + 1, other, line]
+            if table < 0:
+                after[:] = before
+                any_left = True
+                continue
+            i = problem.row[table, place[depth, 0], line]
+            if sets.gaps_made[i] != made:
+                _fill(sets.gaps[i], problem.gaps[i], floor)
+                sets.gaps_made[i] = made
+            any_left |= _meet(before, sets.gaps[i], (angles - place[depth, 1]) % angles, after)
+        if not any_left:
+            return False
+    return True
+
+
+@njit(**PLAIN)
+def _together(problem, place, turns):
+    """Return the margin of the worst group at its best turn."""
+    holds, angles = len(place), problem.gaps.shape[1]
+    worst = np.inf
+    for g in range(problem.part.shape[1]):
+        best = -np.inf
+        left = turns[g].copy()
+        turn = _take_first(left)
+        while turn >= 0:
+            margin = np.inf
+            for d in range(holds):
+                part = problem.part[d, g]
+                if part >= 0:
+                    column = (place[d, 1] + turn) % angles
+                    margin = min(margin, problem.margins[part, place[d, 0], column])
+            best = max(best, margin)
+            turn = _take_first(left)
+        worst = min(worst, best)
+    return worst
+
+
+@njit(**PLAIN)
+def _new_sets(problem, words):
+    count, double = problem.margins.shape[0] * problem.margins.shape[1], 2 * words + 1
+    return _Sets(
+        np.empty((count, double), np.uint64),
+        np.full(count, -1),
+        np.empty((len(problem.gaps), double), np.uint64),
+        np.full(len(problem.gaps), -1),
+    )
+
+
+@njit(**PLAIN)
+def _full(angles, word):
+    """Return a word of the set of all columns."""
+    return ~np.uint64(0) >> np.uint64(max(0, WORD * (word + 1) - angles))
+
+
+@njit(**PLAIN)
+def _fill(bits, values, floor):
+    """Write the set of columns whose value is above the floor, twice in a row."""
+    bits[:] = 0
+    angles = len(values)
+    for j in range(angles):
+        if values[j] > floor:
+            for k in (j, j + angles):
+                bits[k // WORD] |= np.uint64(1) << np.uint64(k % WORD)
+
+
+@njit(**PLAIN)
+def _meet(own, other, first, both):
+    """Write what a set shares with another one read from column ``first``; tell whether it is anything."""
+    i, shift = first // WORD, np.uint64(first % WORD)
+    anything = False
+    for w in range(len(own)):
+        bits = other[i + w] >> shift
+        if shift:
+            bits |= other[i + w + 1] << (np.uint64(WORD) - shift)
+        both[w] = own[w] & bits
+        anything |= both[w] != 0
+    return anything
+
+
+@njit(**PLAIN)
+def _take_first(bits):
+    """Take the first column out of a set and return it, or -1 if the set is empty."""
+    for w in range(len(bits)):
+        if bits[w]:
+            low = bits[w] & (~bits[w] + np.uint64(1))
+            bits[w] ^= low
+            place = 0
+            for step in (32, 16, 8, 4, 2, 1):
+                if low >> np.uint64(step):
+                    low >>= np.uint64(step)
+                    place += step
+            return WORD * w + place
+    return -1
