@@ -165,7 +165,7 @@ class ExactEngine:
         )
         with _ALL_CORES:
             found = search.search(
-                self.ik.chain, self._rig.body, self._rig.solids, self._rig.tree, pose, goals
+                self.ik.chain, self._rig.body, self._rig.solids, self._rig.tree, pose, goals, self.arm.dof
             )
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.grid.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)

@@ -19,6 +19,7 @@ from numba import njit, prange
 from symgrasp.engine.checks import (
     FREE_BAND,
     UNDECIDED,
+    Body,
     check_arm,
     check_hand,
     check_round,
@@ -26,7 +27,9 @@ from symgrasp.engine.checks import (
     place_arm,
     place_hand,
 )
-from symgrasp.ik.spherical import BRANCHES, STRICT, branches_at
+from symgrasp.engine.solids import Solids
+from symgrasp.engine.tree import Tree
+from symgrasp.ik.spherical import BRANCHES, STRICT, Chain, branches_at
 from symgrasp.poses import Array
 
 __all__ = [
@@ -128,35 +131,42 @@ class _Branches(NamedTuple):
     T: Array
 
 
-@njit(cache=True, error_model="numpy", parallel=True, nogil=True)
-def search(chain, body, solids, tree, pose, goals):
-    """Search cells.
+def search(
+    chain: Chain, body: Body, solids: Solids, tree: Tree, pose: Array, goals: Goals, joints: int
+) -> Found:
+    """Search cells, on all cores.
 
     Args:
-        chain: `symgrasp.ik.spherical.Chain`.
-        body: `symgrasp.engine.checks.Body`.
-        solids: `symgrasp.engine.solids.Solids`.
-        tree: `symgrasp.engine.tree.Tree` over what stands still.
+        chain: the arm's geometry for the inverse kinematics.
+        body: what moves.
+        solids: all pieces.
+        tree: those that stand still.
         pose: (P, 12) of all pieces; those of moving ones do not matter.
-        goals: `Goals`.
-
-    Returns:
-        `Found`.
+        goals: what is asked.
+        joints: number of joints n.
     """
+    m = len(goals.T_base_tool)
+    found = Found(
+        status=np.zeros(m, dtype=np.uint8),
+        pair=np.full((m, 2), -1, dtype=np.int32),
+        depth=np.full(m, np.nan),
+        q=np.full((m, joints), np.nan),
+        pick=np.full((m, 2), -1, dtype=np.int16),
+        clearance=np.full(m, np.nan),
+        open_count=np.zeros(m, dtype=np.int32),
+        open_q=np.empty((m, OPEN_KEPT, joints)),
+        open_pick=np.empty((m, OPEN_KEPT, 2), dtype=np.int16),
+    )
+    # Nothing is returned from compiled code: a Ctrl-C while numba wraps up results crashes the process.
+    _search(chain, body, solids, tree, pose, goals, found)
+    return found
+
+
+@njit(cache=True, error_model="numpy", parallel=True, nogil=True)
+def _search(chain, body, solids, tree, pose, goals, found):
     m, n, runs, steps = len(goals.T_base_tool), chain.limits.shape[1], len(goals.row), 1 + len(goals.retreat)
     around = _Around(
         np.empty((runs, steps)), np.full((runs, steps, 2), -1, dtype=np.int64), np.full((runs, steps), np.nan)
-    )
-    found = Found(
-        np.zeros(m, dtype=np.uint8),
-        np.full((m, 2), -1, dtype=np.int32),
-        np.full(m, np.nan),
-        np.full((m, n), np.nan),
-        np.full((m, 2), -1, dtype=np.int16),
-        np.full(m, np.nan),
-        np.zeros(m, dtype=np.int32),
-        np.empty((m, OPEN_KEPT, n)),
-        np.empty((m, OPEN_KEPT, 2), dtype=np.int16),
     )
     for part in prange(goals.parts):
         scratch = new_scratch(pose, solids, n)
@@ -175,7 +185,6 @@ def search(chain, body, solids, tree, pose, goals):
         # Dealt out like cards, so that every part has its share of easy and of hard cells.
         for cell in range(part, m, goals.parts):
             _cell(chain, body, solids, tree, scratch, branches, goals, around, cell, found)
-    return found
 
 
 @njit(**STRICT)

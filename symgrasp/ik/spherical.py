@@ -113,13 +113,22 @@ class SphericalIK(ClosedFormIK):
             q (m, samples, BRANCHES, n), whether it reaches the pose (m, samples, BRANCHES), and
             whether it does so inside the limits.
         """
-        return _solve_batch(*self.chain, np.ascontiguousarray(T_base_tool, dtype=float))
+        T = np.ascontiguousarray(T_base_tool, dtype=float)
+        found = self._room(len(T), len(self.phi))
+        _solve_batch(*self.chain, T, *found)
+        return found
 
     def _solve(self, chain: Chain, T_base_tool: Array, first: int, last: int) -> Solutions:
         T = np.ascontiguousarray(T_base_tool, dtype=float)
-        q, exists, inside = _solve_range(*chain, T, first, last)
+        q, exists, inside = self._room(last - first)
+        _solve_range(*chain, T, first, last, q, exists, inside)
         sample, branch = np.nonzero(exists)
         return Solutions(q[exists], sample + first, branch, inside[exists])
+
+    def _room(self, *shape: int) -> tuple[Array, np.ndarray, np.ndarray]:
+        """Return arrays for compiled code to write to: a Ctrl-C while numba wraps up results crashes."""
+        q = np.empty((*shape, BRANCHES, self.arm.dof))
+        return q, np.empty(q.shape[:-1], dtype=bool), np.empty(q.shape[:-1], dtype=bool)
 
     def _chain(self, phi: Array) -> Chain:
         arm = self.arm
@@ -227,28 +236,17 @@ def _meeting(h: Array, o: Array) -> Array | None:
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _solve_batch(geometry, joint, limits, forward, T):
-    m, n, samples = T.shape[0], limits.shape[1], len(geometry)
-    q = np.empty((m, samples, BRANCHES, n))
-    exists = np.empty((m, samples, BRANCHES), dtype=np.bool_)
-    inside = np.empty((m, samples, BRANCHES), dtype=np.bool_)
-    for i in prange(m):
-        for k in range(samples):
+def _solve_batch(geometry, joint, limits, forward, T, q, exists, inside):
+    for i in prange(len(T)):
+        for k in range(len(geometry)):
             branches_at(geometry, joint, limits, forward, k, T[i], False, q[i, k], exists[i, k], inside[i, k])
-    return q, exists, inside
 
 
 @njit(cache=True, error_model="numpy")
-def _solve_range(geometry, joint, limits, forward, T, first, last):
-    n = limits.shape[1]
-    q = np.empty((last - first, BRANCHES, n))
-    exists = np.empty((last - first, BRANCHES), dtype=np.bool_)
-    inside = np.empty((last - first, BRANCHES), dtype=np.bool_)
+def _solve_range(geometry, joint, limits, forward, T, first, last, q, exists, inside):
     for k in range(first, last):
-        branches_at(
-            geometry, joint, limits, forward, k, T, False, q[k - first], exists[k - first], inside[k - first]
-        )
-    return q, exists, inside
+        i = k - first
+        branches_at(geometry, joint, limits, forward, k, T, False, q[i], exists[i], inside[i])
 
 
 @njit(**STRICT)
