@@ -16,6 +16,7 @@ from symgrasp import pictures
 from symgrasp.errors import MapError, ProfileError
 from symgrasp.files import write_atomically
 from symgrasp.manifold import ROLLS, Manifold
+from symgrasp.margins import cells_to_infeasible
 from symgrasp.poses import Array, rotation_z
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
@@ -171,12 +172,9 @@ class FeasibilityMap:
         Zero where infeasible. Both ends of the object count as infeasible; around the object
         half a turn is the most there is.
         """
-        rows = np.minimum(_run_length(self.feasible, 1), _run_length(self.feasible[:, ::-1], 1)[:, ::-1])
-        around = np.concatenate([self.feasible] * 3, axis=2)
-        columns = np.minimum(_run_length(around, 2), _run_length(around[..., ::-1], 2)[..., ::-1])
-        angles = self.manifold.angles
-        columns = np.minimum(columns[..., angles : 2 * angles], angles // 2)
-        margins = np.stack([rows * self.manifold.dh, columns * self.manifold.dtheta], axis=-1)
+        along, around = cells_to_infeasible(self.feasible)
+        margins = np.empty((*self.feasible.shape, 2))
+        margins[..., 0], margins[..., 1] = along * self.manifold.dh, around * self.manifold.dtheta
         margins.setflags(write=False)
         return margins
 
@@ -304,12 +302,6 @@ def _listed(values: Array) -> list[Any]:
     listed = values.astype(object)
     listed[np.isnan(values)] = None
     return listed.tolist()
-
-
-def _run_length(feasible: np.ndarray, axis: int) -> np.ndarray:
-    """Count along an axis how many cells ago the last infeasible one was (0 for itself)."""
-    position = np.arange(1, feasible.shape[axis] + 1).reshape([-1 if k == axis else 1 for k in range(3)])
-    return position - np.maximum.accumulate(np.where(feasible, 0, position), axis=axis)
 
 
 _ARRAYS = (

@@ -241,14 +241,14 @@ def _why_not(tasks: Sequence[Task], maps: Maps, tried: int) -> str:
             return f"no grasp of {arm} is feasible in task {tasks[k].name}"
     if tried:
         return (
-            f"no placement exists on this grid: the handprints are apart in {tried}, "
+            f"no placement exists on this grid: the hands are apart in {tried}, "
             "but the arms meet in every configuration of each"
         )
     for run in hold_runs([task.arms for task in tasks]):
         alone = [maps[k, run.arm] for k in run.tasks]
         if not np.logical_and.reduce([m.feasible.any(axis=2) for m in alone]).any():
             return explain_conflict(alone)
-    return "no placement exists on this grid: wherever all arms can hold, their handprints share a cell"
+    return "no placement exists on this grid: wherever all arms can hold, their hands meet"
 
 
 def _climb(

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import combinations, islice, product
+from itertools import chain, combinations, islice, product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility import Cell
+from symgrasp.manifold import ROLLS, grasp_to_tool
 from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
-from symgrasp.planners.gaps import OVERLAP, PrintGaps
-from symgrasp.planners.holding import HoldingSearch, hold_runs
+from symgrasp.planners.free import best_free
+from symgrasp.planners.gaps import OVERLAP, PASSING, PrintGaps
+from symgrasp.planners.holding import HoldingSearch, hold_runs, turn_groups
+from symgrasp.planners.postures import Posture, Postures
 from symgrasp.planners.sequential import surface_margin
 from tests.conftest import load_small
 from tests.test_planners import map_of
@@ -25,6 +31,14 @@ def small():
     scene = load_small("log_two_robots", 6, 8)
     arms = list(scene.arms.values())
     return arms, scene.manifold, PrintGaps([*arms, arms[0]], scene.manifold)
+
+
+@cache
+def fine():
+    """A grid fine enough for hands that pass each other while their prints overlap."""
+    scene = load_small("log_two_robots", 24, 8)
+    arms = list(scene.arms.values())
+    return arms, scene.manifold, PrintGaps(arms, scene.manifold)
 
 
 def gap_by_hand(a: Cell, b: Cell) -> float:
@@ -106,7 +120,9 @@ def test_all_placements_best_first(seed, size):
             key = difference(cells)
             expected[key] = max(expected.get(key, 0.0), reached)
     search = together(maps)
-    found = list(search.best_first())
+    every = list(search.best_first())
+    found = [h for h in every if h.score >= 0]
+    assert every[: len(found)] == found
     assert {difference(h.cells) for h in found} == set(expected)
     assert len(found) == len(expected)
     scores = [h.score for h in found]
@@ -169,10 +185,141 @@ def test_sequences_by_trying_all_grasps(seed, tasks, density):
             best = max(best, reached)
     search = HoldingSearch(maps, tasks, gaps)
     found = next(search.best_first(), None)
-    assert (found is None) == (best < 0)
-    if found:
+    assert (found is not None and found.score >= 0) == (best >= 0)
+    if found and best >= 0:
         assert found.score == pytest.approx(best)
         assert all(search.turns(found.cells, k) for k in range(len(search.groups)))
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_wide_open_maps_by_brute_force(count):
+    """Where every cell is feasible, ties are everywhere: the best of all placements all the same."""
+    scene = load_small("log_two_robots", 12, 6)
+    arms, grid = list(scene.arms.values()), scene.manifold
+    everything = map_of(np.ones((2, 12, 6), dtype=bool), grid=grid)
+    gaps = PrintGaps([arms[k % 2] for k in range(count)], grid)
+    margin = surface_margin(everything).ravel()
+    line, column = np.divmod(np.arange(margin.size), 6)
+    table = gaps.table(0, 1)  # all hands are alike
+    gap = table.gaps[table.row[line[:, None], line], (column - column[:, None]) % 6]
+    pairs = np.minimum(gap, np.minimum(margin[:, None], margin))
+    best = -1.0
+    for first in np.flatnonzero(column == 0):
+        reached = np.minimum(pairs[first][:, None], np.minimum(pairs[first], pairs))
+        if count == 3:
+            best = max(best, reached.max())
+            continue
+        for second in np.flatnonzero(pairs[first] > best):
+            others = np.minimum(pairs[second][:, None], pairs[second])
+            best = max(best, min(pairs[first, second], np.minimum(reached, others).max()))
+    names = [str(k) for k in range(count)]
+    search = HoldingSearch({(0, name): everything for name in names}, [names], gaps)
+    found = next(search.best_first())
+    assert found.score == pytest.approx(best)
+    assert best > 0
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_hands_that_pass_each_other_come_last(seed):
+    """All placements whose prints overlap and whose hands do not meet for certain, once each."""
+    _, grid, gaps = fine()
+    rng = np.random.default_rng(seed)
+    maps = [map_of(rng.random((2, 24, 8)) < 0.06, grid=grid) for _ in range(2)]
+    table = gaps.passing(0, 1)
+    expected = set()
+    for a, b in product(*([Cell(*map(int, c)) for c in np.argwhere(m.feasible)] for m in maps)):
+        gap = table.gaps[table.row[a.roll * 24 + a.row, b.roll * 24 + b.row], (b.column - a.column) % 8]
+        if gap == PASSING:
+            expected.add(difference((a, b)))
+    found = list(HoldingSearch({(0, "a"): maps[0], (0, "b"): maps[1]}, [["a", "b"]], gaps).best_first())
+    passing = [h for h in found if h.score < 0]
+    assert {difference(h.cells) for h in passing} == expected
+    assert len(passing) == len(expected)
+    assume(passing)
+    assert found[len(found) - len(passing) :] == passing
+
+
+def test_hands_that_meet_do_meet():
+    """What the table excludes does intersect: some point lies in a body of each (linear programming)."""
+    arms, grid, gaps = fine()
+    apart, passing = gaps.table(0, 1), gaps.passing(0, 1)
+    rng = np.random.default_rng(0)
+    radius = float(grid.profile.radius(grid.h[0]))
+    bodies = arms[0].hand_bodies(arms[0].hand.opening(radius))
+    standoff = arms[0].hand.standoff(radius)
+
+    def placed(line, column):
+        roll, row = divmod(line, 24)
+        T = grasp_to_tool(np.eye(4), grid.h[row], column * grid.dtheta, ROLLS[roll], standoff)
+        return [points @ T[:3, :3].T + T[:3, 3] for points in bodies]
+
+    met = missed = passed = 0
+    for _ in range(300):
+        (a, b), column = rng.integers(0, 48, 2), int(rng.integers(0, 8))
+        if apart.gaps[apart.row[a, b], column] != OVERLAP:
+            continue
+        meets = passing.gaps[passing.row[a, b], column] == OVERLAP
+        really = any(share_a_point(x, y) for x, y in product(placed(a, 0), placed(b, column)))
+        assert really or not meets
+        met += meets
+        missed += really and not meets
+        passed += not really
+    assert met > 10
+    assert passed > 0
+    assert missed <= 0.2 * met
+
+
+def share_a_point(a: np.ndarray, b: np.ndarray) -> bool:
+    weights = np.block(
+        [[a.T, -b.T], [np.ones(len(a)), np.zeros(len(b))], [np.zeros(len(a)), np.ones(len(b))]]
+    )
+    return linprog(np.zeros(len(a) + len(b)), A_eq=weights, b_eq=[0, 0, 0, 1, 1]).success
+
+
+class Picky(Postures):
+    """Finds that bodies are free at some combinations of cells only."""
+
+    def __init__(self, maps, seed):
+        arms: Any = [SimpleNamespace(name=f"arm {k}") for k in range(len(maps))]
+        self.arms, self.maps, self.seed = arms, maps, seed
+
+    def find(self, cells, *, every=True):
+        free = np.random.default_rng([self.seed, *chain(*cells)]).random() < 0.05
+        return [Posture(arm, np.zeros(7), 0.0) for arm in self.arms] if free else None
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, 0.3, 1.0]))
+@settings(max_examples=60, deadline=None)
+def test_the_best_that_is_free(seed, density):
+    """Of all cells at which the bodies are free, none reach more; bodies are refused mostly."""
+    maps = random_maps(seed, 2, density)
+    desk = Picky(maps, seed)
+    best = -1.0
+    for cells in product(*([Cell(*map(int, c)) for c in np.argwhere(m.feasible)] for m in maps)):
+        reached = score(cells, maps)
+        if reached > best and desk.find(cells):
+            best = reached
+    _, steps = best_free(together(maps), [desk])
+    if best >= 0:
+        assert steps
+        assert score(steps[0].cells, maps) == pytest.approx(best)
+        assert desk.find(steps[0].cells)
+    elif steps:
+        assert apart(steps[0].cells) == OVERLAP
+
+
+def test_an_object_that_stands_is_not_turned():
+    """Tasks between which nobody holds on share their turn."""
+    assert turn_groups([["a"], ["a", "b"], ["b"]]) == [[0], [1], [2]]
+    assert turn_groups([["a"], ["b"], ["b"], ["a"]]) == [[0, 1], [2, 3]]
+    one, other = np.zeros((2, 2, 6, 8), dtype=bool)
+    one[0, 2, 3] = other[1, 3, 5] = True
+    keyed = {(0, "a"): map_of(one, grid=small()[1]), (1, "b"): map_of(other, grid=small()[1])}
+    search = HoldingSearch(keyed, [["a"], ["b"]], small()[2])
+    (found,) = search.best_first()
+    (turn,) = search.turns(found.cells, 0)
+    assert [c.turned(turn.columns, 8) for c in found.cells] == [Cell(0, 2, 3), Cell(1, 3, 5)]
 
 
 def test_hold_runs():
@@ -190,7 +337,7 @@ def test_whenever_hill_climbing_finds_something_so_does_the_exact_search():
         try:
             climbed = hill_climb(maps, arms, lambda cells: True, seed, Climb(5, 30))
         except NoPlanError:
-            only_exact += best is not None
+            only_exact += best is not None and best.score >= 0
             continue
         assert best is not None
         assert best.score >= score(climbed.cells, maps)

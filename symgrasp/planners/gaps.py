@@ -9,14 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from symgrasp.manifold import ROLLS, Manifold
+from symgrasp.manifold import ROLLS, Manifold, grasp_to_tool
+from symgrasp.planners.passing import Hands
 from symgrasp.poses import Array
 from symgrasp.robot import Arm
 
-__all__ = ["OVERLAP", "GapTable", "PrintGaps"]
+__all__ = ["OVERLAP", "PASSING", "GapTable", "PrintGaps"]
 
 OVERLAP = -1.0
 """The gap of prints that share a cell."""
+
+PASSING = -0.25
+"""The gap of prints that share a cell where the hands may pass each other, one behind the other."""
 
 
 class GapTable(NamedTuple):
@@ -50,12 +54,17 @@ class PrintGaps:
     def __init__(self, arms: Sequence[Arm], grid: Manifold) -> None:
         self.arms, self.grid = arms, grid
         self._kind = cache(self._kind_of)
-        self._shapes = cache(self._shapes_of)
+        self._lines = cache(self._lines_of)
         self._between = cache(self._compute)
+        self._passing = cache(self._compute_passing)
 
     def table(self, a: int, b: int) -> GapTable:
         """Return the gaps between all prints of arms a and b."""
         return self._between(self._kind(a), self._kind(b))
+
+    def passing(self, a: int, b: int) -> GapTable:
+        """Return the same with `PASSING` where the prints overlap and the hands do not meet for certain."""
+        return self._passing(self._kind(a), self._kind(b))
 
     def around(self, a: int, roll: int, row: int, b: int) -> Array:
         """Return the gaps (R, H, A) from arm a's print at a roll, row and column 0 to all prints of arm b."""
@@ -66,40 +75,76 @@ class PrintGaps:
         """Return the first arm whose hand is the same as that of arm a."""
         return next(k for k in range(a + 1) if k == a or _same_hand(self.arms[k], self.arms[a], self.grid))
 
-    def _shapes_of(self, a: int) -> tuple[np.ndarray, list[tuple[np.ndarray, int]]]:
-        """Return the shape of each line's print (L,), and the shapes: cells, first row less the line's."""
+    def _lines_of(self, a: int) -> tuple[np.ndarray, list[_Line]]:
+        """Return which kind each line is (L,), and the kinds: lines that differ by their height alone."""
         known: dict[tuple, int] = {}
-        shapes, ids = [], []
+        kinds, ids = [], []
         for roll, row in np.ndindex(len(ROLLS), self.grid.heights):
             p = self.arms[a].handprint(self.grid, row, roll)
-            key = (p.first_row - row, p.cells.shape, p.cells.tobytes())
+            radius = float(self.grid.profile.radius(self.grid.h[row]))
+            key = (roll, radius, p.first_row - row, p.cells.shape, p.cells.tobytes())
             if key not in known:
-                known[key] = len(shapes)
-                shapes.append((p.cells, p.first_row - row))
+                known[key] = len(kinds)
+                kinds.append(_Line(roll, radius, p.first_row - row, p.cells))
             ids.append(known[key])
-        return np.array(ids), shapes
+        return np.array(ids), kinds
+
+    def _pairs_of(self, a: int, b: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return pairs (K, 3) of kinds of lines and rows apart, and which one two lines are (L, L)."""
+        row = np.tile(np.arange(self.grid.heights), len(ROLLS))
+        kinds = np.broadcast_arrays(self._lines(a)[0][:, None], self._lines(b)[0], row - row[:, None])
+        unique, inverse = np.unique(np.stack(kinds, axis=-1).reshape(-1, 3), axis=0, return_inverse=True)
+        return unique, np.ascontiguousarray(inverse.reshape(len(row), len(row)))
 
     def _compute(self, a: int, b: int) -> GapTable:
-        """The gap depends on the two shapes and on how many rows they are apart: each once."""
-        (ids_a, shapes_a), (ids_b, shapes_b) = self._shapes(a), self._shapes(b)
-        row = np.tile(np.arange(self.grid.heights), len(ROLLS))
-        apart = row[None, :] - row[:, None]
-        keys = np.stack([*np.broadcast_arrays(ids_a[:, None], ids_b[None, :], apart)], axis=-1)
-        unique, inverse = np.unique(keys.reshape(-1, 3), axis=0, return_inverse=True)
-        gaps = np.empty((len(unique), self.grid.angles))
+        pairs, row = self._pairs_of(a, b)
+        gaps = np.empty((len(pairs), self.grid.angles))
         steps = (self.grid.dh, self.grid.dtheta * self.grid.profile.r_max)
-        low = min(0, *(first for _, first in shapes_b)) - self.grid.heights
-        high = self.grid.heights + max(first + len(cells) for cells, first in shapes_b)
-        for s, (cells, first) in enumerate(shapes_a):
-            around = np.zeros((max(high, first + len(cells)) - min(low, first), self.grid.angles), np.bool_)
-            bottom = min(low, first)
-            around[first - bottom : first - bottom + len(cells)] = cells
+        lines_a, lines_b = self._lines(a)[1], self._lines(b)[1]
+        low = min(line.first for line in lines_b) - self.grid.heights
+        high = max(line.first + len(line.cells) for line in lines_b) + self.grid.heights
+        for kind, line in enumerate(lines_a):
+            bottom, top = min(low, line.first), max(high, line.first + len(line.cells))
+            around = np.zeros((top - bottom, self.grid.angles), np.bool_)
+            around[line.first - bottom : line.first - bottom + len(line.cells)] = line.cells
             field = _distance_field(around, *steps)
-            for t in np.flatnonzero(unique[:, 0] == s):
-                other, offset = shapes_b[unique[t, 1]]
-                _smallest(field, other, int(unique[t, 2]) + offset - bottom, gaps[t])
+            for t in np.flatnonzero(pairs[:, 0] == kind):
+                other = lines_b[pairs[t, 1]]
+                _smallest(field, other.cells, int(pairs[t, 2]) + other.first - bottom, gaps[t])
         gaps.setflags(write=False)
-        return GapTable(np.ascontiguousarray(inverse.reshape(apart.shape)), gaps)
+        return GapTable(row, gaps)
+
+    def _compute_passing(self, a: int, b: int) -> GapTable:
+        pairs, row = self._pairs_of(a, b)
+        gaps = self._between(a, b).gaps.copy()
+        hands = cache(lambda *radii: Hands(self._bodies(a, radii[0]), self._bodies(b, radii[1])))
+        for t, (kind_a, kind_b, apart) in enumerate(pairs.tolist()):
+            overlap = gaps[t] == OVERLAP
+            if overlap.any():
+                line_a, line_b = self._lines(a)[1][kind_a], self._lines(b)[1][kind_b]
+                tools = self._tool(a, line_a, 0.0), self._tool(b, line_b, apart * self.grid.dh)
+                meet = hands(line_a.radius, line_b.radius).meet(*tools, overlap)
+                gaps[t, overlap & ~meet] = PASSING
+        gaps.setflags(write=False)
+        return GapTable(row, gaps)
+
+    def _bodies(self, a: int, radius: float) -> list[Array]:
+        """Return the bodies of a hand in its tool frame, open for a radius (m)."""
+        return self.arms[a].hand_bodies(self.arms[a].hand.opening(radius))
+
+    def _tool(self, a: int, line: _Line, h: float) -> Array:
+        """Return the tool pose (4, 4) on the object at column 0 and a height (m)."""
+        standoff = self.arms[a].hand.standoff(line.radius)
+        return grasp_to_tool(np.eye(4), h, 0.0, ROLLS[line.roll], standoff)
+
+
+class _Line(NamedTuple):
+    """A hand at a line: roll, radius (m), first row of its print less the line's own, and the print."""
+
+    roll: int
+    radius: float
+    first: int
+    cells: np.ndarray
 
 
 def _same_hand(a: Arm, b: Arm, grid: Manifold) -> bool:

@@ -3,15 +3,16 @@
 An arm keeps its grasp (h, θ, roll) as long as it holds on, which is a *hold*: a run of consecutive
 tasks. In every task the object may be turned about its axis, the same for all arms in it; that
 turn is a whole number of columns, k. So task by task, all arms in it must be feasible on their own
-maps at ``column + k``, and hold by hold, prints that are on the object together must not share a
-cell. Where nobody holds on from one task to the next, the object stands still, and both tasks have
-one turn. One grasp for a sequence and several hands in one task are the two special cases: one
-hold over all tasks, and one task with a hold for every arm.
+maps at ``column + k``, and hold by hold, hands that are on the object together must be apart: best
+where their prints share no cell, and failing that where the hands themselves do not meet. Where
+nobody holds on from one task to the next, the object stands still, and both tasks have one turn.
+One grasp for a sequence and several hands in one task are the two special cases: one hold over all
+tasks, and one task with a hold for every arm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
@@ -19,12 +20,15 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.feasibility import Cell, FeasibilityMap
-from symgrasp.planners.gaps import PrintGaps
+from symgrasp.planners.gaps import GapTable, PrintGaps
 from symgrasp.planners.placements import Problem, explore
 from symgrasp.planners.sequential import check_same_grid, surface_margin
 from symgrasp.poses import Array
 
 __all__ = ["HoldRun", "Holding", "HoldingSearch", "Turn", "hold_runs", "turn_groups"]
+
+LOWEST = -0.5
+"""Below the score of every placement, above that of none: `PASSING` counts, `OVERLAP` does not."""
 
 AT_ONCE = 64
 """Placements of one score that are listed at first; eight times as many whenever more are asked for."""
@@ -48,7 +52,7 @@ class Holding(NamedTuple):
     Attributes:
         cells: the grasp (roll, row, column) of every hold, in the order of the holds.
         score: the smallest (m) of the gaps between prints and, task by task at its best turn, of
-            the margins of the arms in it.
+            the margins of the arms in it; `PASSING` where prints overlap.
     """
 
     cells: tuple[Cell, ...]
@@ -138,26 +142,19 @@ class HoldingSearch:
                         self._margins[g, h] = margin if known is None else np.minimum(known, margin)
 
     def best_first(self) -> Iterator[Holding]:
-        """Yield every choice of grasps whose prints are apart and that is feasible at some turn of each task.
+        """Yield every choice of grasps that is feasible at some turn of each task, the hands apart.
 
         In falling order of the score, so the first is the best, and nothing yielded means that
-        nothing exists. Turning all grasps and tasks of the sequence together changes nothing, so
-        the first hold keeps column 0. Of equal scores of a single hold, the larger clearance comes
-        first.
+        nothing exists. Last come those whose prints overlap and whose hands may still pass each
+        other. Turning all grasps and tasks of the sequence together changes nothing, so the first
+        hold keeps column 0. Of equal scores of a single hold, the larger clearance comes first.
         """
         if len(self.holds) == 1:
             yield from self._lines()
             return
-        ceiling, best = np.inf, np.empty((1, len(self.holds), 2), dtype=np.int64)
-        while True:
-            found, score = explore(self._problem, -0.5, ceiling, True, best)
-            if not found:
-                return
-            yield self._holding(best[0], score)
-            for place in self._all_of(score):
-                if not np.array_equal(place, best[0]):
-                    yield self._holding(place, score)
-            ceiling = score
+        yield from self._below(np.inf, self._problem(self.gaps.table))
+        if self._meetings:
+            yield from self._below(0.0, self._problem(self.gaps.passing))
 
     def turns(self, cells: Sequence[Cell], group: int, enough: float = np.inf) -> list[Turn]:
         """Return the turns at which all arms of a group of tasks are feasible, best margin first.
@@ -215,13 +212,26 @@ class HoldingSearch:
         for k in np.lexsort((-np.array(clearance), -alone[lines])):
             yield self._holding(np.array([[lines[k], 0]]), float(alone[lines[k]]))
 
-    def _all_of(self, score: float) -> Iterator[np.ndarray]:
+    def _below(self, ceiling: float, problem: Problem) -> Iterator[Holding]:
+        """Yield all placements whose score is below a ceiling, best first."""
+        best = np.empty((1, len(self.holds), 2), dtype=np.int64)
+        while True:
+            found, score = explore(problem, LOWEST, ceiling, True, best)
+            if not found:
+                return
+            yield self._holding(best[0], score)
+            for place in self._all_of(score, problem):
+                if not np.array_equal(place, best[0]):
+                    yield self._holding(place, score)
+            ceiling = score
+
+    def _all_of(self, score: float, problem: Problem) -> Iterator[np.ndarray]:
         """Yield all placements (n, 2) of a score."""
         done, room = 0, AT_ONCE
         while True:
             places = np.empty((room, len(self.holds), 2), dtype=np.int64)
             above, below = np.nextafter(score, -np.inf), np.nextafter(score, np.inf)
-            count, _ = explore(self._problem, above, below, False, places)
+            count, _ = explore(problem, above, below, False, places)
             yield from places[done:count]
             if count < room:
                 return
@@ -233,7 +243,12 @@ class HoldingSearch:
         return Holding(tuple(cells), float(score))
 
     @cached_property
-    def _problem(self) -> Problem:
+    def _meetings(self) -> list[tuple[int, int]]:
+        """The pairs of holds that are on the object together."""
+        pairs = combinations(range(len(self.holds)), 2)
+        return [(a, b) for a, b in pairs if set(self.holds[a].tasks) & set(self.holds[b].tasks)]
+
+    def _problem(self, gaps_of: Callable[[int, int], GapTable]) -> Problem:
         n, (_, _, angles) = len(self.holds), self._shape
         lines = self._alone.shape[1]
         shared = [g for g in range(len(self.groups)) if sum(other == g for other, _ in self._margins) > 1]
@@ -244,13 +259,13 @@ class HoldingSearch:
                 if (group, h) in self._margins:
                     part[h, column] = len(margins)
                     margins.append(self._margins[group, h])
-        table, rows, gaps = np.full((n, n), -1), [], []
-        for a, b in combinations(range(n), 2):
-            if set(self.holds[a].tasks) & set(self.holds[b].tasks):
-                table[a, b] = len(rows)
-                found = self.gaps.table(a, b)
-                rows.append(found.row + sum(len(g) for g in gaps))
-                gaps.append(found.gaps)
+        table, rows, gaps, first = np.full((n, n), -1), [], [], 0
+        for pair in self._meetings:
+            found = gaps_of(*pair)
+            table[pair] = len(rows)
+            rows.append(found.row + first)
+            gaps.append(found.gaps)
+            first += len(found.gaps)
         return Problem(
             order=np.argsort(-self._alone, axis=1, kind="stable"),
             alone=self._alone,
