@@ -6,7 +6,7 @@ limits, free of collision, and free along the straight retreat where the scene a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -54,10 +54,20 @@ class Judge:
         arm: the arm.
         ik: its inverse kinematics.
         approach: length (m) of the straight retreat against the approach that must be free too.
+        near: says which obstacles and other robots could be in the way at joint values (n,) that
+            reach a tool pose (4, 4) in the frame of the robot's base, for those who know; all are
+            asked about if None.
     """
 
-    def __init__(self, world: BulletWorld, arm: Arm, ik: ClosedFormIK, approach: float) -> None:
-        self.world, self.arm, self.ik = world, arm, ik
+    def __init__(
+        self,
+        world: BulletWorld,
+        arm: Arm,
+        ik: ClosedFormIK,
+        approach: float,
+        near: Callable[[Array, Array], Collection[str]] | None = None,
+    ) -> None:
+        self.world, self.arm, self.ik, self._near = world, arm, ik, near
         steps = int(np.ceil(approach / RETREAT_STEP - 1e-9))
         self._retreat = [translation([0, 0, -approach * (k + 1) / steps]) for k in range(steps)]
 
@@ -80,8 +90,7 @@ class Judge:
         self, T_base_tool: Array, q: Array, sample: int, opening: float
     ) -> tuple[Reason, Collision | None]:
         """Return at which stage a candidate inside the limits fails, or FEASIBLE, and its collision."""
-        self.world.set_arm(self.arm, q, opening)
-        collision = self.world.first_collision(self.arm)
+        collision = self._collision(T_base_tool, q, opening)
         if collision:
             return collision.reason, collision
         for step in self._retreat:
@@ -89,11 +98,14 @@ class Judge:
             if follow is None:
                 return Reason.APPROACH_BLOCKED, None
             q = follow
-            self.world.set_arm(self.arm, q, opening)
-            collision = self.world.first_collision(self.arm)
+            collision = self._collision(T_base_tool @ step, q, opening)
             if collision:
                 return Reason.APPROACH_BLOCKED, collision
         return Reason.FEASIBLE, None
+
+    def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
+        self.world.set_arm(self.arm, q, opening)
+        return self.world.first_collision(self.arm, self._near(q, T_base_tool) if self._near else None)
 
     def _follow(self, T_base_tool: Array, q: Array, sample: int) -> Array | None:
         """Return the configuration at the same φ that continues q to the next pose, if any does."""

@@ -11,7 +11,7 @@ import ctypes
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -414,14 +414,21 @@ class BulletWorld:
 
     # -- questions --------------------------------------------------------------------------
 
-    def first_collision(self, arm: Arm) -> Collision | None:
+    def first_collision(self, arm: Arm, near: Collection[str] | None = None) -> Collision | None:
         """Return the deepest collision of the first stage at which the arm collides, or None.
 
         Stages in order: with its own robot, the object, obstacles, other robots. Links that no
         joint moves are not checked against obstacles; the hand's touch links may touch the object.
+
+        Args:
+            arm: the arm.
+            near: the obstacles and other robots that could be in the way; all of them if None.
         """
         stage: list[Collision] = []
         for query in self._queries[arm.name]:
+            far = near is not None and query.reason in _KEPT_AT_A_DISTANCE
+            if far and self._names[query.b] not in near:
+                continue
             if stage and query.reason != stage[0].reason:
                 break
             stage += self._ask(query)

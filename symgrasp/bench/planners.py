@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import NamedTuple
@@ -67,10 +67,10 @@ class _CountingWorld(BulletWorld):
 
     checks = 0
 
-    def first_collision(self, arm: Arm) -> Collision | None:
+    def first_collision(self, arm: Arm, near: Collection[str] | None = None) -> Collision | None:
         """Count, and answer."""
         self.checks += 1
-        return super().first_collision(arm)
+        return super().first_collision(arm, near)
 
 
 def without_the_manifold(runs: int) -> Iterator[Figure]:

@@ -19,7 +19,7 @@ from symgrasp.poses import Array
 
 __all__ = [
     "HIT_BAND", "UNDECIDED", "Body", "Scratch", "check_arm", "check_hand", "check_round",
-    "new_scratch", "place_arm", "place_hand",
+    "mark_near", "new_scratch", "place_arm", "place_hand",
 ]  # fmt: skip
 
 FREE_BAND = 1e-5
@@ -219,6 +219,24 @@ def check_arm(body, solids, tree, scratch, margin, gap, best):
             hit[2], hit[3] = hit[0], hit[1]
             return gap
     return gap
+
+
+@njit(**FAST)
+def mark_near(body, tree, scratch, reach, near):
+    """Mark which of the pieces that stand still have a box within ``reach`` (m) of one that moves.
+
+    Args:
+        near: (P,) bool receives the marks.
+    """
+    for k in range(len(body.frame)):
+        node = 0
+        while node < len(tree.skip):
+            if _far(scratch.box, k, node, tree.box, reach):
+                node = tree.skip[node]
+                continue
+            if tree.piece[node] >= 0:
+                near[tree.piece[node]] = True
+            node += 1
 
 
 @njit(**FAST)

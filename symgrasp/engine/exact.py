@@ -14,7 +14,7 @@ import numpy as np
 
 from symgrasp.candidates import RETREAT_STEP, Judge
 from symgrasp.engine import search
-from symgrasp.engine.checks import HIT_BAND
+from symgrasp.engine.checks import FREE_BAND, HIT_BAND, mark_near, new_scratch, place_arm, place_hand
 from symgrasp.engine.rig import Rig, can_rig, rig
 from symgrasp.engine.solids import pose_rows
 from symgrasp.feasibility import CLEARANCE_LIMIT, FeasibilityMap, Progress
@@ -78,8 +78,10 @@ class ExactEngine:
         self._opening = np.array([arm.hand.opening(float(r)) for r in radii])
         self._fit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
         self._order = _spread(len(ik.phi))
+        self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._rig: Rig = rig(world, arm, self._opening)
+        self._scratch = new_scratch(self._rig.pose, self._rig.solids, arm.dof)
 
     @staticmethod
     def knows(arm: Arm) -> bool:
@@ -154,7 +156,7 @@ class ExactEngine:
         pose[self._rig.body.objects] = pose_rows(axis_frame(T_world_object))
         goals = search.Goals(
             order=self._order,
-            T_world_base=np.ascontiguousarray(self.arm.robot.T_world_base),
+            T_world_base=self._T_world_base,
             T_base_tool=np.ascontiguousarray(T_base_tool[:, rows].reshape(-1, 4, 4)),
             row=np.tile(rows, len(ROLLS)),
             retreat=_retreat(self.scene.settings.approach),
@@ -186,8 +188,9 @@ class ExactEngine:
     def _decide(
         self, draft: Draft, cell: tuple[int, ...], T_base_tool: Array, listed: list[tuple[Array, int, int]]
     ) -> None:
-        """Let PyBullet decide the candidates of an open cell."""
-        judge = Judge(self.world, self.arm, self.ik, self.scene.settings.approach)
+        """Let PyBullet decide the candidates of an open cell, against what their boxes do not rule out."""
+        near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
+        judge = Judge(self.world, self.arm, self.ik, self.scene.settings.approach, near)
         before: Collision | None = None
         for q, sample, branch in listed:
             draft.asked += 1
@@ -201,6 +204,15 @@ class ExactEngine:
                 if before and _same(before, collision):
                     return  # and it would be for all others, because the tool pose alone decides it
                 before = collision
+
+    def _near(self, q: Array, T_base_tool: Array, row: int) -> set[str]:
+        """Return what stands near the arm: all else is certified free."""
+        rig, scratch = self._rig, self._scratch
+        place_hand(rig.body, rig.solids, scratch, self._T_world_base, T_base_tool, row)
+        place_arm(rig.body, rig.solids, scratch, q)
+        near = np.zeros(len(rig.names), dtype=bool)
+        mark_near(rig.body, rig.tree, scratch, self.world.margin + FREE_BAND, near)
+        return {rig.names[k].body for k in np.flatnonzero(near)}
 
     def _fixed(self, collision: Collision) -> bool:
         """Whether a collision is one of bodies that the tool pose alone places."""

@@ -47,7 +47,7 @@ __all__ = [
 RETREAT_TURN = 0.5
 """As in `symgrasp.candidates`."""
 
-OPEN_KEPT = 6
+OPEN_KEPT = 32
 """Undecided candidates of a cell that are listed; where there are more, all must be gone through."""
 
 UNREACHABLE, LIMITS, HIT, BLOCKED, OPEN, FEASIBLE = 0, 1, 2, 3, 4, 5
