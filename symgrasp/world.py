@@ -426,8 +426,8 @@ class BulletWorld:
         """
         stage: list[Collision] = []
         for query in self._queries[arm.name]:
-            far = near is not None and query.reason in _KEPT_AT_A_DISTANCE
-            if far and self._names[query.b] not in near:
+            stands = query.reason in _KEPT_AT_A_DISTANCE
+            if stands and near is not None and self._names[query.b] not in near:
                 continue
             if stage and query.reason != stage[0].reason:
                 break
