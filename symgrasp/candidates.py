@@ -17,7 +17,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot import Arm
 from symgrasp.world import BulletWorld, Collision
 
-__all__ = ["Candidate", "Judge"]
+__all__ = ["RETREAT_STEP", "RETREAT_TURN", "Candidate", "Judge"]
 
 RETREAT_STEP = 0.01
 """Largest step (m) between the poses that are checked along a retreat."""

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
+from symgrasp.candidates import RETREAT_TURN
 from symgrasp.engine.checks import (
     FREE_BAND,
     UNDECIDED,
@@ -43,9 +44,6 @@ __all__ = [
     "Goals",
     "search",
 ]
-
-RETREAT_TURN = 0.5
-"""As in `symgrasp.candidates`."""
 
 OPEN_KEPT = 32
 """Undecided candidates of a cell that are listed; where there are more, all must be gone through."""
