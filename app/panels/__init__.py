@@ -1,0 +1,1 @@
+"""The parts of the page beside the 3D view: widgets, what they do, how they follow the state."""

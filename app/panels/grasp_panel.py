@@ -1,0 +1,43 @@
+"""The picked grasp: where it is, and how the arm holds it or why it cannot."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.panels.panel import Actions, Panel
+from app.readout import grasp_html
+from app.state import Pick, State
+from app.values import RollChoice
+
+__all__ = ["GraspPanel"]
+
+
+class GraspPanel(Panel):
+    """Picks a grasp by numbers and says what becomes of it."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        with gui.add_folder("Grasp"):
+            self.h = gui.add_number("h (cm)", 0.0, step=0.1)
+            self.theta = gui.add_number("θ (°)", 0.0, min=-180.0, max=180.0, step=0.1)
+            pick = lambda s, _: s.choose(self.h.value / 100, np.deg2rad(self.theta.value))  # noqa: E731
+            self.on(self.h, pick, "inputs")
+            self.on(self.theta, pick, "inputs")
+            self.roll = self.choice("Roll", [roll.value for roll in RollChoice])
+            self.on(self.roll, lambda s, v: s.choose_roll(RollChoice(v)))
+            self.grasp = self.html()
+            self.button("Let go", viser.Icon.HAND_OFF, lambda: actions.change(State.clear_pick), color="gray")
+
+    def show(self, state: State) -> None:
+        """Say what becomes of the grasp."""
+        profile = state.scene.profile
+        self.h.min, self.h.max = 100 * profile.h_min, 100 * profile.h_max
+        self.grasp.show(grasp_html(state))
+
+    def write_inputs(self, state: State) -> None:
+        """Show where the grasp is."""
+        pick = state.pick or Pick(state.scene.profile.h_min, 0.0)
+        self.h.value = round(100 * pick.h, 2)
+        self.theta.value = round(float(np.rad2deg(pick.theta)), 2)
+        self.roll.value = state.roll.value

@@ -1,0 +1,104 @@
+"""Which object, and where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import viser
+
+from app.panels.panel import Actions, Panel, within
+from app.state import State
+from app.things import UNITS, UPLOAD_LIMIT, choices
+from symgrasp.mesh_io import MESH_ENDINGS
+
+__all__ = ["ObjectPanel"]
+
+TURN_STEP = 0.25
+"""Step of the rotation slider (degrees): one column of the map's picture."""
+
+REACH = 200.0
+"""How far (cm) the object may be moved from the world's origin."""
+
+COLOURS = ("map", "symmetry error")
+"""What the object's surface may show."""
+
+
+class ObjectPanel(Panel):
+    """Chooses the object, turns it and moves it about."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        with gui.add_folder("Object"):
+            self._build_choice()
+            self._build_pose()
+
+    def _build_choice(self) -> None:
+        gui = self.gui
+        self.thing = self.choice("Object", choices())
+        self.on_choice(self.thing, self.actions.choose_object)
+        limit = (
+            f"{', '.join(ending[1:].upper() for ending in MESH_ENDINGS)}; at most {UPLOAD_LIMIT / 1e6:g} MB"
+        )
+        self.unit = self.choice("Mesh unit", tuple(UNITS), hint="What one unit of an uploaded mesh is.")
+        self.upload = gui.add_upload_button(
+            "Upload a mesh",
+            icon=viser.Icon.UPLOAD,
+            color="gray",
+            mime_type=",".join(MESH_ENDINGS),
+            hint=limit,
+        )
+        self.upload.on_upload(
+            lambda _: self.actions.upload(
+                self.upload.value.name, self.upload.value.content, UNITS[self.unit.value]
+            )
+        )
+        self.colours = self.choice("Colours", COLOURS, visible=False)
+        self.on(self.colours, lambda s, v: replace(s, errors=v == COLOURS[1]))
+
+    def _build_pose(self) -> None:
+        gui = self.gui
+        self.turn = gui.add_slider(
+            "Rotation (°)", -180.0, 180.0, TURN_STEP, 0.0,
+            hint="Turn the object about its own axis: the map only shifts.",
+        )  # fmt: skip
+        self.on(self.turn, lambda s, v: s.turn(np.deg2rad(v)), "inputs")
+        self.position = {
+            axis: gui.add_slider(f"{axis} (cm)", -REACH, REACH, 0.5, 0.0) for axis in ("x", "y", "z")
+        }
+        for axis, slider in self.position.items():
+            self.on(slider, lambda s, v, axis=axis: s.move(**{axis: v / 100}), "inputs")
+        self.lean = gui.add_slider(
+            "Lean (°)", 0.0, 180.0, 1.0, 0.0, hint="Angle between the object's axis and the vertical."
+        )
+        self.on(self.lean, lambda s, v: s.move(lean=np.deg2rad(v)), "inputs")
+        self.towards = gui.add_slider(
+            "Lean to (°)", -180.0, 180.0, 1.0, 0.0, hint="Direction the axis leans to; 0 is along x."
+        )
+        self.on(self.towards, lambda s, v: s.move(towards=np.deg2rad(v)), "inputs")
+        self.gizmo = gui.add_checkbox("Drag handles", False)
+        self.on(self.gizmo, lambda s, v: replace(s, gizmo=v))
+        self.button(
+            "Put it back",
+            viser.Icon.ARROW_BACK_UP,
+            lambda: self.actions.change(State.reset_pose),
+            color="gray",
+        )
+
+    def show(self, state: State) -> None:
+        """Offer the object that was uploaded as well."""
+        if self.thing.options != (things := choices(state.uploaded)):
+            self.thing.options = things
+
+    def write_inputs(self, state: State) -> None:
+        """Show the object and its pose."""
+        base = state.base
+        self.turn.value = within(self.turn, np.rad2deg(state.delta))
+        for axis, slider in self.position.items():
+            slider.value = within(slider, 100 * getattr(base, axis))
+        self.lean.value = within(self.lean, np.rad2deg(base.lean))
+        self.towards.value = within(self.towards, np.rad2deg(base.towards))
+        self.thing.value = state.choice
+        self.colours.visible = bool(state.thing and state.thing.measurement)
+        self.colours.value = COLOURS[state.errors]
+        self.gizmo.value = state.gizmo

@@ -1,0 +1,113 @@
+"""What all panels have in common: how widgets change the state, and how they are brought up to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import viser
+
+from app.state import State
+
+__all__ = ["Actions", "Change", "Html", "Panel", "within"]
+
+Change = Callable[[State], State]
+
+
+class Actions(Protocol):
+    """What the widgets ask for beyond a change of the state."""
+
+    def change(self, change: Change, origin: str = "") -> None:
+        """Apply a change; widgets of that origin are not written back."""
+
+    def open_scene(self, name: str) -> None:
+        """Load another scene."""
+
+    def choose_object(self, choice: str) -> None:
+        """Put another object into the scene."""
+
+    def choose_hand(self, hand: str) -> None:
+        """Mount another hand on the chosen arm."""
+
+    def upload(self, name: str, content: bytes, scale: float) -> None:
+        """Measure a mesh and put the object into the scene."""
+
+    def plan(self, kind: str) -> None:
+        """Run a planner."""
+
+    def stop_or_retry(self) -> None:
+        """Stop the computation, or begin the one that was stopped again."""
+
+    def download(self) -> None:
+        """Send the plan as a file."""
+
+
+class Html:
+    """A piece of HTML that is only sent when it changes."""
+
+    def __init__(self, gui: viser.GuiApi, content: str = "") -> None:
+        self._handle, self._content = gui.add_html(content), content
+
+    def show(self, content: str) -> None:
+        """Show this from now on."""
+        if content != self._content:
+            self._content = self._handle.content = content
+
+
+class Panel:
+    """Some widgets of one browser; made where they are to appear.
+
+    Args:
+        gui: where to add them.
+        actions: what they do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        self.gui, self.actions = gui, actions
+
+    def show(self, state: State) -> None:
+        """Bring what is only seen up to the state."""
+
+    def write_inputs(self, state: State) -> None:
+        """Bring what a person can change up to the state; not while a person is changing it."""
+
+    def html(self, content: str = "") -> Html:
+        """Add HTML."""
+        return Html(self.gui, content)
+
+    def button(
+        self, label: str, icon: viser.IconName, do: Callable[[], None], **look: Any
+    ) -> viser.GuiButtonHandle:
+        """Add a button and say what it does."""
+        button = self.gui.add_button(label, icon=icon, **look)
+        button.on_click(lambda _: do())
+        return button
+
+    def choice(
+        self, label: str, options: Sequence[str] = ("…",), **look: Any
+    ) -> viser.GuiDropdownHandle[str]:
+        """Add a dropdown; its options may be known later."""
+        return self.gui.add_dropdown(label, options, **look)
+
+    def on(self, widget: Any, change: Callable[[State, Any], State], origin: str = "") -> None:
+        """Let a widget change the state; what the page itself writes into it does not count.
+
+        Widgets that a person drags or types in have the origin "inputs": they are not written back
+        meanwhile.
+        """
+
+        @widget.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                value = widget.value
+                self.actions.change(lambda state: change(state, value), origin)
+
+    def on_choice(self, widget: Any, do: Callable[[str], None]) -> None:
+        """Say what a choice of a person does."""
+        widget.on_update(lambda event: do(widget.value) if event.client is not None else None)
+
+
+def within(slider: viser.GuiSliderHandle[float], value: float) -> float:
+    """Return a value as a slider can show it."""
+    return float(np.clip(round(value / slider.step) * slider.step, slider.min, slider.max))

@@ -1,0 +1,57 @@
+"""Which scene, task, arm and hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import viser
+
+from app.panels.panel import Actions, Panel
+from app.state import State
+from symgrasp.hand import HANDS
+
+__all__ = ["ScenePanel"]
+
+MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
+"""Hands that can be mounted where a scene mounts one."""
+
+
+class ScenePanel(Panel):
+    """Chooses what is shown.
+
+    Args:
+        gui: where to add the widgets.
+        actions: what they do.
+        scenes: names to choose from.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions, scenes: tuple[str, ...]) -> None:
+        super().__init__(gui, actions)
+        with gui.add_folder("Scene"):
+            self.scene = self.choice("Scene", scenes)
+            self.task = self.choice("Task")
+            self.arm = self.choice("Arm")
+            self.hand = self.choice("Hand", MOUNTABLE, visible=False)
+            self.board = gui.add_checkbox("Flat map", True)
+        self.on_choice(self.scene, actions.open_scene)
+        self.on_choice(self.hand, actions.choose_hand)
+        self.on(self.task, lambda s, v: s.choose_task(v))
+        self.on(self.arm, lambda s, v: s.choose_arm(v))
+        self.on(self.board, lambda s, v: replace(s, board=v))
+
+    def show(self, state: State) -> None:
+        """Offer what the scene has."""
+        if self.task.options != (tasks := tuple(state.scene.tasks)):
+            self.task.options = tasks
+        if self.arm.options != (arms := state.scene.task(state.task).arms):
+            self.arm.options = arms
+
+    def write_inputs(self, state: State) -> None:
+        """Show what is chosen."""
+        self.scene.value = state.scene_name
+        self.task.value, self.arm.value = state.task, state.arm
+        hand = state.scene.mounted.get(state.arm)
+        self.hand.visible = hand is not None
+        if hand is not None:
+            self.hand.value = hand
+        self.board.value = state.board

@@ -1,0 +1,42 @@
+"""What to try, what is going on, and the button that stops it."""
+
+from __future__ import annotations
+
+import viser
+
+from app.panels.panel import Actions, Panel
+from app.readout import notes_html, status_html
+from app.state import State
+
+__all__ = ["NotesPanel", "StatusPanel"]
+
+
+class StatusPanel(Panel):
+    """Always takes the same room: nothing below it may jump while it is being dragged."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        self.status = self.html('<div class="sg">Loading the scene …</div>')
+        self.progress = gui.add_progress_bar(0.0)
+        self.stop = self.button("Cancel", viser.Icon.X, actions.stop_or_retry, color="gray", disabled=True)
+
+    def show(self, state: State) -> None:
+        """Say what is being done."""
+        self.status.show(status_html(state))
+        retry = state.busy is None and not state.is_current
+        self.progress.value = 100 * state.busy.share if state.busy else 0.0
+        self.stop.label = "Compute the map" if retry else "Cancel"
+        self.stop.icon = viser.Icon.REFRESH if retry else viser.Icon.X
+        self.stop.disabled = state.busy is None and not retry
+
+
+class NotesPanel(Panel):
+    """What went wrong, and what the object is inside of."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        self.notes = self.html()
+
+    def show(self, state: State) -> None:
+        """Say it."""
+        self.notes.show(notes_html(state))
