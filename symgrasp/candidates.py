@@ -17,13 +17,18 @@ from symgrasp.reason import Reason
 from symgrasp.robot import Arm
 from symgrasp.world import BulletWorld, Collision
 
-__all__ = ["RETREAT_STEP", "RETREAT_TURN", "Candidate", "Judge"]
+__all__ = ["RETREAT_STEP", "RETREAT_TURN", "Candidate", "Fate", "Judge", "retreated"]
 
 RETREAT_STEP = 0.01
 """Largest step (m) between the poses that are checked along a retreat."""
 
 RETREAT_TURN = 0.5
 """Largest change of a joint (rad) in one such step; more is another branch, not a motion."""
+
+
+def retreated(T_base_tool: Array, distance: float) -> Array:
+    """Return a tool pose (4, 4) moved back against its approach by a distance (m)."""
+    return T_base_tool @ translation([0, 0, -distance])
 
 
 class Candidate(NamedTuple):
@@ -44,6 +49,22 @@ class Candidate(NamedTuple):
     branch: int
     fate: Reason
     collision: Collision | None
+
+
+class Fate(NamedTuple):
+    """What became of a candidate inside the limits.
+
+    Attributes:
+        reason: the stage at which it failed, or FEASIBLE.
+        collision: the deepest collision of that stage, None where it is not a collision.
+        retreat: how far (m) from the grasp that was, along the retreat; the whole length if FEASIBLE.
+        q: (n,) joint values there, or the last ones before the arm could not follow.
+    """
+
+    reason: Reason
+    collision: Collision | None
+    retreat: float
+    q: Array
 
 
 class Judge:
@@ -69,7 +90,7 @@ class Judge:
     ) -> None:
         self.world, self.arm, self.ik, self._near = world, arm, ik, near
         steps = int(np.ceil(approach / RETREAT_STEP - 1e-9))
-        self._retreat = [translation([0, 0, -approach * (k + 1) / steps]) for k in range(steps)]
+        self._retreat = [approach * (k + 1) / steps for k in range(steps)]
 
     def candidates(self, T_base_tool: Array, opening: float) -> Iterator[Candidate]:
         """Yield the candidates of a tool pose (4, 4), by φ, then by branch, each decided as it is asked for.
@@ -83,25 +104,24 @@ class Judge:
             sample, branch = int(solutions.sample[k]), int(solutions.branch[k])
             fate, collision = Reason.JOINT_LIMITS, None
             if solutions.inside[k]:
-                fate, collision = self.fate(T_base_tool, q, sample, opening)
+                fate, collision, *_ = self.fate(T_base_tool, q, sample, opening)
             yield Candidate(q, float(self.ik.phi[sample]), sample, branch, fate, collision)
 
-    def fate(
-        self, T_base_tool: Array, q: Array, sample: int, opening: float
-    ) -> tuple[Reason, Collision | None]:
-        """Return at which stage a candidate inside the limits fails, or FEASIBLE, and its collision."""
+    def fate(self, T_base_tool: Array, q: Array, sample: int, opening: float) -> Fate:
+        """Return at which stage a candidate inside the limits fails, or FEASIBLE."""
         collision = self._collision(T_base_tool, q, opening)
         if collision:
-            return collision.reason, collision
-        for step in self._retreat:
-            follow = self._follow(T_base_tool @ step, q, sample)
+            return Fate(collision.reason, collision, 0.0, q)
+        for distance in self._retreat:
+            T = retreated(T_base_tool, distance)
+            follow = self._follow(T, q, sample)
             if follow is None:
-                return Reason.APPROACH_BLOCKED, None
+                return Fate(Reason.APPROACH_BLOCKED, None, distance, q)
             q = follow
-            collision = self._collision(T_base_tool @ step, q, opening)
+            collision = self._collision(T, q, opening)
             if collision:
-                return Reason.APPROACH_BLOCKED, collision
-        return Reason.FEASIBLE, None
+                return Fate(Reason.APPROACH_BLOCKED, collision, distance, q)
+        return Fate(Reason.FEASIBLE, None, self._retreat[-1] if self._retreat else 0.0, q)
 
     def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
         self.world.set_arm(self.arm, q, opening)

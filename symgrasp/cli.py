@@ -88,6 +88,18 @@ def _parser() -> argparse.ArgumentParser:
     map_.add_argument("--arm", metavar="NAME", help="arm (default: the task's first)")
     map_.add_argument("--out", metavar="FILE", type=Path, help="write the map: .npz, .png or .json")
 
+    explain = add("explain", _explain, "List every candidate of one cell of a map and what becomes of it.")
+    add_scene(explain)
+    explain.add_argument("--h", metavar="M", type=float, required=True, help="height along the axis (m)")
+    explain.add_argument(
+        "--theta", metavar="DEG", type=float, required=True, help="angle around it (degrees)"
+    )
+    explain.add_argument(
+        "--roll", type=int, choices=(0, 180), default=0, help="degrees (default: %(default)s)"
+    )
+    explain.add_argument("--task", metavar="NAME", help="task (default: the first)")
+    explain.add_argument("--arm", metavar="NAME", help="arm (default: the task's first)")
+
     plan = add("plan", _plan, "Plan grasps and write the plan as JSON.")
     plan.add_argument("kind", choices=tuple(METHODS), help="which planner")
     add_scene(plan)
@@ -162,6 +174,35 @@ def _map(args: argparse.Namespace) -> int:
         with write_atomically(args.out) as file:
             file.write(_map_content(the_map, args.out.suffix))
         print(f"written to {args.out}")
+    return 0
+
+
+def _explain(args: argparse.Namespace) -> int:
+    from symgrasp.maps import MapMaker
+    from symgrasp.reason import Reason
+    from symgrasp.world import BulletWorld
+
+    scene = _checked(args.scene)
+    task = scene.task(args.task)
+    arm = scene.arm(args.arm or task.arms[0])
+    row, column = scene.manifold.cell(args.h, math.radians(args.theta))
+    with BulletWorld(scene) as world, _computing("candidates") as progress:
+        cell = (args.roll // 180, row, column)
+        found = MapMaker(world, scene).explain(arm.name, task, cell, progress=progress)
+    h, theta = 100 * scene.manifold.h[row], _deg(scene.manifold.theta[column])
+    print(
+        f"{scene.name}: {task.name} with {arm.name}, the cell at "
+        f"h = {h:.1f} cm, θ = {theta:.1f}°, roll {args.roll}°: {found.reason.label}"
+    )
+    if found.reason < Reason.UNREACHABLE:
+        print("no candidates: the hand rules the cell out, whatever the arm does")
+        return 0
+    counts = [f"{count} {reason.label}" for reason, count in found.counts().items()]
+    text = f"{len(found.verdicts)} candidates: {', '.join(counts)}" if counts else "no candidates"
+    print(f"{text}; {found.unreachable} of {len(found.phi)} redundancy samples have none")
+    for verdict in found.verdicts:
+        phi = _deg(verdict.phi)
+        print(f"  φ {phi:7.1f}°  branch {verdict.branch}  {verdict.reason.label:18}  {verdict.why}")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""The maps of a scene: by the exact engine, or as Algorithm 1 is written."""
+"""The maps of a scene: by the exact engine, or as Algorithm 1 is written; and their cells explained."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from symgrasp.algorithm1 import create_map_reference
 from symgrasp.engine import ExactEngine
-from symgrasp.feasibility import FeasibilityMap, Progress
+from symgrasp.explain import Explanation, explain
+from symgrasp.feasibility import Cell, FeasibilityMap, Progress
+from symgrasp.ik import ClosedFormIK, solver_for
 from symgrasp.manifold import Manifold
 from symgrasp.robot import Arm
 from symgrasp.scene import Scene
@@ -35,6 +37,7 @@ class MapMaker:
     def __init__(self, world: BulletWorld, scene: Scene) -> None:
         self.world, self.scene = world, scene
         self._engines: dict[str, ExactEngine | None] = {}
+        self._solvers: dict[str, ClosedFormIK] = {}
 
     def map(
         self,
@@ -53,6 +56,31 @@ class MapMaker:
         if engine:
             return engine.map(the_task, grid, progress)
         return create_map_reference(self.world, self.scene, the_arm, the_task, grid, progress)
+
+    def explain(
+        self,
+        arm: str | None,
+        task: Task | str | None,
+        cell: Cell | tuple[int, int, int],
+        *,
+        manifold: Manifold | None = None,
+        progress: Progress | None = None,
+    ) -> Explanation:
+        """Say what becomes of every candidate of a cell; see `symgrasp.explain.explain`.
+
+        Args:
+            arm: name of the arm; the task's first if None.
+            task: the task or its name; the scene's first if None. It need not be one of the scene's.
+            cell: (roll, row, column).
+            manifold: another grid than the scene's.
+            progress: told the finished share; may raise `Cancelled`.
+        """
+        the_task = task if isinstance(task, Task) else self.scene.task(task)
+        the_arm = self.scene.arm(arm or the_task.arms[0])
+        if the_arm.name not in self._solvers:
+            self._solvers[the_arm.name] = solver_for(the_arm, self.scene.settings.redundancy)
+        ik, grid = self._solvers[the_arm.name], manifold or self.scene.manifold
+        return explain(self.world, the_arm, ik, the_task, grid, Cell(*cell), progress)
 
     def _engine(self, arm: Arm, grid: Manifold) -> ExactEngine | None:
         """Return an arm's engine for a grid's heights, or None where the engine does not know the arm."""

@@ -156,6 +156,7 @@ class BulletWorld:
             self._obstacles = [self._load_obstacle(o) for o in scene.obstacles]
             self._object = self._load_object()
             self._joints = {name: self._movable(name) for name in self._robots}
+            self._values: dict[str, Array] = {}  # joint values of each robot, as set last
             self._queries = {arm.name: self._arm_queries(arm) for arm in scene.arms.values()}
             self._parked_queries = {name: self._parked(name) for name in self._robots}
             self.set_object(scene.task().T_world_object)
@@ -333,9 +334,22 @@ class BulletWorld:
 
     def set_robot(self, robot: str, values: ArrayLike) -> None:
         """Put all joints (n,) of a robot, in the order of its model's ``joint_names``."""
-        self._set(robot, np.asarray(values, dtype=float))
+        self._set(robot, np.array(values, dtype=float))
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Leave robots, object and margin as they were before the ``with`` block."""
+        values, pose, margin = dict(self._values), self._object_pose, self.margin
+        try:
+            yield
+        finally:
+            self.margin = margin
+            self.set_object(pose)
+            for robot, joints in values.items():
+                self._set(robot, joints)
 
     def _set(self, robot: str, values: Array) -> None:
+        self._values[robot] = values
         joints = self._joints[robot]
         pybullet.resetJointStatesMultiDof(
             self._robots[robot],
@@ -434,6 +448,14 @@ class BulletWorld:
             stage += self._ask(query)
         return max(stage, key=lambda c: c.depth, default=None)
 
+    def arm_collisions(self, arm: Arm) -> list[Collision]:
+        """Return all collisions of an arm: by stage in the order of `first_collision`, then deepest first.
+
+        Each pair of bodies comes once, so the first one is that of `first_collision`.
+        """
+        found = _deepest(c for query in self._queries[arm.name] for c in self._ask(query))
+        return sorted(found, key=lambda c: c.reason)
+
     def collisions(self, arms: Sequence[Arm]) -> list[Collision]:
         """Return all collisions of several arms at once, deepest first.
 
@@ -452,10 +474,7 @@ class BulletWorld:
         for name, queries in self._parked_queries.items():
             if name not in busy:
                 found += [c for query in queries for c in self._ask(query)]
-        deepest: dict[object, Collision] = {}
-        for c in sorted(found, key=lambda c: -c.depth):
-            deepest.setdefault((frozenset((c.a, c.b)), c.reason), c)
-        return list(deepest.values())
+        return _deepest(found)
 
     def object_contacts(self, margin: float = 0.0) -> list[Collision]:
         """Return the obstacles that the object is inside of, or within ``margin`` (m) of, deepest first."""
@@ -548,6 +567,14 @@ def check_tasks(scene: Scene) -> None:
                         task.name,
                         f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
                     )
+
+
+def _deepest(found: Iterable[Collision]) -> list[Collision]:
+    """Return the deepest collision of each pair of bodies, deepest first."""
+    deepest: dict[object, Collision] = {}
+    for c in sorted(found, key=lambda c: -c.depth):
+        deepest.setdefault((frozenset((c.a, c.b)), c.reason), c)
+    return list(deepest.values())
 
 
 def _pose(position: Sequence[float], xyzw: Sequence[float]) -> Array:

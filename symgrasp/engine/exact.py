@@ -194,7 +194,7 @@ class ExactEngine:
         before: Collision | None = None
         for q, sample, branch in listed:
             draft.asked += 1
-            fate, collision = judge.fate(T_base_tool, q, sample, float(self._opening[cell[1]]))
+            fate, collision, *_ = judge.fate(T_base_tool, q, sample, float(self._opening[cell[1]]))
             if fate == Reason.FEASIBLE:
                 draft.feasible(cell, q, sample, branch)
                 return

@@ -60,8 +60,8 @@ def _check_witness(
     witness = m.witness(cell)
     assert witness is not None
     assert np.allclose(arm.tool_pose(witness.q), T_base_tool, atol=TOLERANCE)
-    fate, _ = judge.fate(T_base_tool, witness.q, witness.sample, witness.opening)
-    assert fate == Reason.FEASIBLE
+    fate = judge.fate(T_base_tool, witness.q, witness.sample, witness.opening)
+    assert fate.reason == Reason.FEASIBLE
     world.set_arm(arm, witness.q, witness.opening)
     assert 0 <= witness.clearance <= world.clearance(arm, 0.1) + TOLERANCE
 
@@ -75,7 +75,7 @@ def _check_collision(
     inside = np.flatnonzero(solutions.inside)
     if reason == Reason.APPROACH_BLOCKED:
         fates = (
-            judge.fate(T_base_tool, solutions.q[k], int(solutions.sample[k]), opening)[0] for k in inside
+            judge.fate(T_base_tool, solutions.q[k], int(solutions.sample[k]), opening).reason for k in inside
         )
         assert reason in fates
         return
