@@ -142,13 +142,26 @@ class Plan(_Part):
             PlanError: the file is missing or is not such a plan.
         """
         try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            content = Path(path).read_bytes()
+        except OSError as error:
             raise PlanError(path, "file", str(error), "a readable JSON file") from error
+        return Plan.parse(content, str(path))
+
+    @staticmethod
+    def parse(content: str | bytes, source: str) -> Plan:
+        """Read the content of a plan file; ``source`` names it in errors.
+
+        Raises:
+            PlanError: it is not such a plan.
+        """
         try:
-            return Plan.model_validate(content)
+            data = json.loads(content)
+        except (ValueError, RecursionError) as error:
+            raise PlanError(source, "file", str(error), "a readable JSON file") from error
+        try:
+            return Plan.model_validate(data)
         except ValidationError as error:
-            raise PlanError(path, *describe(error, content)) from None
+            raise PlanError(source, *describe(error, data)) from None
 
 
 def plan_schema() -> dict[str, Any]:

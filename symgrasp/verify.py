@@ -17,6 +17,7 @@ import numpy as np
 
 from symgrasp.candidates import Judge
 from symgrasp.errors import SymgraspError
+from symgrasp.feasibility import Progress
 from symgrasp.ik import solver_for
 from symgrasp.plan import CLEARANCE_LIMIT, Hold, Plan, PlanTask, Pose
 from symgrasp.poses import Array, from_position_quat, inverse, pose_error, rotation_z
@@ -59,8 +60,13 @@ class Report:
         return bool(ok)
 
 
-def verify(plan: Plan) -> Report:
-    """Check every statement of a plan; see the module's text for what that takes."""
+def verify(plan: Plan, progress: Progress | None = None) -> Report:
+    """Check every statement of a plan; see the module's text for what that takes.
+
+    Args:
+        plan: the plan.
+        progress: told the finished share; may raise `Cancelled`.
+    """
     report = Report()
     canonical = json.dumps(plan.scene.content, sort_keys=True).encode()
     digest = hashlib.sha256(canonical).hexdigest()
@@ -78,15 +84,21 @@ def verify(plan: Plan) -> Report:
     _check_order(plan, scene, report)
     with BulletWorld(scene) as world:
         _check_grasps_stay(plan, world, report)
+        holds = [(k, task, hold) for k, task in enumerate(plan.tasks) for hold in task.holds]
+        parts = len(plan.tasks) + len(holds)
         for k, task in enumerate(plan.tasks):
             where = f"tasks[{k}] ({task.name})"
+            if progress:
+                progress(k / parts)
             if _check_poses(task, where, scene, report):
                 _check_holds(task, where, scene, world, report)
         if not report.failures:  # margins are those of grasps that hold
-            for k, task in enumerate(plan.tasks):
-                for hold in task.holds:
-                    who = f"tasks[{k}] ({task.name}): {hold.arm}"
-                    _check_margins(hold, task.object_pose_turned.array(), who, world, report)
+            for done, (k, task, hold) in enumerate(holds, start=len(plan.tasks)):
+                who = f"tasks[{k}] ({task.name}): {hold.arm}"
+                tell = (lambda share, done=done: progress((done + share) / parts)) if progress else None
+                _check_margins(hold, task.object_pose_turned.array(), who, world, report, tell)
+    if progress:
+        progress(1.0)
     return report
 
 
@@ -250,7 +262,9 @@ def _tool_of(arm: Arm, T: Array, h: float, theta: float, flipped: bool, radius: 
     return T @ tool
 
 
-def _check_margins(hold: Hold, T: Array, who: str, world: BulletWorld, report: Report) -> None:
+def _check_margins(
+    hold: Hold, T: Array, who: str, world: BulletWorld, report: Report, progress: Progress | None
+) -> None:
     """Check that a grasp closer by a cell than each margin is still feasible, one arm at a time."""
     scene = world.scene
     arm, grid, g = scene.arm(hold.arm), scene.manifold, hold.grasp
@@ -262,15 +276,19 @@ def _check_margins(hold: Hold, T: Array, who: str, world: BulletWorld, report: R
         ("margin_along", hold.margin_along / grid.dh, grid.heights, (grid.dh, 0.0)),
         ("margin_around", hold.margin_around / grid.dtheta, grid.angles // 2, (0.0, grid.dtheta)),
     )
+    cells: list[tuple[str, int, float, float]] = []
     for text, count, limit, step in margins:
+        if not report.expect(count <= limit + 1e-6, f"{who}: {text} is larger than the object"):
+            continue
         whole = abs(count - round(count)) < 1e-6 and count > 0
         report.expect(whole, f"{who}: {text} is {count:.4f} cells, not a whole number above zero")
-        report.expect(count <= limit + 1e-6, f"{who}: {text} is larger than the object")
-        for k in range(1, min(round(count), limit)):
-            for sign in (-1, 1):
-                h, theta = g.h + sign * k * step[0], g.theta + sign * k * step[1]
-                free = _feasible(judge, world, T, h, theta, g.roll)
-                report.expect(free, f"{who}: {text} is overstated: {sign * k:+d} cells away is infeasible")
+        signed = [sign * k for k in range(1, round(count)) for sign in (-1, 1)]
+        cells += [(text, k, g.h + k * step[0], g.theta + k * step[1]) for k in signed]
+    for done, (text, away, h, theta) in enumerate(cells):
+        if progress:
+            progress(done / len(cells))
+        free = _feasible(judge, world, T, h, theta, g.roll)
+        report.expect(free, f"{who}: {text} is overstated: {away:+d} cells away is infeasible")
 
 
 def _feasible(judge: Judge, world: BulletWorld, T: Array, h: float, theta: float, roll: float) -> bool:
