@@ -8,8 +8,9 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
+from itertools import islice, repeat
 from pathlib import Path
 from textwrap import indent
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,8 @@ from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.scene_file import scene_schema
 
 if TYPE_CHECKING:
-    from symgrasp.feasibility import FeasibilityMap
+    from symgrasp.feasibility import FeasibilityMap, Progress
+    from symgrasp.plan import Plan
 
 __all__ = ["main"]
 
@@ -100,17 +102,20 @@ def _parser() -> argparse.ArgumentParser:
     explain.add_argument("--task", metavar="NAME", help="task (default: the first)")
     explain.add_argument("--arm", metavar="NAME", help="arm (default: the task's first)")
 
-    plan = add("plan", _plan, "Plan grasps and write the plan as JSON.")
+    plan = add("plan", _plan, "Plan grasps: write a plan as JSON, or list all there are.")
     plan.add_argument("kind", choices=tuple(METHODS), help="which planner")
     add_scene(plan)
-    plan.add_argument("--out", metavar="FILE", type=Path, required=True, help="the plan file to write")
+    plan.add_argument("--out", metavar="FILE", type=Path, help="the plan file to write")
+    plan.add_argument("--list", metavar="N", type=_whole(1), help="list the N best plans, one a line")
+    text = "write the K-th best plan (default: 1), as numbered by --list"
+    plan.add_argument("--number", metavar="K", type=_whole(1), default=1, help=text)
     plan.add_argument("--arm", metavar="NAME", help="sequential: the arm (default: the first task's)")
     text = "; ".join(
         f"{kind}: {methods[0]} (default), {', '.join(methods[1:])}" for kind, methods in METHODS.items()
     )
     plan.add_argument("--method", metavar="METHOD", help=f"{text}; the first is the default")
     plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
-    plan.add_argument("--seed", type=_natural, default=0, help="hill_climb: seed (default: %(default)s)")
+    plan.add_argument("--seed", type=_whole(0), default=0, help="hill_climb: seed (default: %(default)s)")
 
     verify = add("verify", _verify, "Check a plan: 0 it holds, 1 it does not, 2 it cannot be read.")
     verify.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
@@ -215,39 +220,75 @@ def _map_content(the_map: FeasibilityMap, ending: str) -> bytes:
 
 
 def _plan(args: argparse.Namespace) -> int:
-    from symgrasp.planning import plan_bimanual, plan_handover, plan_sequential
+    from symgrasp.listing import place_in_words
+    from symgrasp.planning import plan_bimanual, plan_sequential
 
-    _check_folder(args.out)
+    if args.out:
+        _check_folder(args.out)
+    elif not args.list:
+        raise InputError("command line", "--out", None, "the plan file to write, or --list")
     methods = METHODS[args.kind]
     method: Any = args.method or methods[0]
     if method not in methods:
         raise InputError("command line", "--method", method, one_of(methods, method))
+    if method != methods[0] and (args.list or args.number > 1):
+        raise InputError("command line", "--method", method, f"{methods[0]}: {method} finds one plan only")
     scene = _checked(args.scene)
     with _computing(f"{args.kind} plan") as progress:
-        if args.kind == "sequential":
+        if method == methods[0]:
+            plan = _listed(args, scene, progress)
+        elif args.kind == "sequential":
             plan = plan_sequential(scene, args.arm, method=method, progress=progress)
-        elif args.kind == "bimanual":
-            plan = plan_bimanual(scene, args.task, method=method, seed=args.seed, progress=progress)
         else:
-            plan = plan_handover(scene, progress=progress)
-    plan.save(args.out)
-    for task in plan.tasks:
-        print(f"{task.name}: turn the object by {_deg(task.delta):.1f}°")
-        for hold in task.holds:
-            grasp = hold.grasp
-            print(
-                f"  {hold.arm} holds at h = {100 * grasp.h:.1f} cm, θ = {_deg(grasp.theta):.1f}°, "
-                f"roll {_deg(grasp.roll):.0f}°, {1e3 * hold.clearance:.1f} mm clear"
-            )
-    print(f"written to {args.out}")
+            plan = plan_bimanual(scene, args.task, method=method, seed=args.seed, progress=progress)
+    if args.out:
+        plan.save(args.out)
+        for task in plan.tasks:
+            print(f"{task.name}: turn the object by {_deg(task.delta):.1f}°")
+            for hold in task.holds:
+                print(
+                    f"  {hold.arm} holds at {place_in_words(hold.grasp)}, {1e3 * hold.clearance:.1f} mm clear"
+                )
+        print(f"written to {args.out}")
     return 0
+
+
+def _listed(args: argparse.Namespace, scene: Scene, progress: Progress | None) -> Plan:
+    """Print the best plans as far as asked for; return the one whose number is asked for."""
+    from symgrasp.listing import intervals_in_words, plan_in_words
+    from symgrasp.planners.sequential import common_grasps
+    from symgrasp.planning import bimanual_plans, handover_plans, sequential_maps, sequential_plans
+
+    notes: Iterator[str] = repeat("")
+    if args.kind == "sequential":
+        maps = sequential_maps(scene, args.arm, progress)
+        plans = sequential_plans(scene, args.arm, maps)
+        grasps = common_grasps(list(maps.values()))  # in the order of the plans
+        notes = (f"\n      {intervals_in_words(grasp, list(maps.values()))}" for grasp in grasps)
+    elif args.kind == "bimanual":
+        plans = bimanual_plans(scene, args.task, progress=progress)
+    else:
+        plans = handover_plans(scene, progress=progress)
+    chosen, count = None, 0
+    with closing(plans):
+        for count, plan in enumerate(islice(plans, max(args.list or 0, args.number)), start=1):
+            note = next(notes)
+            if count <= (args.list or 0):
+                print(f"{count:4}  {plan_in_words(plan)}{note}")
+            if count == args.number:
+                chosen = plan
+    if chosen is None:
+        raise InputError("command line", "--number", args.number, f"at most {count}: there are no more plans")
+    return chosen
 
 
 def _verify(args: argparse.Namespace) -> int:
     from symgrasp.plan import Plan
     from symgrasp.verify import verify
 
-    report = verify(Plan.load(args.plan))
+    plan = Plan.load(args.plan)
+    with _computing(f"verifying {args.plan.name}") as progress:
+        report = verify(plan, progress)
     for failure in report.failures:
         print(failure)
     verdict = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
@@ -346,11 +387,15 @@ def _check_folder(out: Path) -> None:
         raise InputError("command line", "--out", str(out), "a file, not a folder")
 
 
-def _natural(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise ValueError
-    return value
+def _whole(lowest: int) -> Callable[[str], int]:
+    """Return what reads a whole number of an option, from the lowest on."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < lowest:
+            raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from {lowest} on")
+        return int(text)
+
+    return read
 
 
 @contextmanager

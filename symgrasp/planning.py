@@ -1,39 +1,44 @@
-"""From a scene to a plan: maps, a planner, and what it decided written down."""
+"""From a scene to plans: maps, a planner, and what it decided written down.
+
+Every exact planner lists all its solutions, best first and lazily; the best plan is the first.
+"""
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Mapping, Sequence
-from importlib.metadata import version
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
-from symgrasp.errors import NoPlanError, SceneError
-from symgrasp.feasibility import Cell, FeasibilityMap, Progress
-from symgrasp.manifold import ROLLS, grasp_to_tool, wrap
+from symgrasp.errors import SceneError
+from symgrasp.feasibility import FeasibilityMap, Progress
 from symgrasp.maps import MapMaker
-from symgrasp.plan import CLEARANCE_LIMIT, Grasp, Hold, Plan, Planner, PlanTask, Pose, SceneRecord
-from symgrasp.planners.bimanual import Climb, hill_climb
-from symgrasp.planners.conflicts import explain_conflict, fewest_regrasps
-from symgrasp.planners.free import best_free
-from symgrasp.planners.gaps import PrintGaps
-from symgrasp.planners.holding import HoldingSearch, hold_runs
-from symgrasp.planners.postures import Posture, Postures
-from symgrasp.planners.sequential import first_common_grasp
-from symgrasp.poses import rotation_z
+from symgrasp.plan import Plan, Planner
+from symgrasp.plan_writing import write_plan
+from symgrasp.planners.bimanual import Climb, ClimbStep
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
+from symgrasp.solving import Maps, climb, first_grasp, holdings, with_regrasps
 from symgrasp.world import BulletWorld
 
-__all__ = ["plan_bimanual", "plan_handover", "plan_sequential"]
+__all__ = [
+    "Plans",
+    "bimanual_plans",
+    "handover_plans",
+    "plan_bimanual",
+    "plan_handover",
+    "plan_sequential",
+    "sequential_maps",
+    "sequential_plans",
+]
 
 BimanualMethod = Literal["exact", "hill_climb"]
 SequentialMethod = Literal["best", "first", "regrasp"]
 
-Maps = dict[tuple[int, str], FeasibilityMap]
-"""(index of the task, name of the arm) → map."""
+Plans = Generator[Plan]
+"""Plans, made when asked for, best first; `close` it when no more are wanted."""
 
 
 def plan_sequential(
@@ -55,29 +60,47 @@ def plan_sequential(
         progress: told the finished share; may raise `Cancelled`.
 
     Raises:
-        NoPlanError: no grasp serves all tasks; says which exclude each other.
+        ConflictError: no grasp serves all tasks; says which exclude each other.
         SceneError: no task is done by that arm alone.
     """
-    name = scene.arm(arm or scene.task().arms[0]).name
-    tasks = [task for task in scene.tasks.values() if task.arms == (name,)]
-    if not tasks:
-        names = [task.name for task in scene.tasks.values()]
-        expected = f"a task that {name} does alone; several arms are for the other planners"
-        raise SceneError(scene.source, "tasks", names, expected)
-    known = {(k, name): (maps or {})[task.name] for k, task in enumerate(tasks) if task.name in (maps or {})}
+    if method == "best":
+        return _best(sequential_plans(scene, arm, maps, progress))
+    name, tasks = _tasks_alone(scene, arm)
     with BulletWorld(scene) as world:
-        all_maps = _all_maps(world, tasks, known, progress)
-        chosen = [all_maps[k, name] for k in range(len(tasks))]
-        entries: list[PlanTask] = []
-        for visits in _visits(world, tasks, chosen, method):
-            part = [tasks[k] for k in visits]
-            part_maps = {(i, name): chosen[k] for i, k in enumerate(visits)}
-            if method == "first":
-                entries += _first(world, part, part_maps, name)
-            else:  # where it is set down, the object stays as it was turned
-                turned = entries[-1].delta if entries else 0.0
-                entries += _hold_best(world, part, part_maps, None, turned)[0]
-    return _plan(scene, "sequential", Planner(algorithm=method), entries)
+        all_maps = _maps_by_task(world, tasks, name, maps, progress)
+        if method == "first":
+            entries = first_grasp(world, tasks, all_maps, name)
+        else:
+            entries = with_regrasps(world, tasks, all_maps, name)
+    return write_plan(scene, "sequential", Planner(algorithm=method), entries)
+
+
+def sequential_plans(
+    scene: Scene,
+    arm: str | None = None,
+    maps: Mapping[str, FeasibilityMap] | None = None,
+    progress: Progress | None = None,
+) -> Plans:
+    """List the plans with one grasp for all tasks that an arm does alone, best first.
+
+    One for every height and roll that serves all tasks, each with its best turns: in the order of
+    `common_grasps`. Arguments and errors are those of `plan_sequential`.
+    """
+    name, tasks = _tasks_alone(scene, arm)
+    with BulletWorld(scene) as world:
+        all_maps = _maps_by_task(world, tasks, name, maps, progress)
+        for entries, _ in holdings(world, tasks, all_maps, progress):
+            yield write_plan(scene, "sequential", Planner(algorithm="best"), entries)
+
+
+def sequential_maps(
+    scene: Scene, arm: str | None = None, progress: Progress | None = None
+) -> dict[str, FeasibilityMap]:
+    """Return task → map for all tasks that an arm does alone, as `sequential_plans` takes them."""
+    name, tasks = _tasks_alone(scene, arm)
+    with BulletWorld(scene) as world:
+        maps = _maps_by_task(world, tasks, name, None, progress)
+    return {task.name: maps[k, name] for k, task in enumerate(tasks)}
 
 
 def plan_bimanual(
@@ -88,6 +111,7 @@ def plan_bimanual(
     seed: int = 0,
     limits: Climb | None = None,
     progress: Progress | None = None,
+    trace: list[ClimbStep] | None = None,
 ) -> Plan:
     """Place all arms of a task on the object so that they do not meet.
 
@@ -101,24 +125,36 @@ def plan_bimanual(
         seed: of the random choices of the hill climbing.
         limits: how long to climb.
         progress: told the finished share; may raise `Cancelled`.
+        trace: receives every position of the hill climbing, whether it finds something or not.
 
     Raises:
         NoPlanError: no placement exists, or the hill climbing found none.
         SceneError: no task needs several arms.
     """
-    together = [t for t in scene.tasks.values() if len(t.arms) > 1]
-    the_task = scene.task(task) if task or not together else together[0]
-    if len(the_task.arms) < 2:
-        expected = "two or more arms; one arm alone is for the sequential planner"
-        raise SceneError(scene.source, f"task {the_task.name}: arms", list(the_task.arms), expected)
-    known = {(0, arm): m for arm, m in (maps or {}).items()}
+    if method == "exact":
+        return _best(bimanual_plans(scene, task, maps, progress))
+    the_task = _task_together(scene, task)
     with BulletWorld(scene) as world:
-        all_maps = _all_maps(world, [the_task], known, progress)
-        if method == "exact":
-            entries, planner = _hold_best(world, [the_task], all_maps, progress)
-        else:
-            entries, planner = _climb(world, the_task, all_maps, seed, limits or Climb(), progress)
-    return _plan(scene, "bimanual", planner, entries)
+        all_maps = _maps_by_arm(world, the_task, maps, progress)
+        entry, planner = climb(world, the_task, all_maps, seed, limits or Climb(), progress, trace)
+    return write_plan(scene, "bimanual", planner, [entry])
+
+
+def bimanual_plans(
+    scene: Scene,
+    task: str | None = None,
+    maps: Mapping[str, FeasibilityMap] | None = None,
+    progress: Progress | None = None,
+) -> Plans:
+    """List the placements of all arms of a task, best first; neighbouring cells count as one.
+
+    Arguments and errors are those of `plan_bimanual`.
+    """
+    the_task = _task_together(scene, task)
+    with BulletWorld(scene) as world:
+        all_maps = _maps_by_arm(world, the_task, maps, progress)
+        for entries, planner in holdings(world, [the_task], all_maps, progress):
+            yield write_plan(scene, "bimanual", planner, entries)
 
 
 def plan_handover(
@@ -140,6 +176,18 @@ def plan_handover(
         NoPlanError: no grasps exist on this grid.
         SceneError: the object moves between two tasks that share no arm.
     """
+    return _best(handover_plans(scene, maps, progress))
+
+
+def handover_plans(
+    scene: Scene,
+    maps: Mapping[tuple[str, str], FeasibilityMap] | None = None,
+    progress: Progress | None = None,
+) -> Plans:
+    """List the plans for all tasks of a scene in order, best first; neighbouring cells count as one.
+
+    Arguments and errors are those of `plan_handover`.
+    """
     tasks = list(scene.tasks.values())
     for before, after in pairwise(tasks):
         still = np.array_equal(before.T_world_object, after.T_world_object)
@@ -154,177 +202,59 @@ def plan_handover(
                 expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
                 raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
         all_maps = _all_maps(world, tasks, known, progress)
-        entries, planner = _hold_best(world, tasks, all_maps, progress)
-    return _plan(scene, "handover", planner, entries)
+        for entries, planner in holdings(world, tasks, all_maps, progress):
+            yield write_plan(scene, "handover", planner, entries)
+
+
+def _best(plans: Plans) -> Plan:
+    with closing(plans):
+        return next(plans)
+
+
+def _tasks_alone(scene: Scene, arm: str | None) -> tuple[str, list[Task]]:
+    """Return an arm and the tasks that it does alone."""
+    name = scene.arm(arm or scene.task().arms[0]).name
+    tasks = [task for task in scene.tasks.values() if task.arms == (name,)]
+    if not tasks:
+        names = [task.name for task in scene.tasks.values()]
+        expected = f"a task that {name} does alone; several arms are for the other planners"
+        raise SceneError(scene.source, "tasks", names, expected)
+    return name, tasks
+
+
+def _task_together(scene: Scene, task: str | None) -> Task:
+    """Return a task that several arms do together."""
+    together = [t for t in scene.tasks.values() if len(t.arms) > 1]
+    found = scene.task(task) if task or not together else together[0]
+    if len(found.arms) < 2:
+        expected = "two or more arms; one arm alone is for the sequential planner"
+        raise SceneError(scene.source, f"task {found.name}: arms", list(found.arms), expected)
+    return found
+
+
+def _maps_by_task(
+    world: BulletWorld,
+    tasks: Sequence[Task],
+    arm: str,
+    known: Mapping[str, FeasibilityMap] | None,
+    progress: Progress | None,
+) -> Maps:
+    have = {(k, arm): known[task.name] for k, task in enumerate(tasks) if known and task.name in known}
+    return _all_maps(world, tasks, have, progress)
+
+
+def _maps_by_arm(
+    world: BulletWorld, task: Task, known: Mapping[str, FeasibilityMap] | None, progress: Progress | None
+) -> Maps:
+    return _all_maps(world, [task], {(0, arm): m for arm, m in (known or {}).items()}, progress)
 
 
 def _all_maps(world: BulletWorld, tasks: Sequence[Task], known: Maps, progress: Progress | None) -> Maps:
     """Return the maps of all arms in all tasks, computing those that are not known."""
     keys = [(k, arm) for k, task in enumerate(tasks) for arm in task.arms]
     maker = MapMaker(world, world.scene)
-    maps: Maps = {}
+    maps: dict[tuple[int, str], FeasibilityMap] = {}
     for done, (k, arm) in enumerate(keys):
         step = (lambda share, done=done: progress((done + share) / len(keys))) if progress else None
         maps[k, arm] = known.get((k, arm)) or maker.map(arm, tasks[k], progress=step)
     return maps
-
-
-def _visits(
-    world: BulletWorld, tasks: Sequence[Task], maps: Sequence[FeasibilityMap], method: SequentialMethod
-) -> list[list[int]]:
-    """Return for each grasp the tasks that it visits, in order.
-
-    A regrasp visits the task where the object is set down twice: at the end with the old grasp,
-    and at the beginning with the new one.
-    """
-    if method != "regrasp":
-        return [list(range(len(tasks)))]
-    resting = [k for k, task in enumerate(tasks) if world.rests(task.T_world_object)]
-    segments = fewest_regrasps(maps, resting)
-    if segments is None:
-        raise NoPlanError(explain_conflict(maps) + "; no regrasp helps")
-    visits, entry = [], []
-    for segment in segments:
-        leave = [] if segment.set_down is None else [segment.set_down]
-        visits.append([*entry, *range(segment.first, segment.last + 1), *leave])
-        entry = leave
-    return visits
-
-
-def _first(world: BulletWorld, tasks: Sequence[Task], maps: Maps, arm: str) -> list[PlanTask]:
-    found = first_common_grasp([maps[k, arm] for k in range(len(tasks))])
-    entries = []
-    for k, (cell, delta) in enumerate(zip(found.cells, found.deltas, strict=True)):
-        postures = Postures(world, [world.scene.arm(arm)], [maps[k, arm]]).witnesses([cell])
-        holds = [(postures[0], maps[k, arm], cell, found.grasp)]
-        entries.append(_task_entry(world, tasks[k], delta, holds))
-    return entries
-
-
-def _hold_best(
-    world: BulletWorld,
-    tasks: Sequence[Task],
-    maps: Maps,
-    progress: Progress | None,
-    turned: float = 0.0,
-) -> tuple[list[PlanTask], Planner]:
-    """Find the best grasps for a sequence, with configurations in which nothing collides.
-
-    Turning the object and all grasps on it by the same angle changes nothing, so the object can
-    stand in the first task as it is ``turned`` (rad, whole cells) already.
-    """
-    grid = next(iter(maps.values())).manifold
-    names = [task.arms for task in tasks]
-    holders = [world.scene.arm(run.arm) for run in hold_runs(names)]
-    search = HoldingSearch(maps, names, PrintGaps(holders, grid))
-    desks = [
-        Postures(world, [world.scene.arm(a) for a in task.arms], [maps[k, a] for a in task.arms])
-        for k, task in enumerate(tasks)
-    ]
-    tried, steps = best_free(search, desks, progress)
-    if steps is None:
-        raise NoPlanError(_why_not(tasks, maps, tried))
-    common = round(turned / grid.dtheta) - steps[0].turn
-    entries = []
-    for task, desk, step in zip(tasks, desks, steps, strict=True):
-        held = zip(step.postures, desk.maps, step.cells, strict=True)
-        holds = [(p, m, cell, cell.turned(-step.turn - common, grid.angles)) for p, m, cell in held]
-        delta = float(wrap((step.turn + common) * grid.dtheta))
-        entries.append(_task_entry(world, task, delta, holds))
-    statistics = {"placements": tried, "body_checks": sum(desk.body_checks for desk in desks)}
-    return entries, Planner(algorithm="exact", statistics=statistics)
-
-
-def _why_not(tasks: Sequence[Task], maps: Maps, tried: int) -> str:
-    for (k, arm), m in maps.items():
-        if not m.feasible.any():
-            return f"no grasp of {arm} is feasible in task {tasks[k].name}"
-    if tried:
-        return (
-            f"no placement exists on this grid: the hands are apart in {tried}, "
-            "but the arms meet in every configuration of each"
-        )
-    for run in hold_runs([task.arms for task in tasks]):
-        alone = [maps[k, run.arm] for k in run.tasks]
-        if not np.logical_and.reduce([m.feasible.any(axis=2) for m in alone]).any():
-            return explain_conflict(alone)
-    return "no placement exists on this grid: wherever all arms can hold, their hands meet"
-
-
-def _climb(
-    world: BulletWorld, task: Task, maps: Maps, seed: int, limits: Climb, progress: Progress | None
-) -> tuple[list[PlanTask], Planner]:
-    arms = [world.scene.arm(name) for name in task.arms]
-    chosen = [maps[0, name] for name in task.arms]
-    postures = Postures(world, arms, chosen)
-
-    def bodies_free(cells: Sequence[Cell]) -> bool:
-        return postures.find(cells, every=False) is not None
-
-    found = hill_climb(chosen, arms, bodies_free, seed, limits, progress)
-    held = zip(postures.witnesses(found.cells), chosen, found.cells, found.cells, strict=True)
-    planner = Planner(
-        algorithm="hill_climb",
-        seed=seed,
-        settings={"restarts": limits.restarts, "iterations": limits.iterations},
-        statistics={
-            "restarts": found.restarts,
-            "iterations": found.iterations,
-            "counted": found.counted,
-            "body_checks": found.body_checks,
-        },
-    )
-    return [_task_entry(world, task, 0.0, list(held))], planner
-
-
-def _task_entry(
-    world: BulletWorld, task: Task, delta: float, holds: Sequence[tuple[Posture, FeasibilityMap, Cell, Cell]]
-) -> PlanTask:
-    """Write one task; each hold is a posture, the arm's map, the cell on it, and the grasp itself."""
-    turned = task.T_world_object @ rotation_z(delta)
-    world.set_object(turned)
-    world.set_arms(posture for posture, *_ in holds)
-    entries = []
-    for (arm, q, opening), m, cell, grasp in holds:
-        margin = m.margin(cell)
-        h, theta = float(m.manifold.h[grasp.row]), float(m.manifold.theta[grasp.column])
-        roll = ROLLS[grasp.roll]
-        standoff = arm.hand.standoff(float(m.manifold.profile.radius(h)))
-        entries.append(
-            Hold(
-                arm=arm.name,
-                robot=arm.robot.name,
-                grasp=Grasp(h=h, theta=theta, roll=roll),
-                tool_pose=Pose.of(grasp_to_tool(turned, h, theta, roll, standoff)),
-                joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
-                hand_joints=arm.hand.joint_values(opening),
-                opening=opening,
-                clearance=world.clearance(arm, CLEARANCE_LIMIT),
-                margin_along=margin.along,
-                margin_around=margin.around,
-            )
-        )
-    return PlanTask(
-        name=task.name,
-        object_pose=Pose.of(task.T_world_object),
-        delta=delta,
-        object_pose_turned=Pose.of(turned),
-        holds=tuple(entries),
-    )
-
-
-def _plan(
-    scene: Scene,
-    kind: Literal["sequential", "bimanual", "handover"],
-    planner: Planner,
-    entries: list[PlanTask],
-) -> Plan:
-    packages = ("symgrasp", "numpy", "pybullet", "eaik")
-    return Plan(
-        kind=kind,
-        scene=SceneRecord(name=scene.name, sha256=scene.sha256, content=scene.content),
-        versions={"python": platform.python_version(), **{name: version(name) for name in packages}},
-        planner=planner,
-        robots={robot.name: robot.model.joint_names for robot in scene.robots.values()},
-        tasks=tuple(entries),
-    )

@@ -17,7 +17,7 @@ from symgrasp.errors import NoPlanError
 from symgrasp.feasibility import Cell
 from symgrasp.manifold import ROLLS, grasp_to_tool
 from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
-from symgrasp.planners.free import best_free
+from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import OVERLAP, PASSING, PrintGaps
 from symgrasp.planners.holding import HoldingSearch, hold_runs, turn_groups
 from symgrasp.planners.postures import Posture, Postures
@@ -300,13 +300,13 @@ def test_the_best_that_is_free(seed, density):
         reached = score(cells, maps)
         if reached > best and desk.find(cells):
             best = reached
-    _, steps = best_free(together(maps), [desk])
+    found = next(iter(FreePlacements(together(maps), [desk])), None)
     if best >= 0:
-        assert steps
-        assert score(steps[0].cells, maps) == pytest.approx(best)
-        assert desk.find(steps[0].cells)
-    elif steps:
-        assert apart(steps[0].cells) == OVERLAP
+        assert found
+        assert score(found.steps[0].cells, maps) == pytest.approx(best) == found.score
+        assert desk.find(found.steps[0].cells)
+    elif found:
+        assert apart(found.steps[0].cells) == OVERLAP
 
 
 def test_an_object_that_stands_is_not_turned():

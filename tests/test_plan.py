@@ -14,6 +14,7 @@ from symgrasp.errors import NoPlanError, PlanError, SceneError
 from symgrasp.manifold import grasp_to_tool
 from symgrasp.maps import create_map
 from symgrasp.plan import Plan, plan_schema
+from symgrasp.planners.conflicts import ConflictError, Shared
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.postures import Postures
 from symgrasp.planning import plan_bimanual, plan_handover, plan_sequential
@@ -258,8 +259,9 @@ def test_a_regrasp_where_one_grasp_does_not_do():
         return replace(maps[task], reason=reason)
 
     maps |= {"pick": only("pick", slice(0, 6)), "pour": only("pour", slice(6, 12))}
-    with pytest.raises(NoPlanError, match="no grasp serves pick and pour"):
+    with pytest.raises(ConflictError, match="no grasp serves pick and pour") as caught:
         plan_sequential(scene, maps=maps)
+    assert caught.value.conflict.regrasps == (Shared(("pick",), "place"), Shared(("pour", "place"), None))
     plan = plan_sequential(scene, maps=maps, method="regrasp")
     assert [task.name for task in plan.tasks] == ["pick", "place", "place", "pour", "place"]
     grasps = [task.holds[0].grasp for task in plan.tasks]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import combinations, pairwise, product
 
@@ -13,8 +14,16 @@ from hypothesis import strategies as st
 from symgrasp.errors import InputError, NoPlanError
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import Manifold, wrap
-from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
-from symgrasp.planners.conflicts import fewest_regrasps, height_gap, smallest_conflicts
+from symgrasp.planners.bimanual import Climb, ClimbStep, hill_climb, print_overlap
+from symgrasp.planners.conflicts import (
+    ConflictError,
+    Exclusion,
+    Shared,
+    fewest_regrasps,
+    find_conflict,
+    height_gap,
+    smallest_conflicts,
+)
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch
 from symgrasp.planners.sequential import common_grasps, first_common_grasp
@@ -58,7 +67,8 @@ def random_maps(draw: st.DrawFn, count: int) -> list[FeasibilityMap]:
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     density = draw(st.sampled_from([0.01, 0.03, 0.1, 0.4]))
     shape = (2, GRID.heights, GRID.angles)
-    return [map_of(rng.random(shape) < density, f"task {k}") for k in range(count)]
+    maps = [map_of(rng.random(shape) < density, f"task {k}") for k in range(count)]
+    return [replace(m, clearance=np.where(m.feasible, rng.integers(1, 9, shape), np.nan)) for m in maps]
 
 
 @given(st.integers(1, 5).flatmap(random_maps))
@@ -88,32 +98,43 @@ def test_first_common_grasp_by_brute_force(maps):
 @given(st.integers(1, 5).flatmap(random_maps))
 @settings(max_examples=100, deadline=None)
 def test_best_common_grasp_by_brute_force(maps):
-    """No other height, roll and choice of angles has a better worst margin."""
+    """No other height, roll and choice of angles has a better worst margin, or clearance of equal ones."""
     keyed = {(k, "arm"): m for k, m in enumerate(maps)}
     search = HoldingSearch(keyed, [["arm"]] * len(maps), no_gaps())
-    best = 0.0
+    best = (0.0, 0.0)
     for roll, row in product(range(2), range(5)):
         radius = float(GRID.profile.radius(GRID.h[row]))
-        worst = np.inf
-        for m in maps:
-            margins = [m.margin((roll, row, j)) for j in range(12) if m.feasible[roll, row, j]]
-            worst = min(worst, max((min(a, b * radius) for a, b in margins), default=0.0))
-        best = max(best, worst)
-    if best == 0.0:
+        cells = [[(roll, row, j) for j in range(12) if m.feasible[roll, row, j]] for m in maps]
+        if not all(cells):
+            continue
+        margin = [
+            {c: min(m.margin(c).along, m.margin(c).around * radius) for c in own}
+            for m, own in zip(maps, cells, strict=True)
+        ]
+        worst = min(max(own.values()) for own in margin)
+        clear = min(
+            max(m.clearance[c] for c in own if own[c] >= worst) for m, own in zip(maps, margin, strict=True)
+        )
+        best = max(best, (worst, float(clear)))
+    if best[0] == 0.0:
         assert next(search.best_first(), None) is None
         assert not common_grasps(maps)
         return
     found = next(search.best_first())
     (grasp,) = found.cells
-    reached = np.inf
+    reached = clear = np.inf
     for k, m in enumerate(maps):
-        turn = search.turns(found.cells, k)[0].columns
+        turn = search.turns(found.cells, k, found.score)[0].columns
         assert m.shift(turn * GRID.dtheta).feasible[grasp]
         cell = grasp.turned(turn, 12)
         along, around = m.margin(cell)
         reached = min(reached, along, around * float(GRID.profile.radius(GRID.h[cell.row])))
-    assert reached == pytest.approx(best) == found.score
-    assert common_grasps(maps)[0].margin == pytest.approx(best)
+        clear = min(clear, float(m.clearance[cell]))
+    assert (reached, clear) == pytest.approx(best)
+    assert found.score == reached
+    assert common_grasps(maps)[0][3:] == pytest.approx(best)
+    listed = [(cell.roll, cell.row) for (cell,) in (h.cells for h in search.best_first())]
+    assert listed == [(g.roll, g.row) for g in common_grasps(maps)]
 
 
 @given(st.integers(1, 4).flatmap(random_maps))
@@ -212,6 +233,25 @@ def test_why_there_is_no_common_grasp():
     assert "pour" not in text
 
 
+def test_conflicts_as_data():
+    """Pick low, pour high or low, place high: two exclude each other; a regrasp at the pour helps."""
+    low, high = np.zeros((2, 5, 12), dtype=bool), np.zeros((2, 5, 12), dtype=bool)
+    low[0, 0:2, 3] = True
+    high[0, 4, 3] = True
+    maps = [map_of(low, "pick"), map_of(low | high, "pour"), map_of(high, "place")]
+    with pytest.raises(ConflictError) as caught:
+        first_common_grasp(maps, resting=[1])
+    conflict = caught.value.conflict
+    assert conflict.exclusions == (Exclusion(("pick", "place"), height_gap([maps[0], maps[2]])),)
+    assert [task.task for task in conflict.heights] == ["pick", "pour", "place"]
+    assert conflict.heights[1].spans == ((pytest.approx((0.04, 0.12)), pytest.approx((0.36, 0.36))), ())
+    assert conflict.regrasps == (Shared(("pick",), "pour"), Shared(("pour", "place"), None))
+    assert str(caught.value).endswith("each part does: pick, set down at pour; pour and place")
+    assert find_conflict(maps).regrasps is None
+    assert find_conflict(maps, [0]).regrasps == ()
+    assert str(find_conflict(maps, [0])).endswith("no regrasp helps")
+
+
 def test_maps_must_share_a_grid():
     other = Manifold(GRID.profile, 5, 10)
     with pytest.raises(InputError, match="one grid"):
@@ -289,8 +329,11 @@ def test_hill_climb_says_what_stood_in_the_way():
     same = np.zeros((2, 10, 16), dtype=bool)
     same[0, 5, 5] = True
     m = map_of(same, grid=grid)
+    trace: list[ClimbStep] = []
     with pytest.raises(NoPlanError, match="handprints always overlapped"):
-        hill_climb([m, m], arms, free, 0, Climb(3, 10))
+        hill_climb([m, m], arms, free, 0, Climb(3, 10), trace=trace)
+    assert [step.restart for step in trace] == [0] * 10 + [1] * 10 + [2] * 10
+    assert all(step.collisions > 0 for step in trace)
     everything = map_of(np.ones((2, 10, 16), dtype=bool), grid=grid)
     with pytest.raises(NoPlanError, match="arms always met"):
         hill_climb([everything, everything], arms, lambda cells: False, 0, Climb(3, 50))

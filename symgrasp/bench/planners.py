@@ -18,7 +18,7 @@ from symgrasp.ik import solver_for
 from symgrasp.manifold import ROLLS, grasp_to_tool
 from symgrasp.maps import MapMaker, create_map
 from symgrasp.planners.bimanual import Climb, hill_climb
-from symgrasp.planners.free import best_free
+from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch
 from symgrasp.planners.postures import Postures
@@ -215,12 +215,13 @@ def _compare(
     start = perf_counter()
     names = [arm.name for arm in arms]
     keyed = {(0, name): m for name, m in zip(names, maps, strict=True)}
-    _, steps = best_free(HoldingSearch(keyed, [names], gaps), [Postures(world, arms, maps)])
+    search = HoldingSearch(keyed, [names], gaps)
+    found = next(iter(FreePlacements(search, [Postures(world, arms, maps)])), None)
     exact_time = perf_counter() - start
     start = perf_counter()
     climbed = _climb_as_printed(world, arms, maps, seed)
     climb_time = perf_counter() - start
-    exact = tuple(steps[0].cells) if steps else None
+    exact = tuple(found.steps[0].cells) if found else None
     gained = _reached(gaps, maps, exact) - _reached(gaps, maps, climbed) if exact and climbed else 0.0
     return _Pair(exact, exact_time, climbed, climb_time, gained)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from symgrasp.handprint import Handprint
 from symgrasp.planners.sequential import check_same_grid
 from symgrasp.robot import Arm
 
-__all__ = ["Climb", "Placement", "hill_climb", "print_overlap"]
+__all__ = ["Climb", "ClimbStep", "Placement", "hill_climb", "print_overlap"]
 
 Count = Callable[[Sequence[Cell]], int]
 """How many collisions there are with every hand at its cell: what the climb brings down."""
@@ -59,6 +60,20 @@ class Placement:
     body_checks: int
 
 
+class ClimbStep(NamedTuple):
+    """Where the hands are at one moment of a climb.
+
+    Attributes:
+        restart: index of the restart.
+        cells: one cell an arm.
+        collisions: what is counted there; where it is 0 the whole robots were checked.
+    """
+
+    restart: int
+    cells: tuple[Cell, ...]
+    collisions: int
+
+
 def hill_climb(
     maps: Sequence[FeasibilityMap],
     arms: Sequence[Arm],
@@ -67,6 +82,7 @@ def hill_climb(
     limits: Climb | None = None,
     progress: Progress | None = None,
     count: Count | None = None,
+    trace: list[ClimbStep] | None = None,
 ) -> Placement:
     """Place every arm's hand on a feasible cell so that nothing is counted any more: Algorithm 3.
 
@@ -78,6 +94,7 @@ def hill_climb(
         limits: how long to search.
         progress: told the share of restarts used; may raise `Cancelled`.
         count: what to count; the cells that handprints share if None.
+        trace: receives every step in turn, whether anything is found or not.
 
     Raises:
         NoPlanError: nothing found within the limits, or an arm has no feasible cell.
@@ -97,7 +114,10 @@ def hill_climb(
             progress(restart / limits.restarts)
         cells = [Cell(*map(int, rng.choice(choices))) for choices in starts]
         for _ in range(limits.iterations):
-            if search.count(cells) == 0:
+            collisions = search.count(cells)
+            if trace is not None:
+                trace.append(ClimbStep(restart, tuple(cells), collisions))
+            if collisions == 0:
                 body_checks += 1
                 if bodies_free(cells):
                     return Placement(tuple(cells), restart + 1, iterations, search.counted, body_checks)

@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from symgrasp.errors import NoPlanError
 from symgrasp.feasibility import FeasibilityMap
 from symgrasp.manifold import ROLLS
 
-__all__ = ["Segment", "explain_conflict", "fewest_regrasps", "height_gap", "smallest_conflicts"]
+__all__ = [
+    "Conflict",
+    "ConflictError",
+    "Exclusion",
+    "Segment",
+    "Shared",
+    "TaskHeights",
+    "fewest_regrasps",
+    "find_conflict",
+    "height_gap",
+    "smallest_conflicts",
+]
 
 
 class Segment(NamedTuple):
@@ -115,25 +128,124 @@ def fewest_regrasps(maps: Sequence[FeasibilityMap], resting: Sequence[int]) -> l
     return best.get((len(maps), None))
 
 
-def explain_conflict(maps: Sequence[FeasibilityMap]) -> str:
-    """Say in one line which tasks exclude each other, what each allows, and how far apart they are."""
-    conflict = smallest_conflicts(maps)[0]
-    members = [maps[k] for k in conflict]
-    names = " and ".join(m.task for m in members)
-    if len(members) == 1:
-        return f"no grasp is feasible in task {names}"
-    gap = height_gap(members)
-    apart = "they share no roll" if gap is None else f"they are {100 * gap:.1f} cm apart"
-    heights = "; ".join(f"{m.task} allows {_heights(m)}" for m in members)
-    return f"no grasp serves {names}: {apart}; {heights}"
+class TaskHeights(NamedTuple):
+    """Where along the object a task can be done.
+
+    Attributes:
+        task: name of the task.
+        spans: for each roll the runs of heights (lowest, highest) (m) that are feasible at some angle.
+    """
+
+    task: str
+    spans: tuple[tuple[tuple[float, float], ...], ...]
 
 
-def _heights(m: FeasibilityMap) -> str:
-    """Say at which heights (cm) a task has a feasible cell, for each roll."""
+class Exclusion(NamedTuple):
+    """Tasks that no grasp serves together, though it serves any fewer of them.
+
+    Attributes:
+        tasks: their names.
+        apart: the smallest spread (m) of heights, at one roll, that serves each; None if they share no
+            roll or one of them cannot be done at all.
+    """
+
+    tasks: tuple[str, ...]
+    apart: float | None
+
+
+class Shared(NamedTuple):
+    """Tasks that one grasp serves, and where the object is set down afterwards.
+
+    Attributes:
+        tasks: names of consecutive tasks.
+        set_down: name of the task at whose pose it is grasped anew, None after the last.
+    """
+
+    tasks: tuple[str, ...]
+    set_down: str | None
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Why no grasp serves a sequence; as text, one line.
+
+    Attributes:
+        exclusions: the smallest sets of tasks that exclude each other, all of one size.
+        heights: of every task, in their order.
+        regrasps: the fewest grasps that solve it; empty if no number does, None if that was not asked.
+    """
+
+    exclusions: tuple[Exclusion, ...]
+    heights: tuple[TaskHeights, ...]
+    regrasps: tuple[Shared, ...] | None
+
+    def __str__(self) -> str:
+        names, apart = self.exclusions[0]
+        if len(names) == 1:
+            return f"no grasp is feasible in task {names[0]}"
+        gap = "they share no roll" if apart is None else f"they are {100 * apart:.1f} cm apart"
+        more = f" (one of {len(self.exclusions)} such sets)" if len(self.exclusions) > 1 else ""
+        spans = {task.task: task.spans for task in self.heights}
+        parts = [f"{name} allows {_in_words(spans[name])}" for name in names]
+        if self.regrasps is not None:
+            parts.append(_regrasps_in_words(self.regrasps))
+        return f"no grasp serves {' and '.join(names)}{more}: {gap}; {'; '.join(parts)}"
+
+
+class ConflictError(NoPlanError):
+    """No grasp serves a sequence of tasks.
+
+    Attributes:
+        conflict: which tasks exclude each other, and what would help.
+    """
+
+    def __init__(self, conflict: Conflict) -> None:
+        super().__init__(str(conflict))
+        self.conflict = conflict
+
+
+def find_conflict(maps: Sequence[FeasibilityMap], resting: Sequence[int] | None = None) -> Conflict:
+    """Return why no grasp serves all tasks, which must be so.
+
+    Args:
+        maps: the map of every task, in order.
+        resting: indices of tasks in which the object stands on something, to say where a regrasp
+            helps; None where nothing is regrasped.
+    """
+    exclusions = [
+        Exclusion(tuple(maps[k].task for k in members), height_gap([maps[k] for k in members]))
+        for members in smallest_conflicts(maps)
+    ]
+    segments = [] if resting is None else fewest_regrasps(maps, resting) or []
+    shared = [
+        Shared(
+            tuple(maps[k].task for k in range(segment.first, segment.last + 1)),
+            None if segment.set_down is None else maps[segment.set_down].task,
+        )
+        for segment in segments
+    ]
+    heights = [TaskHeights(m.task, tuple(_spans(m, roll) for roll in range(len(ROLLS)))) for m in maps]
+    return Conflict(tuple(exclusions), tuple(heights), None if resting is None else tuple(shared))
+
+
+def _spans(m: FeasibilityMap, roll: int) -> tuple[tuple[float, float], ...]:
+    rows = np.flatnonzero(allowed(m)[roll])
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
+    return tuple((float(m.manifold.h[run[0]]), float(m.manifold.h[run[-1]])) for run in runs)
+
+
+def _in_words(spans: Sequence[Sequence[tuple[float, float]]]) -> str:
+    """Say which heights (cm) are allowed, for each roll."""
     parts = []
-    for roll, angle in enumerate(ROLLS):
-        rows = np.flatnonzero(allowed(m)[roll])
-        runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
-        spans = [f"{100 * m.manifold.h[r[0]]:.1f} to {100 * m.manifold.h[r[-1]]:.1f} cm" for r in runs]
-        parts.append(f"{' and '.join(spans) or 'nothing'} at roll {np.rad2deg(angle):.0f}°")
+    for angle, runs in zip(ROLLS, spans, strict=True):
+        texts = [f"{100 * low:.1f} to {100 * high:.1f} cm" for low, high in runs]
+        parts.append(f"{' and '.join(texts) or 'nothing'} at roll {np.rad2deg(angle):.0f}°")
     return ", ".join(parts)
+
+
+def _regrasps_in_words(shared: Sequence[Shared]) -> str:
+    """Say which tasks share a grasp, and where the object is set down."""
+    if not shared:
+        return "no regrasp helps"
+    parts = [" and ".join(p.tasks) + (f", set down at {p.set_down}" if p.set_down else "") for p in shared]
+    return "a new grasp for each part does: " + "; ".join(parts)

@@ -1,4 +1,4 @@
-"""The best placement for which the whole robots are free of each other."""
+"""Placements for which the whole robots are free of each other, best first."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from symgrasp.feasibility import Cell, Progress
 from symgrasp.planners.holding import Holding, HoldingSearch
 from symgrasp.planners.postures import Posture, Postures
 
-__all__ = ["Step", "best_free"]
+__all__ = ["FreePlacement", "FreePlacements", "Step"]
 
 
 class Step(NamedTuple):
@@ -29,71 +29,120 @@ class Step(NamedTuple):
     cells: Sequence[Cell]
 
 
-def best_free(
-    search: HoldingSearch, desks: Sequence[Postures], progress: Progress | None = None
-) -> tuple[int, list[Step] | None]:
-    """Find the best placement for which there are configurations in which nothing collides.
+class FreePlacement(NamedTuple):
+    """A grasp for every hold, with configurations in which nothing collides.
 
-    Where nothing is free at the best turns of a placement, it waits until no other placement
-    promises more than what its next best turns reach.
+    Attributes:
+        score: what it reaches (m): `Holding.score` at the turns that are free.
+        grasps: of every hold.
+        steps: the tasks in order.
+    """
+
+    score: float
+    grasps: tuple[Cell, ...]
+    steps: list[Step]
+
+
+class _Attempt(NamedTuple):
+    """A placement that waits for its next best turns; the smallest is the most promising, then the first."""
+
+    loss: float
+    number: int
+    holding: Holding
+    settling: Iterator[tuple[float, list[Step] | None]]
+
+
+class FreePlacements:
+    """Lists the placements for which there are configurations in which nothing collides, best first.
+
+    Complete, so the first is the best, and an empty list is a proof. Where nothing is free at the
+    best turns of a placement, it waits until no other placement promises more than what its next
+    best turns reach. Of placements of several hands that are like a listed one but for neighbouring
+    cells, none is listed.
 
     Args:
         search: the search for placements.
         desks: finds the configurations of each task.
         progress: called now and then; may raise `Cancelled`.
 
-    Returns:
-        How many placements were tried, and the steps of the best; None if there is none.
+    Attributes:
+        tried: how many placements were tried so far.
     """
-    waiting: list[tuple[float, int, Iterator[tuple[float, list[Step] | None]]]] = []
-    placements = search.best_first()
-    tried, promised = 0, np.inf
-    while True:
-        if progress:
-            progress(1.0)  # how many there are is not known beforehand; this lets the caller cancel
-        if waiting and -waiting[0][0] >= promised:
-            _, number, attempt = heapq.heappop(waiting)
-            reached, settled = next(attempt, (None, None))
-            if settled:
-                return tried, settled
-            if reached is not None:
-                heapq.heappush(waiting, (-reached, number, attempt))
-            continue
-        holding = next(placements, None)
-        if holding:
-            tried, promised = tried + 1, holding.score
-            heapq.heappush(waiting, (-holding.score, tried, _settle(search, desks, holding)))
-        elif waiting:
-            promised = -np.inf
-        else:
-            return tried, None
+
+    def __init__(
+        self, search: HoldingSearch, desks: Sequence[Postures], progress: Progress | None = None
+    ) -> None:
+        self.tried = 0
+        self._search, self._desks, self._progress = search, desks, progress
+
+    def __iter__(self) -> Iterator[FreePlacement]:
+        """Yield them; lazily, as finding one may take a while."""
+        waiting: list[_Attempt] = []
+        listed: list[FreePlacement] = []
+        placements = self._search.best_first()
+        promised = np.inf
+        while True:
+            if self._progress:
+                self._progress(1.0)  # how many there are is not known beforehand; lets the caller cancel
+            if waiting and -waiting[0].loss >= promised:
+                attempt = heapq.heappop(waiting)
+                if self._is_listed(attempt.holding, listed):
+                    continue
+                reached, settled = next(attempt.settling, (None, None))
+                if settled:
+                    assert reached is not None
+                    listed.append(FreePlacement(reached, attempt.holding.cells, settled))
+                    yield listed[-1]
+                elif reached is not None:
+                    heapq.heappush(waiting, attempt._replace(loss=-reached))
+                continue
+            holding = next(placements, None)
+            if holding:
+                promised = holding.score
+                if not self._is_listed(holding, listed):
+                    self.tried += 1
+                    attempt = _Attempt(-holding.score, self.tried, holding, self._settle(holding))
+                    heapq.heappush(waiting, attempt)
+            elif waiting:
+                promised = -np.inf
+            else:
+                return
+
+    def _is_listed(self, holding: Holding, listed: Sequence[FreePlacement]) -> bool:
+        angles = self._desks[0].maps[0].manifold.angles
+        return len(holding.cells) > 1 and any(_near(holding.cells, p.grasps, angles) for p in listed)
+
+    def _settle(self, holding: Holding) -> Iterator[tuple[float, list[Step] | None]]:
+        """Settle group by group; yield what it reaches whenever that falls, and the steps at last."""
+        reached = holding.score
+        steps: list[Step] = []
+        for group, members in enumerate(self._search.groups):
+            for turn in self._search.turns(holding.cells, group, reached):
+                if turn.margin < reached:
+                    reached = turn.margin
+                    yield reached, None
+                found = [self._step(k, holding.cells, turn.columns) for k in members]
+                free = [step for step in found if step]
+                if len(free) == len(members):
+                    steps += free
+                    break
+            else:
+                return
+        yield reached, steps
+
+    def _step(self, k: int, grasps: Sequence[Cell], turn: int) -> Step | None:
+        """Return task k with the object at a turn, or None if nothing is free there."""
+        desk = self._desks[k]
+        angles = desk.maps[0].manifold.angles
+        held = {run.arm: cell for run, cell in zip(self._search.holds, grasps, strict=True) if k in run.tasks}
+        cells = [held[arm.name].turned(turn, angles) for arm in desk.arms]
+        postures = desk.find(cells)
+        return Step(turn, postures, cells) if postures else None
 
 
-def _settle(
-    search: HoldingSearch, desks: Sequence[Postures], holding: Holding
-) -> Iterator[tuple[float, list[Step] | None]]:
-    """Settle a placement group by group; yield what it reaches whenever that falls, and the steps at last."""
-    reached = holding.score
-    steps: list[Step] = []
-    for group, members in enumerate(search.groups):
-        for turn in search.turns(holding.cells, group, reached):
-            if turn.margin < reached:
-                reached = turn.margin
-                yield reached, None
-            found = [_step(search, desks[k], k, holding.cells, turn.columns) for k in members]
-            free = [step for step in found if step]
-            if len(free) == len(members):
-                steps += free
-                break
-        else:
-            return
-    yield reached, steps
-
-
-def _step(search: HoldingSearch, desk: Postures, k: int, grasps: Sequence[Cell], turn: int) -> Step | None:
-    """Return task k with the object at a turn, or None if nothing is free there."""
-    angles = desk.maps[0].manifold.angles
-    held = {run.arm: cell for run, cell in zip(search.holds, grasps, strict=True) if k in run.tasks}
-    cells = [held[arm.name].turned(turn, angles) for arm in desk.arms]
-    postures = desk.find(cells)
-    return Step(turn, postures, cells) if postures else None
+def _near(a: Sequence[Cell], b: Sequence[Cell], angles: int) -> bool:
+    """Whether every grasp has the same roll in both and is at most a row and a column away."""
+    return all(
+        x.roll == y.roll and abs(x.row - y.row) <= 1 and (x.column - y.column + 1) % angles <= 2
+        for x, y in zip(a, b, strict=True)
+    )

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.errors import InputError, NoPlanError
+from symgrasp.errors import InputError
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import ROLLS, wrap
-from symgrasp.planners.conflicts import explain_conflict
+from symgrasp.planners.conflicts import ConflictError, find_conflict
 from symgrasp.poses import Array
 
 __all__ = ["CommonGrasp", "SequentialGrasp", "common_grasps", "first_common_grasp"]
@@ -44,22 +44,27 @@ class CommonGrasp(NamedTuple):
         intervals: for every task the feasible runs of columns, each (first, count); a run may
             go on past the last column to the first.
         margin: the worst task's best margin on the surface (m).
+        clearance: the worst task's best clearance (m), of angles with at least that margin.
     """
 
     roll: int
     row: int
     intervals: tuple[tuple[tuple[int, int], ...], ...]
     margin: float
+    clearance: float
 
 
-def first_common_grasp(maps: Sequence[FeasibilityMap]) -> SequentialGrasp:
+def first_common_grasp(
+    maps: Sequence[FeasibilityMap], resting: Sequence[int] | None = None
+) -> SequentialGrasp:
     """Return the first grasp that is feasible in every task: Algorithm 2 as printed, roll by roll.
 
     Args:
         maps: the map of every task, all over the same grid.
+        resting: indices of tasks in which the object stands on something, to say where a regrasp helps.
 
     Raises:
-        NoPlanError: no height and roll is feasible in every task; says why.
+        ConflictError: no height and roll is feasible in every task; says why.
         InputError: there is no map, or the grids differ.
     """
     check_same_grid(maps)
@@ -68,22 +73,36 @@ def first_common_grasp(maps: Sequence[FeasibilityMap]) -> SequentialGrasp:
             columns = [_first(m.feasible[roll, row]) for m in maps]
             if None not in columns:
                 return _grasp(maps, roll, row, [c for c in columns if c is not None])
-    raise NoPlanError(explain_conflict(maps))
+    raise ConflictError(find_conflict(maps, resting))
 
 
 def common_grasps(maps: Sequence[FeasibilityMap]) -> list[CommonGrasp]:
-    """List every height and roll that serves all tasks, best margin first.
+    """List every height and roll that serves all tasks: best margin first, of equal ones best clearance.
 
     Raises:
         InputError: there is no map, or the grids differ.
     """
     check_same_grid(maps)
-    worst = np.min([surface_margin(m).max(axis=2) for m in maps], axis=0)
+    margins = [surface_margin(m) for m in maps]
+    worst = np.min([margin.max(axis=2) for margin in margins], axis=0)
+    clear = np.min(
+        [
+            np.max(m.clearance, axis=2, where=m.feasible & (margin >= worst[..., None]), initial=0.0)
+            for m, margin in zip(maps, margins, strict=True)
+        ],
+        axis=0,
+    )
     found = [
-        CommonGrasp(roll, row, tuple(_runs(m.feasible[roll, row]) for m in maps), float(worst[roll, row]))
+        CommonGrasp(
+            roll,
+            row,
+            tuple(_runs(m.feasible[roll, row]) for m in maps),
+            float(worst[roll, row]),
+            float(clear[roll, row]),
+        )
         for roll, row in np.argwhere(worst > 0).tolist()
     ]
-    return sorted(found, key=lambda g: -g.margin)
+    return sorted(found, key=lambda g: (-g.margin, -g.clearance))
 
 
 def surface_margin(m: FeasibilityMap) -> Array:

@@ -1,0 +1,40 @@
+"""Plans in words: one line a plan, to choose from a list."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from symgrasp.feasibility import FeasibilityMap
+from symgrasp.plan import Grasp, Plan
+from symgrasp.planners.sequential import CommonGrasp
+
+__all__ = ["intervals_in_words", "place_in_words", "plan_in_words"]
+
+
+def plan_in_words(plan: Plan) -> str:
+    """Say where each arm holds, and what is the least of the margins and clearances."""
+    holds = [hold for task in plan.tasks for hold in task.holds]
+    grasps = dict.fromkeys((hold.arm, place_in_words(hold.grasp)) for hold in holds)
+    along = 1e3 * min(hold.margin_along for hold in holds)
+    around = math.degrees(min(hold.margin_around for hold in holds))
+    clear = 1e3 * min(hold.clearance for hold in holds)
+    where = "; ".join(f"{arm} at {place}" for arm, place in grasps)
+    return f"{where}: margins {along:.1f} mm, {around:.1f}°; {clear:.1f} mm clear"
+
+
+def place_in_words(grasp: Grasp) -> str:
+    """Say where on the object a grasp is."""
+    turn = f"θ = {math.degrees(grasp.theta):.1f}°, roll {math.degrees(grasp.roll):.0f}°"
+    return f"h = {100 * grasp.h:.1f} cm, {turn}"
+
+
+def intervals_in_words(grasp: CommonGrasp, maps: Sequence[FeasibilityMap]) -> str:
+    """Say at which angles (°, outer edges of the cells) each task allows a grasp's height and roll."""
+    parts = []
+    for m, runs in zip(maps, grasp.intervals, strict=True):
+        start, step = math.degrees(m.manifold.theta_start), math.degrees(m.manifold.dtheta)
+        spans = [(start + first * step, start + (first + count) * step) for first, count in runs]
+        texts = [f"{low:.1f}° to {high:.1f}°" for low, high in spans]
+        parts.append(f"{m.task} {' and '.join(texts)}")
+    return "; ".join(parts)
