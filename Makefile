@@ -27,5 +27,5 @@ $(VENV)/dev.stamp: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	touch $@ $(VENV)/app.stamp
 
-figures: $(VENV)/dev.stamp  ## make the README's pictures again
-	$(BIN)/python -m docs.figures
+figures: $(VENV)/dev.stamp  ## make the pictures of the README and docs/ again
+	$(BIN)/python -m docs.figures $(ARGS)

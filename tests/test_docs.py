@@ -8,11 +8,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from docs.figures.__main__ import FIGURES
 from symgrasp.cli import main
 from symgrasp.scene import Scene
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(language: str) -> list[str]:
@@ -58,11 +62,18 @@ def test_the_scene_example_loads():
     assert list(scene.tasks) == ["pick", "pour"]
 
 
-def test_the_pictures_are_there():
-    pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
-    assert pictures
-    missing = [p for p in pictures if not (ROOT / p).is_file()]
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_and_pictures_lead_somewhere(page):
+    links = re.findall(r"!?\[[^\]]+\]\(([^)]+)\)", page.read_text())
+    missing = [link for link in links if not (page.parent / link).is_file()]
+    assert links
     assert not missing
+
+
+def test_every_picture_is_made_and_shown():
+    shown = {p.stem for page in PAGES for p in map(Path, re.findall(r"[\w/]+\.png(?=\))", page.read_text()))}
+    kept = {path.stem for path in (ROOT / "docs/images").iterdir()}
+    assert kept == shown == set(FIGURES)
 
 
 def test_the_first_screen():

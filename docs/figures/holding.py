@@ -1,0 +1,120 @@
+"""The figures with whole robots: the paper's figures 1, 4 and 8."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.palette import INK, PRINTS
+from docs.figures.models import (
+    cells_paint,
+    floor,
+    map_colors,
+    object_body,
+    obstacles,
+    robot,
+    robots,
+    with_seam,
+)
+from docs.figures.render import Camera
+from docs.figures.style import board, label, legend, map_axes, mark, new, photo, save
+from symgrasp.feasibility import Cell
+from symgrasp.manifold import ROLLS, Manifold
+from symgrasp.maps import create_map
+from symgrasp.plan import Hold
+from symgrasp.planning import plan_bimanual, plan_sequential
+from symgrasp.scene import Scene
+
+__all__ = ["log_four_robots", "pick_pour_place", "wine_bottle"]
+
+WOOD = np.array([214, 178, 131]) / 255
+HANDS = PRINTS[1:-1]
+
+
+def log_four_robots() -> None:
+    """Figure 1: robots hold a long log, and the prints of their hands share no cell."""
+    scene = Scene.load("log_four_robots")
+    (task,) = plan_bimanual(scene).tasks
+    pose, grid = task.object_pose_turned.array(), scene.manifold
+    fine = Manifold(grid.profile, 4 * grid.heights, 4 * grid.angles)
+    colors = np.tile(WOOD, (fine.heights, fine.angles, 1))
+    for hold, color in zip(task.holds, HANDS, strict=True):
+        colors[_print(scene, hold, fine)] = color / 255
+    log = object_body(scene.profile, pose, cells_paint(grid, colors))
+
+    figure = new(10, 6.6)
+    camera = Camera((0.02, 0, 0.27), -64, 25, 3.3)
+    bodies = [*robots(scene, task), *obstacles(scene, without=("floor",)), log, floor(0)]
+    axes, picture = photo(figure, (0, 1.75, 10, 4.85), bodies, camera)
+    for hold in task.holds:
+        point = (pose @ [*grid.contact(hold.grasp.h, hold.grasp.theta), 1.0])[:3]
+        offset = (0, 62 if hold.grasp.theta > 0 else -62)
+        label(axes, picture, point, hold.arm, offset)
+
+    unwrapped = board(figure, (0.75, 0.55, 8.9, 1.05))
+    extent = (0, 100 * scene.profile.h_max, -180, 180)
+    unwrapped.imshow(
+        colors.swapaxes(0, 1), origin="lower", aspect="auto", interpolation="nearest", extent=extent
+    )
+    unwrapped.set(xlabel="h (cm)", ylabel="θ (°)", yticks=(-180, 0, 180))
+    for hold in task.holds:
+        text = {"ha": "center", "va": "center", "fontsize": 8}
+        box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+        below = -105 if hold.grasp.theta > 0 else 105
+        unwrapped.text(100 * hold.grasp.h, below, hold.arm, **text, bbox=box)
+    save(figure, "log_four_robots.png")
+
+
+def wine_bottle() -> None:
+    """Figure 4: every cell of a wine bottle tried, on the bottle and unwrapped."""
+    scene = Scene.load("bottle_on_table")
+    task, grid = scene.task(), scene.manifold
+    the_map = create_map(scene)
+    roll = 0
+    cell = Cell(roll, *grid.cell(0.137, np.deg2rad(150)))
+    witness = the_map.witness(cell)
+    assert witness, "the picture shows a grasp"
+    arm = scene.arm()
+    colors = map_colors(the_map, roll)
+    bottle = object_body(scene.profile, task.T_world_object, cells_paint(grid, colors))
+
+    figure = new(10, 4.4)
+    things = [*obstacles(scene), bottle, floor(-0.04)]
+    holding = [*robot(arm.robot, arm.robot_values(witness.q, witness.opening)), *things]
+    photo(figure, (0, 0, 4.3, 4.4), holding, Camera((0.33, -0.02, 0.3), 62, 20, 1.12))
+    photo(figure, (4.3, 0, 1.75, 4.4), [bottle, floor(0)], Camera((0.55, 0, 0.145), 150, 14, 0.165, 14))
+    axes = board(figure, (6.65, 1.25, 3.15, 2.85))
+    map_axes(axes, grid, colors)
+    mark(axes, float(grid.h[cell.row]), float(grid.theta[cell.column]))
+    legend(figure, the_map.reason[roll], (6.65, 0.75), columns=2)
+    save(figure, "wine_bottle.png")
+
+
+def pick_pour_place() -> None:
+    """Figure 8: one grasp from the first task to the last."""
+    scene = Scene.load("pick_pour_place")
+    plan = plan_sequential(scene)
+    figure = new(10, 4.2)
+    for k, task in enumerate(plan.tasks):
+        (hold,) = task.holds
+        the_map = create_map(scene, task=task.name).shift(task.delta)
+        colors = map_colors(the_map, ROLLS.index(hold.grasp.roll))
+        paint = with_seam(cells_paint(the_map.manifold, colors), scene.profile)
+        thing = object_body(scene.profile, task.object_pose_turned.array(), paint)
+        bodies = [*robots(scene, task), *obstacles(scene), thing, floor(-0.04)]
+        box = (3.35 * k, 0.5, 3.3, 3.7)
+        photo(figure, box, bodies, Camera((0.36, 0.01, 0.33), -14, 20, 1.14))
+        turned = f", bottle turned by {np.rad2deg(task.delta):.0f}°" if k else ""
+        figure.text(
+            (3.35 * k + 1.65) / 10, 0.09, f"{task.name}{turned}", ha="center", va="center", fontsize=10
+        )
+    (hold,) = plan.tasks[0].holds
+    grasp = f"the same grasp in all: h = {100 * hold.grasp.h:.1f} cm, θ = {np.rad2deg(hold.grasp.theta):.0f}°"
+    figure.text(0.5, 0.02, grasp, ha="center", va="bottom", color=INK, fontsize=9)
+    save(figure, "pick_pour_place.png")
+
+
+def _print(scene: Scene, hold: Hold, grid: Manifold) -> np.ndarray:
+    """Return the cells (H, A) under the hand that holds."""
+    row, column = grid.cell(hold.grasp.h, hold.grasp.theta)
+    handprint = scene.arm(hold.arm).handprint(grid, row, ROLLS.index(hold.grasp.roll))
+    return handprint.on(grid, column)
