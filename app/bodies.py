@@ -143,7 +143,7 @@ def board_position(state: State, view: Viewpoint) -> Array:
 
 
 def _colors(state: State, reason: np.ndarray, prints: Sequence[np.ndarray]) -> np.ndarray:
-    colors = REASONS[reason] if state.is_current else faded(REASONS[reason])
+    colors = REASONS[reason] if state.is_fresh else faded(REASONS[reason])
     if not prints:
         return colors
     index = print_index(prints)

@@ -26,6 +26,9 @@ __all__ = ["Store", "Workbench", "check_visuals"]
 MAPS_KEPT = 64
 """Maps that the server remembers, newest first; a big one (96 x 192 cells) takes about 4 MB."""
 
+POSES_KEPT = 6
+"""Of them, those of one task and arm that differ in pose: a drag leaves dozens that nobody comes back to."""
+
 
 class Store:
     """What all browsers share because it never changes: loaded scenes and computed maps.
@@ -91,6 +94,9 @@ class Store:
         """Remember a map."""
         with self._lock:
             self._maps[result.request] = result
+            alike = [r for r in self._maps if r.pose and r.differs_in_pose(result.request)]
+            for request in alike[:-POSES_KEPT]:
+                del self._maps[request]
             while len(self._maps) > MAPS_KEPT:
                 self._maps.popitem(last=False)
 

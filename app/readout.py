@@ -34,8 +34,9 @@ def postures(state: State) -> dict[str, Array]:
 def map_title(state: State) -> str:
     """Name the map that is shown."""
     names = f"{escape(state.scene.name)} · {escape(state.task)} · {escape(state.arm)}"
-    age = "" if state.is_current or not state.result else " — of an earlier pose"
-    return f'<div class="sg sg-title">{names}{age}</div>'
+    age = "" if state.is_fresh or not state.result else " — of an earlier pose"
+    busy = "false" if state.is_current and not state.busy else "true"
+    return f'<div class="sg sg-title" aria-busy="{busy}">{names}{age}</div>'
 
 
 def grasp_html(state: State) -> str:
@@ -44,7 +45,7 @@ def grasp_html(state: State) -> str:
         text = "No grasp picked: click a cell on the object or on the map beside it, or enter h and θ."
         return f'<div class="sg sg-faint">{text}</div>'
     place = _place(state.pick.h, state.pick.theta)
-    if not state.is_current or state.map is None or state.cell is None:
+    if not state.is_fresh or state.map is None or state.cell is None:
         return f'<div class="sg"><b>{place}</b><br>waits for the map</div>'
     place += f", roll {np.rad2deg(ROLLS[state.cell.roll]):.0f}°"
     why = escape(state.map.why(state.cell))
@@ -65,8 +66,10 @@ def grasp_html(state: State) -> str:
 def status_html(state: State) -> str:
     """Say what to try and what is going on, in the same number of lines whatever it is."""
     thing = escape(state.scene.file.object.name)
-    doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %" if state.busy else "Ready."
-    if not state.busy and not state.is_current:
+    doing = "Ready."
+    if state.busy and state.is_waiting:
+        doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %"
+    elif not state.busy and not state.is_current:
         doing = "Stopped: no map for this pose yet."
     return (
         f'<div class="sg">Drag <b>Rotation</b>: the {thing} turns and its map slides along, with nothing '

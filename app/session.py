@@ -6,17 +6,18 @@ import itertools
 import logging
 import re
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import viser
 
+from app.asking import Request
 from app.compute import Store, Workbench, check_visuals
 from app.controls import PANELS_WIDTH, Controls
 from app.state import State
 from app.things import Thing, check_size, from_mesh
-from app.values import MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
 from symgrasp.errors import SymgraspError
@@ -26,6 +27,9 @@ from symgrasp.scene import Scene
 __all__ = ["Session"]
 
 log = logging.getLogger(__name__)
+
+LATE = 0.25
+"""Computations longer than this (s) are spoken of; others are over before one could read it."""
 
 
 class Session:
@@ -190,7 +194,7 @@ class Session:
                 self.worker.cancel()
         elif known := self.store.map(request):
             self.worker.cancel()
-            self.state = replace(state, busy=None, result=known)
+            self._take(replace(state, busy=None, result=known), origin)
         else:
             self._submit(
                 f"Computing the map of {request.task}",
@@ -204,15 +208,17 @@ class Session:
         label: str,
         run: Callable[[Progress], Any],
         done: Callable[[int, Any], None],
-        request: MapRequest | None = None,
+        request: Request | None = None,
     ) -> None:
         """Give the worker something to do, in place of what it does now."""
-        ticket = next(self._tickets)
+        ticket, begun = next(self._tickets), time.monotonic()
         self.change(lambda s: s.started(ticket, label, request))
         self.worker.submit(
             Job(
                 run=run,
-                progress=lambda share: self.change(lambda s: s.progressed(ticket, share)),
+                progress=lambda share: self.change(
+                    lambda s: s.progressed(ticket, share, late=time.monotonic() - begun > LATE)
+                ),
                 done=lambda result: done(ticket, result),
                 failed=lambda problem: self._failed(ticket, problem),
             )

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from app.asking import Busy, Request
 from app.things import OWN, Thing
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.errors import InputError
@@ -21,7 +22,7 @@ from symgrasp.plan import PlanTask
 from symgrasp.poses import Array, rotation_z
 from symgrasp.scene import Scene
 
-__all__ = ["Busy", "Pick", "State"]
+__all__ = ["Pick", "State"]
 
 GIZMO_NOISE = 1e-6
 """Change of position (m) or axis below which the gizmo only turned: browsers send rounded numbers."""
@@ -34,23 +35,6 @@ class Pick:
     h: float
     theta: float
     roll: int | None = None
-
-
-@dataclass(frozen=True)
-class Busy:
-    """A computation under way.
-
-    Attributes:
-        ticket: number of the computation; the last words of an earlier one do not count.
-        label: what is computed.
-        request: the map it computes, None for anything else.
-        share: how much of it is done.
-    """
-
-    ticket: int
-    label: str
-    request: MapRequest | None = None
-    share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +51,7 @@ class State:
         poses: task → base pose, of the tasks that were moved.
         delta: turn (rad) of the object about its axis.
         result: the newest map, maybe of an earlier request.
-        refused: the request whose computation was cancelled or failed: not tried again unasked.
+        refused: what was cancelled or failed: not tried again unasked.
         pick: the grasp picked.
         plan: the newest plan.
         step: which of its tasks is shown; None once the person has moved on.
@@ -88,7 +72,7 @@ class State:
     poses: Mapping[str, ObjectPose] = field(default_factory=dict)
     delta: float = 0.0
     result: MapResult | None = None
-    refused: MapRequest | None = None
+    refused: Request | None = None
     pick: Pick | None = None
     plan: PlanResult | None = None
     step: int | None = None
@@ -132,18 +116,38 @@ class State:
         return self.result is not None and self.result.request == self.request
 
     @property
-    def wanted(self) -> MapRequest | None:
-        """The map to begin computing now; while a plan is made, its maps are."""
-        if self.is_current or self.refused == self.request:
-            return None
-        if self.busy and self.busy.request in (None, self.request):
-            return None
-        return self.request
+    def unmet(self) -> Request | None:
+        """What is asked for first and not there."""
+        return None if self.is_current else self.request
+
+    @property
+    def lacking(self) -> Request | None:
+        """The same, unless it was cancelled or failed: then everything waits."""
+        return None if self.unmet == self.refused else self.unmet
+
+    @property
+    def wanted(self) -> Request | None:
+        """What to begin computing now; while a plan is made, its maps are."""
+        lacking = self.lacking
+        return None if lacking is None or (self.busy and self.busy.goes_first(lacking)) else lacking
 
     @property
     def is_obsolete(self) -> bool:
-        """Whether a map is being computed that nobody waits for any more."""
-        return bool(self.busy and self.busy.request and self.busy.request != self.request)
+        """Whether something is being computed that nobody waits for any more."""
+        return bool(self.busy and self.busy.request) and self.lacking is None
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether something is being computed that takes long enough to say so."""
+        return self.busy is not None and (self.busy.request is None or self.busy.late or self.result is None)
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether the map shown is the one for the object's pose, or will be in a moment."""
+        if self.is_current:
+            return True
+        follows = self.result is not None and self.result.request.differs_in_pose(self.request)
+        return follows and self.busy is not None and not self.is_waiting
 
     @property
     def inputs(self) -> tuple[object, ...]:
@@ -277,29 +281,31 @@ class State:
         """Let go: the arms park."""
         return replace(self, pick=None, step=None)
 
-    def started(self, ticket: int, label: str, request: MapRequest | None = None) -> State:
+    def started(self, ticket: int, label: str, request: Request | None = None) -> State:
         """A computation began; it replaces the one before."""
         problem = self.problem if request else ""
         return replace(self, busy=Busy(ticket, label, request), problem=problem)
 
-    def progressed(self, ticket: int, share: float) -> State:
-        """The computation is this far."""
+    def progressed(self, ticket: int, share: float, late: bool = False) -> State:
+        """The computation is this far, and so late by now that the page says so."""
         if self.busy is None or self.busy.ticket != ticket:
             return self
-        return replace(self, busy=replace(self.busy, share=share))
+        return replace(self, busy=replace(self.busy, share=share, late=late or self.busy.late))
 
     def map_arrived(self, ticket: int, result: MapResult) -> State:
-        """Take a map, unless it is for an earlier request."""
-        busy = None if self.busy and self.busy.ticket == ticket else self.busy
-        if result.request != self.request:
-            return replace(self, busy=busy)
-        return replace(self, busy=busy, result=result, refused=None)
+        """Take a map: that of the object's pose, or on the way there that of an earlier one."""
+        is_awaited = self.busy is not None and self.busy.ticket == ticket
+        state = replace(self, busy=None) if is_awaited else self
+        follows = is_awaited and not self.is_current and result.request.differs_in_pose(self.request)
+        if result.request != self.request and not follows:
+            return state
+        return replace(state, result=result, refused=None)
 
     def stopped(self, ticket: int, problem: str = "") -> State:
         """The computation was cancelled or failed: do not begin it again by itself."""
         if self.busy is None or self.busy.ticket != ticket:
             return self
-        refused = None if self.is_current else self.request
+        refused = self.unmet
         if problem and self.busy.request is None:  # it was not the map that failed
             refused = self.refused
         return replace(self, busy=None, refused=refused, problem=problem)

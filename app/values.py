@@ -93,6 +93,10 @@ class MapRequest:
         """The base pose (4, 4)."""
         return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
 
+    def differs_in_pose(self, other: MapRequest) -> bool:
+        """Whether only the object's pose is another."""
+        return self.scene is other.scene and (self.arm, self.task) == (other.arm, other.task)
+
     def moved_task(self) -> Task:
         """Return the task, moved there."""
         return Task(self.task, self.scene.task(self.task).arms, self.T_world_object)

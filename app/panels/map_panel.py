@@ -37,6 +37,6 @@ class MapPanel(Panel):
         if prints and state.shown:
             legend += prints_html(state.shown, prints)
             marks = [Mark(h.grasp.h, h.grasp.theta, h.arm) for h in state.shown.holds]
-        shown = map_html(state.map, state.roll, marks, prints, stale=not state.is_current)
+        shown = map_html(state.map, state.roll, marks, prints, stale=not state.is_fresh)
         self.map.show(f'<div class="sg-side">{shown}{profile_html(state)}</div>')
         self.legend.show(legend)

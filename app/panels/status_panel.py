@@ -24,10 +24,10 @@ class StatusPanel(Panel):
         """Say what is being done."""
         self.status.show(status_html(state))
         retry = state.busy is None and not state.is_current
-        self.progress.value = 100 * state.busy.share if state.busy else 0.0
+        self.progress.value = 100 * state.busy.share if state.busy and state.is_waiting else 0.0
         self.stop.label = "Compute the map" if retry else "Cancel"
         self.stop.icon = viser.Icon.REFRESH if retry else viser.Icon.X
-        self.stop.disabled = state.busy is None and not retry
+        self.stop.disabled = not state.is_waiting and not retry
 
 
 class NotesPanel(Panel):

@@ -57,6 +57,18 @@ def test_only_so_many_maps_are_kept(monkeypatch):
     assert [store.map(r) is None for r in states] == [True, False, False, False]
 
 
+def test_a_drag_pushes_out_its_own_maps_only(monkeypatch):
+    monkeypatch.setattr(compute, "POSES_KEPT", 2)
+    store, base = Store("bottle_on_table"), small_map("bottle_on_table", "pick", "panda")
+    bottle, can = (State.of(load_small(name), name) for name in ("bottle_on_table", "soda_can"))
+    drag = [bottle.move(x=x).request for x in (0.1, 0.2, 0.3, 0.4)]
+    for request in [bottle.request, can.move(x=0.5).request, *drag]:
+        store.keep(MapResult(request, base.map))
+    assert store.map(bottle.request)  # where "put it back" leads
+    assert store.map(can.move(x=0.5).request)
+    assert [store.map(r) is None for r in drag] == [True, True, False, False]
+
+
 def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(bench):
     bottle = load_small("bottle_on_table")
     maker = bench.maker(bottle)

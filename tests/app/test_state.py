@@ -138,12 +138,46 @@ def test_a_move_asks_for_a_new_map_and_keeps_the_old_one_in_view():
 
 def test_the_newest_request_wins():
     first = opened().move(x=0.5)
-    second = first.started(1, "map", first.request).move(x=0.45)
+    second = first.started(1, "map", first.request).move(x=0.45).started(2, "map", first.request)
     late = small_map("bottle_on_table", "pick", "panda", first.request.pose)
-    assert second.map_arrived(1, late).result is second.result
-    assert not second.map_arrived(1, late).is_current
+    assert second.map_arrived(1, late) is second
     right = small_map("bottle_on_table", "pick", "panda", second.request.pose)
     assert second.map_arrived(2, right).is_current
+    assert second.map_arrived(2, right).busy is None
+
+
+def test_a_map_follows_a_drag_one_pose_behind():
+    first = opened().move(x=0.5)
+    state = first.started(1, "map", first.request).move(x=0.45)
+    assert state.wanted is None  # the quick map of 0.5 is not interrupted
+    assert state.is_fresh
+    assert not state.is_waiting
+    state = state.map_arrived(1, small_map("bottle_on_table", "pick", "panda", first.request.pose))
+    assert state.result.request == first.request
+    assert not state.is_current
+    assert state.wanted == state.request
+    assert state.started(2, "map", state.request).is_fresh
+
+
+def test_a_map_that_takes_long_is_spoken_of_and_interrupted():
+    first = opened().move(x=0.5)
+    late = first.started(1, "map", first.request).progressed(1, 0.1, late=True)
+    assert late.is_waiting
+    assert not late.is_fresh
+    assert late.progressed(1, 0.2).busy.late
+    assert late.wanted is None
+    moved = late.move(x=0.45)
+    assert moved.wanted == moved.request
+
+
+def test_a_map_of_another_arm_or_task_interrupts_at_once():
+    state = opened("pick_pour_place").move(x=0.5)
+    busy = state.started(1, "map", state.request)
+    other = busy.choose_task("pour")
+    assert other.wanted == other.request
+    assert not other.started(2, "map", other.request).is_fresh
+    late = small_map("pick_pour_place", "pick", "panda", state.request.pose)
+    assert other.map_arrived(1, late).result is other.result
 
 
 def test_moving_back_needs_no_map():
@@ -159,7 +193,7 @@ def test_moving_back_needs_no_map():
 def test_one_map_at_a_time_is_asked_for():
     state = opened().move(x=0.5)
     assert state.started(1, "map", state.request).wanted is None
-    assert state.started(1, "map", state.request).move(x=0.51).wanted is not None
+    assert state.started(1, "Planning").wanted is None
 
 
 def test_cancelled_is_not_begun_again_by_itself():
@@ -365,6 +399,8 @@ CHANGES = st.one_of(
             State.retry,
             lambda s: s.map_arrived(0, s.result) if s.result else s,
             lambda s: s.started(1, "map", s.wanted) if s.wanted else s,
+            lambda s: s.progressed(1, 0.5, late=True),
+            lambda s: s.map_arrived(1, s.result) if s.result else s,
             lambda s: s.stopped(1),
             lambda s: s.started(2, "Planning"),
             lambda s: s.plan_arrived(2, planned("pick_pour_place", "sequential")),

@@ -67,7 +67,7 @@ class GraspPage:
         """Wait for the map of that scene, task or arm, up to date."""
         title = self.page.locator(".sg-title")
         expect(title).to_contain_text(text)
-        expect(title).not_to_contain_text("earlier")
+        expect(title).to_have_attribute("aria-busy", "false")
         expect(self.text("Ready.")).to_be_visible()
 
     def picture(self, alt: str = "map") -> np.ndarray:
