@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, ViewportSize, sync_playwright
 
 from tests.e2e.page import GraspPage
 
@@ -74,9 +74,13 @@ def open_page(browser: Browser, start_server: Callable[[str], str]) -> Iterator[
     contexts = []
 
     def open_(
-        server: str = "bottle_on_table", scene: str | None = None, wait_for_map: bool = True
+        server: str = "bottle_on_table",
+        scene: str | None = None,
+        wait_for_map: bool = True,
+        size: tuple[int, int] = (1280, 800),
     ) -> GraspPage:
-        context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
+        viewport: ViewportSize = {"width": size[0], "height": size[1]}
+        context = browser.new_context(viewport=viewport, accept_downloads=True)
         contexts.append(context)
         page = GraspPage(context.new_page(), start_server(server), wait_for_map)
         if scene:

@@ -1,0 +1,57 @@
+"""The map follows while the object is dragged about with its handles."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+
+from symgrasp.scene import Scene
+from tests.e2e.page import GraspPage
+
+BOTTLE = Scene.load("bottle_on_table")
+SHOTS = Path(__file__).parent / "screenshots"
+
+HANDLE = np.array([0.0389, 0.0389, 0.0])
+"""Where (m) the handle that slides the object over the table is, from the object's origin."""
+
+log = logging.getLogger(__name__)
+
+WATCH = """() => {
+    window.updates = [];
+    let last = document.querySelector("img[alt='map']").src;
+    new MutationObserver(() => {
+        const image = document.querySelector("img[alt='map']");
+        if (image && image.src !== last) { last = image.src; window.updates.push(performance.now()); }
+    }).observe(document.body, {subtree: true, childList: true, attributes: true});
+}"""
+
+
+def test_the_map_follows_a_circle_on_the_table(open_page):
+    page: GraspPage = open_page(size=(1280, 720))
+    page.page.get_by_label("Drag handles").check()
+    page.settled_view()
+    bottle = BOTTLE.task().T_world_object[:3, 3]
+    turns = np.linspace(0, 2 * np.pi, 61)
+    radius = 0.06
+    centre = bottle + HANDLE - [radius, 0, 0]
+    path = [page.at(BOTTLE, centre + radius * np.array([np.cos(a), np.sin(a), 0])) for a in turns]
+    mouse = page.page.mouse
+    mouse.move(path[0][0] - 3, path[0][1])
+    page.settled_view()
+    mouse.move(*path[0])
+    page.settled_view()
+    page.page.evaluate(WATCH)
+    mouse.down()
+    for x, y in path:
+        mouse.move(x, y)
+    page.page.screenshot(path=SHOTS / "drag.png")
+    mouse.up()
+    page.expect_title("pick")
+    times = np.array(page.page.evaluate("window.updates")) / 1e3
+    rate = (len(times) - 1) / (times[-1] - times[0])
+    log.info("%d maps for %d positions while dragging, %.1f a second", len(times), len(path), rate)
+    assert len(times) > 3
+    pose = page.slider_box("x (cm)").input_value(), page.slider_box("y (cm)").input_value()
+    assert pose == ("55", "0")  # full circle
