@@ -14,7 +14,9 @@ from contextlib import redirect_stdout
 import viser
 
 from app.compute import Store
-from app.session import Session
+from app.front_door import FrontDoor
+from app.reception import Reception
+from symgrasp.compiling import COMPILING, telling_of_compiling
 from symgrasp.errors import InputError, SymgraspError
 
 __all__ = ["main", "serve"]
@@ -32,31 +34,18 @@ def serve(scene: str, host: str, port: int) -> None:
         InputError: the scene is unusable or the port is not free.
     """
     _check_free(host, port)
-    store = Store(scene)
+    store = _warm_store(scene)
     with redirect_stdout(io.StringIO()):  # viser's own banner
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-    if server.get_port() != port:  # taken meanwhile: viser moves on to the next one without a word
-        server.stop()
-        raise _busy(port, "taken by another program")
+        server = viser.ViserServer(host="127.0.0.1", port=_any_port(), verbose=False)
     server.scene.world_axes.visible = False
-    sessions: dict[int, Session] = {}
-    lock = threading.Lock()
-
-    @server.on_client_connect
-    def _(client: viser.ClientHandle) -> None:
-        session = Session(client, store)
-        with lock:
-            sessions[client.client_id] = session
-        if client.client_id not in server.get_clients():  # gone while its session was made
-            _close(client)
-
-    @server.on_client_disconnect
-    def _close(client: viser.ClientHandle) -> None:
-        with lock:
-            session = sessions.pop(client.client_id, None)
-        if session:
-            session.close()
-
+    reception = Reception(store, lambda client_id: client_id in server.get_clients())
+    server.on_client_connect(reception.arrived)
+    server.on_client_disconnect(reception.left)
+    try:
+        door = FrontDoor(host, port, server.get_port(), reception.visited)
+    except OSError as error:  # taken meanwhile
+        server.stop()
+        raise _busy(port, (error.strerror or str(error)).lower()) from error
     shown = f"[{host}]" if ":" in host else host
     print(f"symgrasp: http://{shown}:{port}", flush=True)
     try:
@@ -64,9 +53,23 @@ def serve(scene: str, host: str, port: int) -> None:
     except KeyboardInterrupt:
         print("\nsymgrasp: stopped", flush=True)
     finally:
-        for session in list(sessions.values()):
-            session.close()
+        door.close()
+        reception.close()
         server.stop()
+
+
+def _warm_store(scene: str) -> Store:
+    """Return the store with the first map in it, so that whoever opens the page finds it there."""
+    with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
+        store = Store(scene)
+        store.warm()
+    return store
+
+
+def _any_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 def _check_free(host: str, port: int) -> None:

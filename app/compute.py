@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Mapping
 
@@ -11,6 +13,7 @@ import numpy as np
 from app.meshes import link_visuals
 from app.things import OWN, Thing, from_library
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
+from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.feasibility import FeasibilityMap, Progress
 from symgrasp.manifold import ROLLS
 from symgrasp.maps import MapMaker
@@ -23,11 +26,17 @@ from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
 
 __all__ = ["Store", "Workbench", "check_visuals"]
 
+log = logging.getLogger(__name__)
+
 MAPS_KEPT = 64
 """Maps that the server remembers, newest first; a big one (96 x 192 cells) takes about 4 MB."""
 
 POSES_KEPT = 6
 """Of them, those of one task and arm that differ in pose: a drag leaves dozens that nobody comes back to."""
+
+
+WARMING = 5.0
+"""How long (s) people wait for the first map before the page opens without it."""
 
 
 class Store:
@@ -99,6 +108,28 @@ class Store:
                 del self._maps[request]
             while len(self._maps) > MAPS_KEPT:
                 self._maps.popitem(last=False)
+
+    def warm(self) -> None:
+        """Compute the first map of the first scene, unless that takes too long to wait for.
+
+        What goes wrong is left for the page to say.
+        """
+        scene = self.scene(self.first)
+        task = scene.task()
+        begun: list[float] = []
+
+        def patience(share: float) -> None:
+            begun.append(time.monotonic())  # first told when everything is compiled
+            if begun[-1] - begun[0] > WARMING and share < 1:
+                raise Cancelled
+
+        bench = Workbench(self)
+        try:
+            bench.map(MapRequest(scene, task.arms[0], task.name), patience)
+        except SymgraspError as error:  # also when cancelled
+            log.info("no first map: %s", error)
+        finally:
+            bench.close()
 
 
 class Workbench:

@@ -132,3 +132,17 @@ def test_the_first_scene_is_offered_even_if_it_is_a_file(tmp_path, content):
     names = Store(path).names
     assert names[0] == path
     assert set(names[1:]) == set(SHIPPED)
+
+
+def test_the_first_map_is_there_before_anybody_asks(monkeypatch, tmp_path, content):
+    content["map"] = {"heights": 4, "angles": 8, "redundancy": 2}
+    store = Store(str(write_scene(tmp_path, content)))
+    request = State.of(store.scene(store.first), store.first).request
+    assert store.map(request) is None
+    monkeypatch.setattr(compute, "WARMING", -1.0)
+    monkeypatch.setattr(MapMaker, "map", lambda self, arm, task, progress: progress(0.5))
+    store.warm()  # takes too long: the page opens without it
+    assert store.map(request) is None
+    monkeypatch.undo()
+    store.warm()
+    assert store.map(request)
