@@ -23,14 +23,17 @@ SECONDS_PER_TASK = 1
 
 
 def to_csv(plan: Plan) -> str:
-    """Return one line for each joint of each arm in each task: task, arm, joint, value (rad or m)."""
+    """Return a line for each joint of each arm in each task: step, task, arm, joint, value (rad or m).
+
+    Steps count the plan's tasks from 1: a regrasp visits the task where the object stands twice.
+    """
     buffer = io.StringIO()
     rows = csv.writer(buffer, lineterminator="\n")
-    rows.writerow(["task", "arm", "joint", "value"])
-    for task in plan.tasks:
+    rows.writerow(["step", "task", "arm", "joint", "value"])
+    for step, task in enumerate(plan.tasks, start=1):
         for hold in task.holds:
             for name, value in {**hold.joints, **hold.hand_joints}.items():
-                rows.writerow([task.name, hold.arm, name, repr(value)])
+                rows.writerow([step, task.name, hold.arm, name, repr(value)])
     return buffer.getvalue()
 
 

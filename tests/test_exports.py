@@ -7,10 +7,12 @@ import json
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 from symgrasp.cli import main
 from symgrasp.exports import to_csv, to_trajectories, to_tsr
-from symgrasp.poses import rotation_z, translation
+from symgrasp.manifold import grasp_to_tool
+from symgrasp.poses import pose_error, rotation_z, translation
 from symgrasp.scene import Scene
 from tests.test_plan import PLANS, bimanual, sequential
 
@@ -19,12 +21,15 @@ from tests.test_plan import PLANS, bimanual, sequential
 def test_csv_reads_back_exactly(make):
     plan = make()
     rows = list(csv.DictReader(io.StringIO(to_csv(plan))))
-    values = {(r["task"], r["arm"], r["joint"]): float(r["value"]) for r in rows}
+    values = {(r["step"], r["task"], r["arm"], r["joint"]): float(r["value"]) for r in rows}
+    expected = {
+        (str(step), task.name, hold.arm, name): value
+        for step, task in enumerate(plan.tasks, start=1)
+        for hold in task.holds
+        for name, value in {**hold.joints, **hold.hand_joints}.items()
+    }
     assert len(rows) == len(values)
-    for task in plan.tasks:
-        for hold in task.holds:
-            for name, value in {**hold.joints, **hold.hand_joints}.items():
-                assert values[task.name, hold.arm, name] == value
+    assert values == expected
 
 
 @pytest.mark.parametrize("make", PLANS)
@@ -65,6 +70,33 @@ def test_regions_contain_the_grasps(make):
             for h in bounds[2]:
                 assert scene.arm(hold.arm).hand.pads_rest(scene.profile, float(h))
             assert region["preshape"] == [hold.opening]
+
+
+@pytest.mark.parametrize("make", PLANS)
+def test_poses_drawn_from_a_region_are_grasps(make):
+    """Any pose within Bw, by the region's own formula, is a grasp of its height and angle.
+
+    The hand stays at one distance from the axis, so it may be off by what its radius tolerates.
+    """
+    plan = make()
+    scene = Scene.from_content(plan.scene.content)
+    rng = np.random.default_rng(0)
+    holds = {h.arm: h for task in plan.tasks for h in task.holds}
+    for region in yaml.safe_load_all(to_tsr(plan)):
+        hold = holds[region["name"].split(": ")[1]]
+        hand = scene.arm(hold.arm).hand
+        bounds = np.array(region["Bw"])
+        for _ in range(50):
+            x, y, z, roll, pitch, yaw = rng.uniform(*bounds.T)
+            inside = np.eye(4)
+            inside[:3, :3] = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
+            inside[:3, 3] = x, y, z
+            drawn = np.array(region["T_ref_tsr"]) @ inside @ np.array(region["Tw_e"])
+            standoff = hand.standoff(float(scene.profile.radius(z)))
+            grasp = grasp_to_tool(np.eye(4), z, yaw, hold.grasp.roll, standoff)
+            distance, angle = pose_error(drawn, grasp)
+            assert distance <= hand.radius_tolerance + 1e-9
+            assert angle < 1e-7
 
 
 @pytest.mark.parametrize("name", ["csv", "trajectory", "tsr"])

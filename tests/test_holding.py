@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from itertools import chain, combinations, islice, product
 from types import SimpleNamespace
@@ -217,6 +218,60 @@ def test_wide_open_maps_by_brute_force(count):
     found = next(search.best_first())
     assert found.score == pytest.approx(best)
     assert best > 0
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.005, 0.02]))
+@settings(max_examples=30, deadline=None)
+def test_four_hands_by_trying_all(seed, density):
+    """A handful of cells for each of four hands: the best score over all choices, if there is one."""
+    arms, grid, _ = fine()
+    rng = np.random.default_rng(seed)
+    maps = [map_of(rng.random((2, 24, 8)) < density, grid=grid) for _ in range(4)]
+    gaps = PrintGaps([arms[k % 2] for k in range(4)], grid)
+    cells = [np.argwhere(m.feasible) for m in maps]
+    alone = [surface_margin(m)[m.feasible] for m in maps]
+    reached = np.full([len(own) for own in cells], np.inf)
+    for k, margin in enumerate(alone):
+        reached = np.minimum(reached, margin.reshape([-1 if axis == k else 1 for axis in range(4)]))
+    for a, b in combinations(range(4), 2):
+        table = gaps.table(a, b)
+        line_a, line_b = (cells[k][:, 0] * 24 + cells[k][:, 1] for k in (a, b))
+        columns = (cells[b][:, 2] - cells[a][:, 2][:, None]) % 8
+        gap = table.gaps[table.row[line_a[:, None], line_b], columns]
+        reached = np.minimum(reached, gap.reshape([len(cells[k]) if k in (a, b) else 1 for k in range(4)]))
+    best = reached.max(initial=-1.0)
+    names = [str(k) for k in range(4)]
+    keyed = {(0, name): m for name, m in zip(names, maps, strict=True)}
+    found = next(HoldingSearch(keyed, [names], gaps).best_first(), None)
+    assert (found is not None and found.score >= 0) == (best >= 0)
+    if found and best >= 0:
+        assert found.score == pytest.approx(best)
+
+
+def test_the_work_grows_with_the_number_of_tasks():
+    """One grasp for a sequence: twice the tasks, about twice the calls, on maps of one size."""
+    (m,) = random_maps(0, 1, 0.5)
+
+    def calls(tasks: int) -> int:
+        count = 0
+
+        def note(frame, event, argument):
+            nonlocal count
+            count += event in ("call", "c_call")
+
+        maps = {(k, "a"): m for k in range(tasks)}
+        sys.setprofile(note)
+        try:
+            search = HoldingSearch(maps, [["a"]] * tasks, small()[2])
+            found = next(search.best_first())
+            assert all(search.turns(found.cells, k) for k in range(tasks))
+        finally:
+            sys.setprofile(None)
+        return count
+
+    calls(1)  # what is computed once
+    assert calls(80) - calls(40) < 1.1 * (calls(60) - calls(20))
+    assert calls(80) < 2.1 * calls(40)
 
 
 @given(st.integers(0, 2**32 - 1))

@@ -12,6 +12,7 @@ import pytest
 from symgrasp.cli import main
 from symgrasp.errors import PlanError
 from symgrasp.plan import Plan
+from symgrasp.scene import Scene
 from symgrasp.verify import verify
 from tests.test_plan import PLANS, bimanual, handover, sequential
 
@@ -74,6 +75,18 @@ def test_small_changes_of_joints_and_poses_are_caught(make):
     missed = [p for p in paths if not caught(changed(content, p, -1e-5))]
     assert len(paths) > 60
     assert missed == []
+
+
+@pytest.mark.parametrize("make", PLANS)
+def test_margins_of_one_more_cell_are_caught(make):
+    """They are exact: a cell more would reach past what is feasible, or half around the object."""
+    content = json.loads(make().to_json())
+    grid = Scene.from_content(content["scene"]["content"]).manifold
+    holds = [
+        ("tasks", k, "holds", j) for k, task in enumerate(content["tasks"]) for j in range(len(task["holds"]))
+    ]
+    sizes = {"margin_along": grid.dh, "margin_around": grid.dtheta}
+    assert all(caught(changed(content, (*h, name), size)) for h in holds for name, size in sizes.items())
 
 
 def edit(make, change) -> dict:

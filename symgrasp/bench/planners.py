@@ -23,6 +23,7 @@ from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch
 from symgrasp.planners.postures import Postures
 from symgrasp.planners.sequential import surface_margin
+from symgrasp.planning import plan_sequential
 from symgrasp.poses import Array, inverse, rotation_z, translation
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm
@@ -33,15 +34,18 @@ from symgrasp.world import BulletWorld, Collision
 __all__ = ["long_sequence", "run", "several_hands", "without_the_manifold"]
 
 
-LIMITS = Climb(restarts=20, iterations=100)
-"""Of the hill climbing; the paper does not tell its own."""
+LIMITS = Climb(restarts=10, iterations=50)
+"""Of the hill climbing; the paper does not tell its own.
+
+Twice as many of both find 2 % more, in thrice the time.
+"""
 
 
 def run() -> Iterator[Figure]:
     """Measure the planners, a figure at a time."""
     yield from long_sequence(tasks=50, runs=10)
     yield from without_the_manifold(runs=10)
-    yield from several_hands(pairs=60)
+    yield from several_hands(pairs=500)
 
 
 def long_sequence(tasks: int, runs: int) -> Iterator[Figure]:
@@ -87,15 +91,21 @@ def without_the_manifold(runs: int) -> Iterator[Figure]:
         next(search.best_first())
         with_maps = perf_counter() - start
         budget = world.checks
-        successes, ratios = [], []
+        successes, times = [], []
         for seed in range(runs):
             start = perf_counter()
             successes.append(float(_sample_grasps(scene, tasks, world, budget, seed)))
-            ratios.append((perf_counter() - start) / with_maps)
+            times.append(perf_counter() - start)
+    plan_sequential(scene)  # compiles what is not compiled yet
+    start = perf_counter()
+    plan_sequential(scene)
+    with_engine = perf_counter() - start
+    name = "pick, pour, place by sampling, same budget of collision checks"
+    yield Figure(f"{name}: success", "", tuple(successes))
+    yield Figure("  time against maps of Algorithm 1 and planner", "×", tuple(t / with_maps for t in times))
     yield Figure(
-        "pick, pour, place by sampling, same budget of collision checks: success", "", tuple(successes)
+        "  time against the best plan, world and maps made anew", "×", tuple(t / with_engine for t in times)
     )
-    yield Figure("  time against maps and planner", "×", tuple(ratios))
 
 
 def _sample_grasps(
@@ -166,6 +176,7 @@ def _said(results: Sequence[_Pair]) -> Iterator[Figure]:
     exact, climb = (np.array([getattr(r, name) for r in results]) for name in ("exact_time", "climb_time"))
     where = np.array([r.climbed is not None for r in results])
     share = lambda found: (100 * sum(found) / len(results),)  # noqa: E731
+    yield Figure("two hands: random pairs of maps, the same for both", "", (float(len(results)),))
     yield Figure("two hands, complete search: success", "%", share([r.exact is not None for r in results]))
     yield Figure("two hands, hill climbing as printed: success", "%", share(where.tolist()))
     missed = [r.climbed is not None and r.exact is None for r in results]
