@@ -176,9 +176,9 @@ def _said(results: Sequence[_Pair]) -> Iterator[Figure]:
     exact, climb = (np.array([getattr(r, name) for r in results]) for name in ("exact_time", "climb_time"))
     where = np.array([r.climbed is not None for r in results])
     share = lambda found: (100 * sum(found) / len(results),)  # noqa: E731
-    yield Figure("two hands: random pairs of maps, the same for both", "", (float(len(results)),))
-    yield Figure("two hands, complete search: success", "%", share([r.exact is not None for r in results]))
-    yield Figure("two hands, hill climbing as printed: success", "%", share(where.tolist()))
+    pairs = f"success in {len(results)} pairs"
+    yield Figure(f"two hands, complete search: {pairs}", "%", share([r.exact is not None for r in results]))
+    yield Figure(f"two hands, hill climbing as printed: {pairs}", "%", share(where.tolist()))
     missed = [r.climbed is not None and r.exact is None for r in results]
     yield Figure("  climbing alone finds something", "%", share(missed))
     yield Figure("two hands, complete search with whole robots", "ms", tuple(1e3 * exact))
