@@ -7,7 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 
-from docs.figures import holding, page, unwrapping
+from docs.figures import climbing, holding, page, unwrapping
 from docs.figures.style import IMAGES
 
 __all__ = ["FIGURES", "main"]
@@ -20,6 +20,7 @@ FIGURES: dict[str, Callable[[], None]] = {
         holding.wine_bottle,
         unwrapping.turn_shifts,
         unwrapping.maps_slide,
+        climbing.handprints,
         holding.pick_pour_place,
         page.page,
         page.page_two_robots,
