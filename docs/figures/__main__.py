@@ -22,6 +22,7 @@ FIGURES: dict[str, Callable[[], None]] = {
         unwrapping.maps_slide,
         climbing.handprints,
         holding.pick_pour_place,
+        holding.tutorial,
         page.page,
         page.page_two_robots,
     )

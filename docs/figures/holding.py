@@ -1,6 +1,10 @@
-"""The figures with whole robots: the paper's figures 1, 4 and 8."""
+"""The figures with whole robots: the paper's figures 1, 4 and 8, and the tutorial's."""
 
 from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -16,16 +20,18 @@ from docs.figures.models import (
     with_seam,
 )
 from docs.figures.render import Camera
-from docs.figures.style import board, label, legend, map_axes, mark, new, photo, save
+from docs.figures.style import IMAGES, board, label, legend, map_axes, mark, new, photo, save
+from docs.pages import refresh
 from symgrasp.feasibility import Cell
 from symgrasp.manifold import ROLLS, Manifold
 from symgrasp.maps import create_map
-from symgrasp.plan import Hold
+from symgrasp.plan import Hold, Plan
 from symgrasp.planning import plan_bimanual, plan_sequential
 from symgrasp.scene import Scene
 
-__all__ = ["log_four_robots", "pick_pour_place", "wine_bottle"]
+__all__ = ["log_four_robots", "pick_pour_place", "tutorial", "wine_bottle"]
 
+GLAZE = np.array([60, 120, 160]) / 255
 WOOD = np.array([214, 178, 131]) / 255
 HANDS = PRINTS[1:-1]
 
@@ -111,6 +117,25 @@ def pick_pour_place() -> None:
     grasp = f"the same grasp in all: h = {100 * hold.grasp.h:.1f} cm, θ = {np.rad2deg(hold.grasp.theta):.0f}°"
     figure.text(0.5, 0.02, grasp, ha="center", va="bottom", color=INK, fontsize=9)
     save(figure, "pick_pour_place.png")
+
+
+def tutorial() -> None:
+    """The tutorial's pictures: those that its commands write, and its plan."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        refresh(IMAGES.parent / "tutorial.md", folder)
+        for path in folder.glob("*.png"):
+            shutil.copy(path, IMAGES / f"tutorial_{path.name}")
+        plan = Plan.load(folder / "plan.json")
+    scene = Scene.from_content(plan.scene.content)
+    figure = new(10, 4.6)
+    for k, task in enumerate(plan.tasks):
+        pose = task.object_pose_turned.array()
+        vase = object_body(scene.profile, pose, lambda h, _: np.tile(GLAZE, (len(h), 1)))
+        bodies = [*robots(scene, task), *obstacles(scene), vase, floor(-0.04)]
+        photo(figure, (5.05 * k, 0.35, 4.95, 4.25), bodies, Camera((0.4, 0.1, 0.4), -108, 18, 1.4))
+        figure.text((5.05 * k + 2.5) / 10, 0.03, task.name, ha="center", fontsize=10)
+    save(figure, "tutorial_plan.png")
 
 
 def _print(scene: Scene, hold: Hold, grid: Manifold) -> np.ndarray:
