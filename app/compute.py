@@ -20,7 +20,7 @@ from symgrasp.maps import MapMaker
 from symgrasp.meshes import read_mesh
 from symgrasp.plan import Hold, Plan
 from symgrasp.planning import plan_bimanual, plan_sequential
-from symgrasp.robot import RobotModel
+from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
 

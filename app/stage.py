@@ -11,7 +11,7 @@ import viser
 from app.meshes import link_visuals
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, quat_wxyz
-from symgrasp.robot import RobotModel
+from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Obstacle
 

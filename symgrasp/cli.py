@@ -298,7 +298,7 @@ def _verify(args: argparse.Namespace) -> int:
 
 def _hand(args: argparse.Namespace) -> int:
     from symgrasp.measure_hand import hand_yaml, measure_hand
-    from symgrasp.robot import RobotModel
+    from symgrasp.robot_model import RobotModel
 
     path = resolve(args.urdf, Path())
     if path is None:

@@ -11,7 +11,7 @@ import numpy as np
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.handprint import hull_edges, slab_corners
 from symgrasp.poses import Array, inverse
-from symgrasp.robot import RobotModel
+from symgrasp.robot_model import RobotModel
 
 __all__ = ["Anatomy", "Gripper", "Motion", "find_anatomy", "find_gripper", "snap", "solid_links"]
 

@@ -16,7 +16,7 @@ from symgrasp.hand import Hand, JointTable
 from symgrasp.handprint import hull_edges, slab_corners
 from symgrasp.outline import simplify
 from symgrasp.poses import Array, from_rotation, inverse, quat_wxyz, rpy
-from symgrasp.robot import RobotModel
+from symgrasp.robot_model import RobotModel
 
 __all__ = ["hand_yaml", "measure_hand"]
 

@@ -14,7 +14,8 @@ from symgrasp.hand import HANDS, Hand
 from symgrasp.objects import library_objects, load_object
 from symgrasp.poses import Array
 from symgrasp.profile import Profile
-from symgrasp.robot import Arm, Robot, RobotModel
+from symgrasp.robot import Arm, Robot
+from symgrasp.robot_model import RobotModel
 from symgrasp.scene_file import (
     SHAPES,
     ArmFile,

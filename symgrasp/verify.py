@@ -18,7 +18,7 @@ import numpy as np
 from symgrasp.candidates import Judge
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import Progress
-from symgrasp.ik import solver_for
+from symgrasp.ik import ClosedFormIK
 from symgrasp.plan import CLEARANCE_LIMIT, Hold, Plan, PlanTask, Pose
 from symgrasp.poses import Array, from_position_quat, inverse, pose_error, rotation_z
 from symgrasp.reason import Reason
@@ -268,7 +268,7 @@ def _check_margins(
     """Check that a grasp closer by a cell than each margin is still feasible, one arm at a time."""
     scene = world.scene
     arm, grid, g = scene.arm(hold.arm), scene.manifold, hold.grasp
-    ik = solver_for(arm, scene.settings.redundancy)
+    ik = ClosedFormIK(arm, scene.settings.redundancy)  # EAIK: maps are mostly made with another solver
     judge = Judge(world, arm, ik, scene.settings.approach)
     for name in scene.robots:
         world.park(name)

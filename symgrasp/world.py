@@ -25,7 +25,8 @@ from symgrasp.errors import MeshError, SceneError, SymgraspError, UrdfError
 from symgrasp.meshes import depth_inside, read_mesh
 from symgrasp.poses import Array, axis_frame, from_position_quat, quat_wxyz, wxyz_to_xyzw, xyzw_to_wxyz
 from symgrasp.reason import Reason
-from symgrasp.robot import Arm, Robot, RobotModel
+from symgrasp.robot import Arm, Robot
+from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Obstacle
 

@@ -10,7 +10,7 @@ from symgrasp.assembly import Frame, Mount, assemble
 from symgrasp.errors import UrdfError
 from symgrasp.files import resolve
 from symgrasp.poses import from_position_rpy, quat_wxyz
-from symgrasp.robot import RobotModel
+from symgrasp.robot_model import RobotModel
 
 WSG = resolve("package://static_scenes/hands/wsg50.urdf", Path()) or Path()
 IIWA = resolve("package://pybullet_data/kuka_iiwa/model.urdf", Path()) or Path()

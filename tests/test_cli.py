@@ -6,6 +6,7 @@ import pty
 import signal
 import subprocess
 import sys
+from importlib import resources
 from pathlib import Path
 
 import jsonschema
@@ -81,9 +82,12 @@ def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):
 @pytest.mark.parametrize("name", ["scene", "plan"])
 def test_schemas_are_schemas(name, capsys):
     assert main(["schema", name]) == 0
-    schema = json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr().out
+    schema = json.loads(printed)
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["properties"]["schema_version"]["const"] == 1
+    shipped = resources.files("symgrasp") / "schemas" / f"{name}.schema.json"
+    assert shipped.read_text(encoding="utf-8") == printed, f"symgrasp schema {name} > {shipped}"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ import ssik
 from symgrasp.errors import UrdfError
 from symgrasp.ik import ClosedFormIK
 from symgrasp.poses import from_position_quat, pose_error
-from symgrasp.robot import Arm, Robot, RobotModel
+from symgrasp.robot import Arm, Robot
+from symgrasp.robot_model import RobotModel
 from tests.conftest import load_small
 from tests.test_robot import KUKA
 

@@ -15,7 +15,7 @@ from symgrasp.files import resolve
 from symgrasp.hand import HANDS, Hand
 from symgrasp.measure_hand import hand_yaml, measure_hand
 from symgrasp.poses import from_rotation, rpy
-from symgrasp.robot import RobotModel
+from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene
 from tests.hands import FLANGE, IIWA
 

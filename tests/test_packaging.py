@@ -36,7 +36,7 @@ def wheel(tmp_path_factory) -> Path:
 def test_scenes_and_the_page_come_with_the_wheel(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {f"static_scenes/{name}.yaml" for name in SHIPPED} <= names
-    assert {"static_scenes/bowl.obj", "app/__main__.py", "symgrasp/cli.py"} <= names
+    assert {"static_scenes/bowl.obj", "app/__main__.py", "symgrasp/schemas/plan.schema.json"} <= names
     assert not any(name.startswith("tests/") for name in names)
 
 

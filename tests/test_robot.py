@@ -9,7 +9,8 @@ import yourdfpy
 from symgrasp.errors import UrdfError
 from symgrasp.files import package_dir
 from symgrasp.hand import HANDS, Hand
-from symgrasp.robot import Arm, Robot, RobotModel
+from symgrasp.robot import Arm, Robot
+from symgrasp.robot_model import RobotModel
 
 DATA = package_dir("pybullet_data") or Path()
 PANDA = DATA / "franka_panda" / "panda.urdf"

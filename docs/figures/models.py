@@ -21,7 +21,8 @@ from symgrasp.plan import Hold, PlanTask
 from symgrasp.poses import Array, inverse
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
-from symgrasp.robot import Robot, RobotModel
+from symgrasp.robot import Robot
+from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Obstacle
 

@@ -14,7 +14,8 @@ from symgrasp.engine.tree import Tree, build
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, inverse
 from symgrasp.profile import COLLISION_FACETS
-from symgrasp.robot import Arm, Joint, RobotModel
+from symgrasp.robot import Arm
+from symgrasp.robot_model import Joint, RobotModel
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Obstacle
 from symgrasp.world import Body as Name

@@ -11,7 +11,7 @@ import trimesh
 
 from app.meshes import link_visuals
 from symgrasp.errors import SymgraspError
-from symgrasp.robot import RobotModel
+from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene
 
 URDF = """<robot name="r"><material name="blue"><color rgba="0 0 1 1"/></material>
