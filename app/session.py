@@ -16,6 +16,7 @@ import viser
 from app.asking import Request
 from app.compute import Store, Workbench, check_visuals
 from app.controls import PANELS_WIDTH, Controls
+from app.history import remember
 from app.state import State
 from app.things import Thing, check_size, from_mesh
 from app.view import SceneView
@@ -92,7 +93,8 @@ class Session:
             with self._changed:
                 old = self.state
                 if old is None or (old.busy and old.busy.ticket == ticket):
-                    self._take(replace(State.of(scene, name), uploaded=old.uploaded if old else None), "")
+                    new = State.of(scene, name)
+                    self._take(replace(new, uploaded=old.uploaded, history=old.history) if old else new, "")
 
         self._submit(f"Loading {name}", lambda _: self.store.scene(name), done)
 
@@ -181,6 +183,8 @@ class Session:
         """Make a state the current one, and compute what it lacks; the lock is held."""
         if state is self.state:
             return
+        if self.state is not None:
+            state = remember(self.state, state, origin, time.monotonic())
         if self.state is None or state.inputs != self.state.inputs:
             self._write_inputs |= origin != "inputs"
             self._move_gizmo |= origin != "gizmo"

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from app.asking import Busy, Request
+from app.history import History
 from app.things import OWN, Thing
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.errors import InputError
@@ -60,6 +61,7 @@ class State:
         gizmo: whether the handles that drag the object are seen.
         errors: whether the object's surface shows the symmetry error of its mesh and not the map.
         board: whether the map is laid out in the scene as well.
+        history: what can be undone and redone.
     """
 
     scene: Scene
@@ -81,6 +83,7 @@ class State:
     gizmo: bool = False
     errors: bool = False
     board: bool = True
+    history: History = field(default_factory=History)
 
     @staticmethod
     def of(scene: Scene, name: str) -> State:
