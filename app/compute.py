@@ -7,6 +7,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 
@@ -144,6 +145,13 @@ class Workbench:
         if self._maker:
             self._maker.world.close()
             self._maker = None
+
+    def restart(self) -> None:
+        """Leave the physics world alone, whatever state it is in; the next computation makes another."""
+        broken, self._maker = self._maker, None
+        if broken:
+            with suppress(Exception):  # nothing is known about what is broken
+                broken.world.close()
 
     def maker(self, scene: Scene) -> MapMaker:
         """Return a map maker for the scene's robots, obstacles and object; its tasks do not matter."""

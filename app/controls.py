@@ -7,6 +7,7 @@ from pathlib import Path
 import viser
 
 from app.panels.grasp_panel import GraspPanel
+from app.panels.keyboard import Keyboard
 from app.panels.map_panel import MapPanel
 from app.panels.object_panel import ObjectPanel
 from app.panels.panel import Actions, Panel
@@ -15,11 +16,14 @@ from app.panels.scene_panel import ScenePanel
 from app.panels.status_panel import NotesPanel, StatusPanel
 from app.state import State
 
-__all__ = ["PANELS_WIDTH", "Controls"]
+__all__ = ["Controls", "panel_widths"]
+
+WINDOW = 1280
+"""Width (px) of a window from which on the panels have all the room they want."""
 
 MAP_WIDTH = 480
 CONTROLS_WIDTH = 320
-PANELS_WIDTH = MAP_WIDTH + CONTROLS_WIDTH
+NARROWEST = 240
 
 
 class Controls:
@@ -33,10 +37,8 @@ class Controls:
 
     def __init__(self, client: viser.ClientHandle, actions: Actions, scenes: tuple[str, ...]) -> None:
         gui = client.gui
-        gui.configure_theme(
-            control_layout="floating", dark_mode=False, show_logo=False, show_share_button=False,
-            brand_color=(38, 102, 190),
-        )  # fmt: skip
+        self.gui, self._dark = gui, False
+        self._theme(dark=False)
         gui.set_panel_label("symgrasp")
         left = gui.add_panel()
         with left.add_tab("Grasp map", viser.Icon.MAP_2):
@@ -48,14 +50,16 @@ class Controls:
                 PlanMapsPanel(gui, actions),
             ]
         left.dock_left()
-        left.set_width(MAP_WIDTH)
+        map_width, controls_width = panel_widths(client.camera.image_width)
+        left.set_width(map_width)
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(CONTROLS_WIDTH)
+        gui.main_panel.set_width(controls_width)
         main = [
             StatusPanel(gui, actions),
             ScenePanel(gui, actions, scenes),
             ObjectPanel(gui, actions),
             PlanPanel(gui, actions),
+            Keyboard(gui, actions, scenes),
         ]
         self.panels: tuple[Panel, ...] = (*map_tab, *main)
 
@@ -66,10 +70,24 @@ class Controls:
             state: the state.
             write_inputs: write the inputs as well; not while a person is moving them.
         """
+        if state.dark != self._dark:
+            self._dark = state.dark
+            self._theme(dark=state.dark)
         for panel in self.panels:
             panel.show(state)
             if write_inputs:
                 panel.write_inputs(state)
+
+    def _theme(self, *, dark: bool) -> None:
+        self.gui.configure_theme(
+            dark_mode=dark, show_logo=False, show_share_button=False, brand_color=(38, 102, 190)
+        )
+
+
+def panel_widths(window: int) -> tuple[int, int]:
+    """Return how wide (px) the maps and the controls are, so that a tablet shows the scene as well."""
+    share = min(1.0, window / WINDOW)
+    return round(MAP_WIDTH * share), max(round(CONTROLS_WIDTH * share), NARROWEST)
 
 
 def _style() -> str:

@@ -15,7 +15,7 @@ import viser
 
 from app.asking import Request
 from app.compute import Store, Workbench, check_visuals
-from app.controls import PANELS_WIDTH, Controls
+from app.controls import Controls, panel_widths
 from app.history import remember
 from app.state import State
 from app.things import Thing, check_size, from_mesh
@@ -53,11 +53,11 @@ class Session:
         self._write_inputs = self._move_gizmo = True
         self._closed = False
         self.bench = Workbench(store)
-        self.worker = Worker(f"worker {client.client_id}", self.bench.close)
+        self.worker = Worker(f"worker {client.client_id}", self.bench.close, self.bench.restart)
         self.controls = Controls(client, self, store.names)
         self.view = SceneView(
             client,
-            PANELS_WIDTH,
+            sum(panel_widths(client.camera.image_width)),
             on_surface=lambda i, j: self.change(lambda s: s.choose_surface_cell(i, j)),
             on_board=lambda i, j: self.change(lambda s: s.choose_cell(i, j)),
             on_drag=lambda pose: self.change(lambda s: s.drag(pose), "gizmo"),
@@ -93,8 +93,7 @@ class Session:
             with self._changed:
                 old = self.state
                 if old is None or (old.busy and old.busy.ticket == ticket):
-                    new = State.of(scene, name)
-                    self._take(replace(new, uploaded=old.uploaded, history=old.history) if old else new, "")
+                    self._take(old.open_scene(scene, name) if old else State.of(scene, name), "")
 
         self._submit(f"Loading {name}", lambda _: self.store.scene(name), done)
 

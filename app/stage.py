@@ -30,6 +30,10 @@ __all__ = [
 OBSTACLES = ((202, 199, 193), (164, 173, 184), (190, 172, 150), (170, 180, 160))
 """Colours of the obstacles in turn, paler than those of the map."""
 
+FLOOR = ((247, 248, 249), (225, 225, 225), (205, 205, 205))
+DARK_FLOOR = ((38, 40, 44), (52, 55, 60), (70, 74, 80))
+"""Colours of the floor, its lines, and every fifth of them."""
+
 FLOOR_GAP = 0.002
 
 FIELD_OF_VIEW = np.deg2rad(42)
@@ -65,7 +69,7 @@ class Viewpoint:
 
     def camera(self, aspect: float) -> Array:
         """Return where the camera stands (3,), for a picture of this width by height."""
-        distance = self.width / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.58, 1.1))
+        distance = self.width / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.35, 1.1))
         rise = np.array([0.0, 0.0, np.sin(VIEW_HEIGHT)])
         return self.look_at + distance * (np.cos(VIEW_HEIGHT) * self.direction + rise)
 
@@ -114,8 +118,9 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
             place(node, poses[model.link_index(link)])
 
 
-def add_floor(client: viser.ClientHandle, name: str, scene: Scene) -> None:
-    """Add a faint grid under everything."""
+def add_floor(client: viser.ClientHandle, name: str, scene: Scene, *, dark: bool) -> None:
+    """Add a faint grid under everything, or replace it."""
+    plane, cell, section = DARK_FLOOR if dark else FLOOR
     low = [robot.T_world_base[2, 3] for robot in scene.robots.values()]
     low += [o.T_world_obstacle[2, 3] - o.size[2] / 2 for o in scene.obstacles if o.kind == "box"]
     client.scene.add_grid(
@@ -124,9 +129,9 @@ def add_floor(client: viser.ClientHandle, name: str, scene: Scene) -> None:
         height=4.0,
         cell_size=0.1,
         section_size=0.5,
-        cell_color=(225, 225, 225),
-        section_color=(205, 205, 205),
-        plane_color=(247, 248, 249),
+        cell_color=cell,
+        section_color=section,
+        plane_color=plane,
         plane_opacity=1.0,
         shadow_opacity=0.0,
         position=(0.0, 0.0, min(low) - FLOOR_GAP),

@@ -61,6 +61,7 @@ class State:
         gizmo: whether the handles that drag the object are seen.
         errors: whether the object's surface shows the symmetry error of its mesh and not the map.
         board: whether the map is laid out in the scene as well.
+        dark: whether the page is dark.
         history: what can be undone and redone.
     """
 
@@ -83,6 +84,7 @@ class State:
     gizmo: bool = False
     errors: bool = False
     board: bool = True
+    dark: bool = False
     history: History = field(default_factory=History)
 
     @staticmethod
@@ -157,7 +159,7 @@ class State:
         """Everything that a widget or the gizmo shows and can change."""
         return (
             self.scene, self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick,
-            self.step, self.gizmo, self.errors, self.board, self.thing, self.uploaded,
+            self.step, self.gizmo, self.errors, self.board, self.dark, self.thing, self.uploaded,
         )  # fmt: skip
 
     @cached_property
@@ -196,6 +198,11 @@ class State:
         return moved(self.scene, self.poses)
 
     # -- changes ----------------------------------------------------------------------------
+
+    def open_scene(self, scene: Scene, name: str) -> State:
+        """Show another scene; what belongs to none stays."""
+        new = State.of(scene, name)
+        return replace(new, uploaded=self.uploaded, board=self.board, dark=self.dark, history=self.history)
 
     def choose_object(self, scene: Scene, thing: Thing | None) -> State:
         """Show the scene with another object in it, or with its own again (None)."""

@@ -40,6 +40,7 @@ class SceneView:
         self._beside = beside
         self._scene: Scene | None = None
         self._builds = 0
+        self._dark = False
         self._root = self._object_root = ""
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
@@ -48,6 +49,9 @@ class SceneView:
             self._build(state)
         elif state.scene is not self._scene:
             self._build_object(state)
+        if state.dark != self._dark:
+            self._dark = state.dark
+            add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.dark)
         with self.client.atomic():
             if state.is_current or not state.busy:  # arms wait where they are for a new map
                 for name, values in postures(state).items():
@@ -68,7 +72,8 @@ class SceneView:
             client.camera.look_at = view.look_at
         client.scene.add_frame(root, show_axes=False)
         add_lights(client, root, view)
-        add_floor(client, f"{root}/floor", scene)
+        self._dark = state.dark
+        add_floor(client, f"{root}/floor", scene, dark=state.dark)
         for k, obstacle in enumerate(scene.obstacles):
             add_obstacle(client, f"{root}/obstacle{k}", obstacle, k)
         self._build_object(state)

@@ -42,10 +42,13 @@ class Worker:
     Args:
         name: of the thread.
         finish: called on the thread at the very end, to free what the jobs used.
+        restart: called on the thread after a job broke in an unexpected way, to use nothing of it again.
     """
 
-    def __init__(self, name: str, finish: Callable[[], None]) -> None:
-        self._finish = finish
+    def __init__(
+        self, name: str, finish: Callable[[], None], restart: Callable[[], None] = lambda: None
+    ) -> None:
+        self._finish, self._restart = finish, restart
         self._changed = threading.Condition()
         self._waiting: Job | None = None
         self._running: Job | None = None
@@ -104,7 +107,9 @@ class Worker:
             self._tell(job, job.failed, str(error))
         except Exception as error:  # whatever a library raises must not end the thread
             log.exception("a computation failed")
-            self._tell(job, job.failed, f"unexpected {type(error).__name__}: {' '.join(str(error).split())}")
+            self._restart()
+            text = f"unexpected {type(error).__name__}: {' '.join(str(error).split())}"
+            self._tell(job, job.failed, f"{text}; what you set is kept, and the physics begins anew")
         else:
             self._tell(job, job.done, result)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import viser
@@ -13,6 +13,9 @@ from app.state import State
 __all__ = ["Actions", "Change", "Html", "Panel", "within"]
 
 Change = Callable[[State], State]
+Hotkey = Any
+"""A letter, a digit or the name of a key; None for none. viser does not export the type."""
+Modifier = Literal["cmd/ctrl", "shift", "cmd/ctrl+shift"] | None
 
 
 class Actions(Protocol):
@@ -83,6 +86,17 @@ class Panel:
         button = self.gui.add_button(label, icon=icon, **look)
         button.on_click(lambda _: do())
         return button
+
+    def command(
+        self, label: str, do: Callable[[], None], hotkey: Hotkey = None, modifier: Modifier = None
+    ) -> viser.CommandHandle:
+        """Add a command to the palette (Ctrl+K), and a key that does it.
+
+        The 3D view flies on W, A, S, D, Q, E and the arrows: those keys are taken.
+        """
+        command = self.gui.add_command(label, hotkey=hotkey, modifier=modifier)
+        command.on_trigger(lambda _: do())
+        return command
 
     def choice(
         self, label: str, options: Sequence[str] = ("…",), **look: Any

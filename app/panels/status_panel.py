@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import viser
 
+from app.history import redo, undo
 from app.panels.panel import Actions, Panel
 from app.readout import notes_html, status_html
 from app.state import State
 
 __all__ = ["NotesPanel", "StatusPanel"]
+
+
+UNDO, REDO = "Undo", "Redo"
 
 
 class StatusPanel(Panel):
@@ -19,13 +23,16 @@ class StatusPanel(Panel):
         self.status = self.html('<div class="sg">Loading the scene …</div>')
         self.progress = gui.add_progress_bar(0.0)
         self.stop = self.button("Cancel", viser.Icon.X, actions.stop_or_retry, color="gray", disabled=True)
+        self.steps = gui.add_button_group("", (UNDO, REDO), hint="Also Ctrl+Z and Ctrl+Shift+Z")
+        self.steps.on_click(lambda _: actions.change(undo if self.steps.value == UNDO else redo))
 
     def show(self, state: State) -> None:
         """Say what is being done."""
         self.status.show(status_html(state))
         retry = state.busy is None and not state.is_current
         self.progress.value = 100 * state.busy.share if state.busy and state.is_waiting else 0.0
-        self.stop.label = "Compute the map" if retry else "Cancel"
+        again = "Restart" if state.problem else "Compute the map"
+        self.stop.label = again if retry else "Cancel"
         self.stop.icon = viser.Icon.REFRESH if retry else viser.Icon.X
         self.stop.disabled = not state.is_waiting and not retry
 

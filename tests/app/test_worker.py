@@ -114,7 +114,10 @@ def test_cancel_stops_and_says_nothing(worker):
     ("error", "text"),
     [
         (NoPlanError("no grasp"), "no grasp"),
-        (RuntimeError("two\nlines"), "unexpected RuntimeError: two lines"),
+        (
+            RuntimeError("two\nlines"),
+            "unexpected RuntimeError: two lines; what you set is kept, and the physics begins anew",
+        ),
     ],
 )
 def test_an_error_is_one_line_and_the_worker_goes_on(worker, error, text):
@@ -127,6 +130,28 @@ def test_an_error_is_one_line_and_the_worker_goes_on(worker, error, text):
     assert log.next() == ("failed", text)
     worker.submit(log.job(lambda _: 1))
     assert log.next() == ("done", 1)
+
+
+def test_only_what_nobody_expected_restarts_what_jobs_use():
+    restarts: list[str] = []
+    worker, log = Worker("test", lambda: None, lambda: restarts.append("anew")), Log()
+
+    def breaks(error: Exception) -> Callable[[Callable[[float], None]], Any]:
+        def run(progress: Callable[[float], None]) -> None:
+            raise error
+
+        return run
+
+    try:
+        worker.submit(log.job(breaks(NoPlanError("no grasp"))))
+        assert log.next()[0] == "failed"
+        assert restarts == []
+        worker.submit(log.job(breaks(RuntimeError("physics"))))
+        assert log.next()[0] == "failed"
+        assert restarts == ["anew"]
+    finally:
+        worker.close()
+        worker.join(WAIT)
 
 
 def test_close_stops_the_job_and_frees_what_it_used(worker, finished):

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import ConsoleMessage, Locator, Page, expect
 
-from app.controls import PANELS_WIDTH
+from app.controls import panel_widths
 from app.palette import rgb
 from app.stage import FIELD_OF_VIEW, viewpoint
 from symgrasp.reason import Reason
@@ -149,7 +149,7 @@ class GraspPage:
         assert box
         assert size
         view = viewpoint(scene, scene.task().T_world_object)
-        eye = view.camera((size["width"] - PANELS_WIDTH) / size["height"])
+        eye = view.camera((size["width"] - sum(panel_widths(size["width"]))) / size["height"])
         forward = (view.look_at - eye) / np.linalg.norm(view.look_at - eye)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)

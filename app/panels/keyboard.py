@@ -1,0 +1,81 @@
+"""The command palette and its keys: everything that the widgets of the page do, without a mouse."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import viser
+
+from app.history import redo, undo
+from app.panels.panel import Actions, Panel
+from app.state import State
+from app.values import RollChoice
+
+__all__ = ["Keyboard"]
+
+TASKS = 9
+"""Tasks that have a digit."""
+
+
+class Keyboard(Panel):
+    """Has no widgets; every command is a change that some widget makes as well.
+
+    Args:
+        gui: where to add the commands.
+        actions: what they do.
+        scenes: names to choose from.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions, scenes: Sequence[str]) -> None:
+        super().__init__(gui, actions)
+        self._scenes, self._scene = scenes, ""
+        change = actions.change
+        self.command("Undo", lambda: change(undo), "Z", "cmd/ctrl")
+        self.command("Redo", lambda: change(redo), "Z", "cmd/ctrl+shift")
+        self.command("Cancel or compute again", actions.stop_or_retry, "escape")
+        self._tasks: dict[str, viser.CommandHandle] = {}
+        self.command("Next arm", lambda: change(_next_arm), "M")
+        self.command("Next roll", lambda: change(_next_roll), "R")
+        self.command("Put the object back", lambda: change(State.reset_pose), "B")
+        self.command("Let go of the grasp", lambda: change(State.clear_pick), "L")
+        self.command("Flat map", lambda: change(lambda s: replace(s, board=not s.board)), "F")
+        self.command("Drag handles", lambda: change(lambda s: replace(s, gizmo=not s.gizmo)), "G")
+        self.command("Light or dark", lambda: change(lambda s: replace(s, dark=not s.dark)), "T")
+        self.command("Plan one grasp for all tasks", lambda: actions.plan("sequential"), "P")
+        self.command("Plan all arms together", lambda: actions.plan("bimanual"), "H")
+        self.command("Next task of the plan", lambda: change(lambda s: _step(s, 1)), "pagedown")
+        self.command("Previous task of the plan", lambda: change(lambda s: _step(s, -1)), "pageup")
+        self.command("Next scene", self._next_scene, "N")
+        for name in scenes:
+            self.command(f"Open {name}", lambda name=name: actions.open_scene(name))
+
+    def show(self, state: State) -> None:
+        """Offer the tasks of the scene."""
+        self._scene = state.scene_name
+        names = tuple(state.scene.tasks)[:TASKS]
+        if names != tuple(self._tasks):
+            for command in self._tasks.values():
+                command.remove()
+            self._tasks = {name: self._task(name, str(k)) for k, name in enumerate(names, 1)}
+
+    def _task(self, name: str, digit: str) -> viser.CommandHandle:
+        return self.command(f"Task {name}", lambda: self.actions.change(lambda s: s.choose_task(name)), digit)
+
+    def _next_scene(self) -> None:
+        known = self._scenes.index(self._scene) if self._scene in self._scenes else -1
+        self.actions.open_scene(self._scenes[(known + 1) % len(self._scenes)])
+
+
+def _next_arm(state: State) -> State:
+    arms = state.scene.task(state.task).arms
+    return state.choose_arm(arms[(arms.index(state.arm) + 1) % len(arms)])
+
+
+def _next_roll(state: State) -> State:
+    rolls = list(RollChoice)
+    return state.choose_roll(rolls[(rolls.index(state.roll) + 1) % len(rolls)])
+
+
+def _step(state: State, by: int) -> State:
+    return state if state.plan is None else state.show_step((state.step or 0) + by)
