@@ -403,7 +403,7 @@ CHANGES = st.one_of(
             lambda s: s.map_arrived(1, s.result) if s.result else s,
             lambda s: s.stopped(1),
             lambda s: s.started(2, "Planning"),
-            lambda s: s.plan_arrived(2, planned("pick_pour_place", "sequential")),
+            lambda s: s if s.poses else s.plan_arrived(2, planned("pick_pour_place", "sequential")),
         ]
     ),
 )
