@@ -149,13 +149,20 @@ def test_retreats_end_for_every_cause():
     """Into an obstacle, out of reach and limits, and where only another branch goes on."""
     scene = load_small("bottle_on_table", 8, 24, 6).with_settings(approach=0.3)
     causes = set()
+    ik, T_base_world = ClosedFormIK(scene.arm(), 6), inverse(scene.arm().robot.T_world_base)
     with BulletWorld(scene) as world:
         maker = MapMaker(world, scene)
         m = maker.map(method="reference")
         for index in np.argwhere(m.reason == Reason.APPROACH_BLOCKED)[::3]:
-            for v in maker.explain(None, None, Cell(*map(int, index))).verdicts:
+            found = maker.explain(None, None, Cell(*map(int, index)))
+            for v in found.verdicts:
                 if v.reason == Reason.APPROACH_BLOCKED:
                     causes.add(v.lost)
+                    T = T_base_world @ found.T_world_tool @ translation([0, 0, -v.retreat])
+                    inside = ik.solve_sample(T, v.sample).inside
+                    if v.lost:
+                        expected = Lost.REACH if not len(inside) else Lost.LIMITS
+                        assert v.lost == (Lost.BRANCH if inside.any() else expected)
                     assert "after" in v.why
     assert causes == {None, *Lost}
 
