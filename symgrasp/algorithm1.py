@@ -18,7 +18,7 @@ from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
 from symgrasp.world import BulletWorld
 
-__all__ = ["create_map_reference"]
+__all__ = ["create_map_reference", "verdict"]
 
 
 def create_map_reference(
@@ -59,14 +59,14 @@ def create_map_reference(
                 draft.reason[cell] = stage
                 continue
             candidates = judge.candidates(T_base_tool[cell], draft.opening[row])
-            draft.record(cell, *_verdict(candidates))
+            draft.record(cell, *verdict(candidates))
         if progress:
             progress((row + 1) / manifold.heights)
     world.set_arms(())
     return draft.finish(scene.name, task)
 
 
-def _verdict(candidates: Iterable[Candidate]) -> tuple[Reason, Candidate | None]:
+def verdict(candidates: Iterable[Candidate]) -> tuple[Reason, Candidate | None]:
     """Return the furthest stage of the candidates of a cell, and the one that reached it.
 
     The first feasible one ends the search; of those that collide at the same stage, the one that

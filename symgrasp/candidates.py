@@ -6,7 +6,7 @@ limits, free of collision, and free along the straight retreat where the scene a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from symgrasp.ik import ClosedFormIK
 from symgrasp.poses import Array, translation
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm
-from symgrasp.world import BulletWorld, Collision
+from symgrasp.world import BulletWorld, Collision, Near
 
 __all__ = ["RETREAT_STEP", "RETREAT_TURN", "Candidate", "Fate", "Judge", "retreated"]
 
@@ -75,9 +75,8 @@ class Judge:
         arm: the arm.
         ik: its inverse kinematics.
         approach: length (m) of the straight retreat against the approach that must be free too.
-        near: says which obstacles and other robots could be in the way at joint values (n,) that
-            reach a tool pose (4, 4) in the frame of the robot's base, for those who know; all are
-            asked about if None.
+        near: says what could be in the way at joint values (n,) that reach a tool pose (4, 4) in the
+            frame of the robot's base, for those who know; all is asked about if None.
     """
 
     def __init__(
@@ -86,7 +85,7 @@ class Judge:
         arm: Arm,
         ik: ClosedFormIK,
         approach: float,
-        near: Callable[[Array, Array], Collection[str]] | None = None,
+        near: Callable[[Array, Array], Near] | None = None,
     ) -> None:
         self.world, self.arm, self.ik, self._near = world, arm, ik, near
         steps = int(np.ceil(approach / RETREAT_STEP - 1e-9))

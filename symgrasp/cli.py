@@ -138,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
     export.add_argument("--out", metavar="FILE", type=Path, required=True, help="the file to write")
 
-    bench = add("bench", _bench, "Measure the planners against what one would do otherwise.")
+    bench = add("bench", _bench, "Measure maps and planners against what one would do otherwise.")
     bench.add_argument("--out", metavar="FILE", type=Path, help="write the figures as JSON")
 
     schema = add("schema", _schema, "Print the JSON Schema of a file format.")

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import InputError
-from symgrasp.poses import Array, axis_frame, from_rotation, rotation_z, spin, translation
+from symgrasp.poses import Array, axis_frame, from_rotation, rotation_z, spin
 from symgrasp.profile import Profile
 
 __all__ = ["ROLLS", "Manifold", "grasp_to_tool", "wrap"]
@@ -52,17 +52,18 @@ def grasp_to_tool(
     Returns:
         Poses ``T_world_tool`` (..., 4, 4) over the broadcast batch shape.
     """
-    h, theta, roll, standoff = np.broadcast_arrays(h, theta, roll, standoff)
+    h, theta, roll, standoff = (np.asarray(part, dtype=float) for part in (h, theta, roll, standoff))
     # Written through the axis frame, so that the object's own spin enters only as a sum of
     # angles: m((h, θ), T·Rz(δ)) and m((h, θ + δ), T) then share every bit (equation 3).
     azimuth = wrap(np.round(wrap(spin(T_world_object) + theta) / AZIMUTH_STEP) * AZIMUTH_STEP)
-    offset = np.stack([standoff, np.zeros_like(h, dtype=float), h], axis=-1)
+    offset = np.stack(np.broadcast_arrays(standoff, 0.0, h), axis=-1)
     sign = np.where(np.cos(roll) >= 0, 1.0, -1.0)
     hand = np.zeros((*sign.shape, 3, 3))  # columns: x, y (closing), z (approach) of the tool
     hand[..., 2, 0] = sign
     hand[..., 1, 1] = sign
     hand[..., 0, 2] = -1.0
-    return axis_frame(T_world_object) @ rotation_z(azimuth) @ translation(offset) @ from_rotation(hand)
+    # Each factor has the batch axes that it depends on: on a grid, few of the products are many.
+    return (axis_frame(T_world_object) @ rotation_z(azimuth)) @ from_rotation(hand, offset)
 
 
 @dataclass(frozen=True, eq=False)

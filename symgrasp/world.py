@@ -53,7 +53,7 @@ def _silenced() -> Iterator[None]:
 with _silenced():  # it prints its build time
     import pybullet
 
-__all__ = ["Body", "BulletWorld", "Collision", "Shape", "check_tasks", "checked_self_pairs"]
+__all__ = ["Body", "BulletWorld", "Collision", "Near", "Shape", "check_tasks", "checked_self_pairs"]
 
 RESTING_DEPTH = 1e-3
 """How deep (m) an object may sink into what it stands on and still count as resting."""
@@ -115,13 +115,17 @@ class Shape(NamedTuple):
     slack: float
 
 
+Near = Collection[str | frozenset[str]]
+"""What could be in the way of an arm: bodies by their names, and pairs of the robot's own links."""
+
 _KEPT_AT_A_DISTANCE = (Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION)
 
 
 class _Query(NamedTuple):
-    """One closest-points call: all links of two bodies, or two links."""
+    """One closest-points call: all links of two bodies, or two links; ``key`` is what `Near` calls it."""
 
     reason: Reason
+    key: str | frozenset[str]
     a: int
     b: int
     link_a: int | None = None
@@ -285,24 +289,24 @@ class BulletWorld:
         mount = frozenset(index[link] for link in robot.model.mount_links())
         touch = frozenset(index[link] for link in arm.hand.touch_links)
         queries = [
-            _Query(Reason.SELF_COLLISION, body, body, index[a], index[b])
+            _Query(Reason.SELF_COLLISION, frozenset((a, b)), body, body, index[a], index[b])
             for a, b in checked_self_pairs(robot.model)
         ]
-        queries += [_Query(Reason.OBJECT_COLLISION, body, piece, skip_a=touch) for piece in self._object]
-        queries += [_Query(Reason.SCENE_COLLISION, body, o, skip_a=mount) for o in self._obstacles]
-        queries += [
-            _Query(Reason.ROBOT_COLLISION, body, other)
-            for name, other in self._robots.items()
-            if other != body
-        ]
-        return queries
+        queries += [self._query(Reason.OBJECT_COLLISION, body, p, skip_a=touch) for p in self._object]
+        queries += [self._query(Reason.SCENE_COLLISION, body, o, skip_a=mount) for o in self._obstacles]
+        others = [other for other in self._robots.values() if other != body]
+        return queries + [self._query(Reason.ROBOT_COLLISION, body, other) for other in others]
+
+    def _query(self, reason: Reason, a: int, b: int, skip_a: frozenset[int] = frozenset()) -> _Query:
+        """Return the query for all links of two bodies."""
+        return _Query(reason, self._names[b], a, b, skip_a=skip_a)
 
     def _parked(self, name: str) -> list[_Query]:
         """List what is checked for a robot that holds nothing: the object, and the other robots."""
         body = self._robots[name]
-        queries = [_Query(Reason.OBJECT_COLLISION, body, piece) for piece in self._object]
+        queries = [self._query(Reason.OBJECT_COLLISION, body, piece) for piece in self._object]
         others = [other for other in self._robots.values() if other != body]
-        return queries + [_Query(Reason.ROBOT_COLLISION, body, other) for other in others]
+        return queries + [self._query(Reason.ROBOT_COLLISION, body, other) for other in others]
 
     # -- state ------------------------------------------------------------------------------
 
@@ -429,7 +433,7 @@ class BulletWorld:
 
     # -- questions --------------------------------------------------------------------------
 
-    def first_collision(self, arm: Arm, near: Collection[str] | None = None) -> Collision | None:
+    def first_collision(self, arm: Arm, near: Near | None = None) -> Collision | None:
         """Return the deepest collision of the first stage at which the arm collides, or None.
 
         Stages in order: with its own robot, the object, obstacles, other robots. Links that no
@@ -437,12 +441,11 @@ class BulletWorld:
 
         Args:
             arm: the arm.
-            near: the obstacles and other robots that could be in the way; all of them if None.
+            near: what could be in the way; everything if None.
         """
         stage: list[Collision] = []
         for query in self._queries[arm.name]:
-            stands = query.reason in _KEPT_AT_A_DISTANCE
-            if stands and near is not None and self._names[query.b] not in near:
+            if near is not None and query.key not in near:
                 continue
             if stage and query.reason != stage[0].reason:
                 break
@@ -483,7 +486,7 @@ class BulletWorld:
             c
             for piece in self._object
             for obstacle in self._obstacles
-            for c in self._ask(_Query(Reason.SCENE_COLLISION, piece, obstacle), margin)
+            for c in self._ask(self._query(Reason.SCENE_COLLISION, piece, obstacle), margin)
         ]
         found += self._engulfed()
         return sorted(found, key=lambda c: -c.depth)

@@ -20,7 +20,7 @@ class Figure:
     Attributes:
         name: what was measured.
         unit: its unit; ``×`` for a ratio.
-        values: one value a run.
+        values: one value a run; none where it could not be measured, and the name says why.
     """
 
     name: str
@@ -29,6 +29,8 @@ class Figure:
 
     def line(self) -> str:
         """Say median and spread."""
+        if not self.values:
+            return self.name
         low, middle, high = np.quantile(self.values, [0.0, 0.5, 1.0])
         spread = f"{low:.3g} to {high:.3g}" if len(self.values) > 1 else "one run"
         return f"{self.name:64} {middle:9.3g} {self.unit:3} ({spread})"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import NamedTuple
@@ -29,7 +29,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot import Arm
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
-from symgrasp.world import BulletWorld, Collision
+from symgrasp.world import BulletWorld, Collision, Near
 
 __all__ = ["long_sequence", "run", "several_hands", "without_the_manifold"]
 
@@ -71,7 +71,7 @@ class _CountingWorld(BulletWorld):
 
     checks = 0
 
-    def first_collision(self, arm: Arm, near: Collection[str] | None = None) -> Collision | None:
+    def first_collision(self, arm: Arm, near: Near | None = None) -> Collision | None:
         """Count, and answer."""
         self.checks += 1
         return super().first_collision(arm, near)

@@ -222,21 +222,37 @@ def check_arm(body, solids, tree, scratch, margin, gap, best):
 
 
 @njit(**FAST)
-def mark_near(body, tree, scratch, reach, near):
-    """Mark which of the pieces that stand still have a box within ``reach`` (m) of one that moves.
+def mark_near(body, tree, scratch, reach, near, near_pairs):
+    """Mark what has a box within ``reach`` (m) of that of a piece that moves, where the two may not touch.
 
     Args:
-        near: (P,) bool receives the marks.
+        near: (P,) bool receives marks for the pieces of the object and those that stand still.
+        near_pairs: (.,) bool receives marks for the pairs of the robot's own pieces: ``hand_pairs``,
+            then ``base_pairs``, then ``arm_pairs``.
     """
+    box, hands = scratch.box, body.hand.shape[1]
     for k in range(len(body.frame)):
         node = 0
         while node < len(tree.skip):
-            if _far(scratch.box, k, node, tree.box, reach):
+            if _far(box, k, node, tree.box, reach):
                 node = tree.skip[node]
                 continue
             if tree.piece[node] >= 0:
                 near[tree.piece[node]] = True
             node += 1
+        if k >= hands or not body.touch[k]:
+            for i in body.objects:
+                near[i] |= not _far(box, k, i, box, reach)
+    first = _mark_pairs(box, body.hand_pairs, reach, near_pairs, 0)
+    first = _mark_pairs(box, body.base_pairs, reach, near_pairs, first)
+    _mark_pairs(box, body.arm_pairs, reach, near_pairs, first)
+
+
+@njit(**FAST)
+def _mark_pairs(box, pairs, reach, near, first):
+    for i in range(len(pairs)):
+        near[first + i] = not _far(box, pairs[i, 0], pairs[i, 1], box, reach)
+    return first + len(pairs)
 
 
 @njit(**FAST)

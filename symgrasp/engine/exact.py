@@ -17,6 +17,7 @@ from symgrasp.engine import search
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND, mark_near, new_scratch, place_arm, place_hand
 from symgrasp.engine.rig import Rig, can_rig, rig
 from symgrasp.engine.solids import pose_rows
+from symgrasp.engine.tree import box_of
 from symgrasp.feasibility import CLEARANCE_LIMIT, FeasibilityMap, Progress
 from symgrasp.fit import fit
 from symgrasp.ik import SphericalIK, solver_for
@@ -26,14 +27,14 @@ from symgrasp.reason import Reason
 from symgrasp.robot import Arm
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
-from symgrasp.world import Body, BulletWorld, Collision
+from symgrasp.world import Body, BulletWorld, Collision, Near
 
 __all__ = ["ExactEngine"]
 
 PARTS = 4
 """Parts of a search for each thread, so that none waits long for the last."""
 
-AT_ONCE = 100_000
+AT_ONCE = 150_000
 """Cells times redundancy samples that are searched before progress is told: some 50 ms."""
 
 _ALL_CORES = threading.Lock()
@@ -115,13 +116,17 @@ class ExactEngine:
         world.margin = self.scene.settings.margin
         world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
         world.set_object(task.T_world_object)
+        rig, scratch = self._rig, self._scratch
+        scratch.pose[rig.body.objects] = pose_rows(axis_frame(task.T_world_object))
+        for k in rig.body.objects:
+            box_of(rig.solids.size, scratch.pose, k, scratch.box[k])
         draft = Draft(self, grid)
         still = self._still()
         rows = np.array([row for row, stage in enumerate(self._fit) if stage is None], dtype=np.int64)
         at_once = max(1, AT_ONCE // (len(ROLLS) * grid.angles * len(self.ik.phi)))
         for first in range(0, len(rows), at_once):
             part = rows[first : first + at_once]
-            self._search(draft, part, T_base_tool, task.T_world_object, still)
+            self._search(draft, part, T_base_tool, still)
             if progress:
                 progress((first + len(part)) / len(rows))
         world.set_arms(())
@@ -148,12 +153,9 @@ class ExactEngine:
         draft: Draft,
         rows: np.ndarray,
         T_base_tool: Array,
-        T_world_object: Array,
         still: _Still,
     ) -> None:
         """Search some rows of the map."""
-        pose = self._rig.pose.copy()
-        pose[self._rig.body.objects] = pose_rows(axis_frame(T_world_object))
         goals = search.Goals(
             order=self._order,
             T_world_base=self._T_world_base,
@@ -167,7 +169,13 @@ class ExactEngine:
         )
         with _ALL_CORES:
             found = search.search(
-                self.ik.chain, self._rig.body, self._rig.solids, self._rig.tree, pose, goals, self.arm.dof
+                self.ik.chain,
+                self._rig.body,
+                self._rig.solids,
+                self._rig.tree,
+                self._scratch.pose,
+                goals,
+                self.arm.dof,
             )
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.grid.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
@@ -205,14 +213,15 @@ class ExactEngine:
                     return  # and it would be for all others, because the tool pose alone decides it
                 before = collision
 
-    def _near(self, q: Array, T_base_tool: Array, row: int) -> set[str]:
-        """Return what stands near the arm: all else is certified free."""
+    def _near(self, q: Array, T_base_tool: Array, row: int) -> Near:
+        """Return what is near the arm: all else is certified free."""
         rig, scratch = self._rig, self._scratch
         place_hand(rig.body, rig.solids, scratch, self._T_world_base, T_base_tool, row)
         place_arm(rig.body, rig.solids, scratch, q)
-        near = np.zeros(len(rig.names), dtype=bool)
-        mark_near(rig.body, rig.tree, scratch, self.world.margin + FREE_BAND, near)
-        return {rig.names[k].body for k in np.flatnonzero(near)}
+        near, pairs = np.zeros(len(rig.names), dtype=bool), np.zeros(len(rig.pairs), dtype=bool)
+        mark_near(rig.body, rig.tree, scratch, self.world.margin + FREE_BAND, near, pairs)
+        bodies = {rig.names[k].body for k in np.flatnonzero(near)}
+        return bodies | {rig.pairs[k] for k in np.flatnonzero(pairs)}
 
     def _fixed(self, collision: Collision) -> bool:
         """Whether a collision is one of bodies that the tool pose alone places."""

@@ -33,6 +33,7 @@ class Rig(NamedTuple):
         pose: (P, 12) where they are; the object's and those of what moves do not matter.
         body: what moves.
         tree: over all others.
+        pairs: the links of the robot's own pairs, in the order of `mark_near`.
         moving: the links that move.
         with_tool: those of them that are fixed to the tool, fingers included.
     """
@@ -42,6 +43,7 @@ class Rig(NamedTuple):
     pose: Array
     body: Body
     tree: Tree
+    pairs: list[frozenset[str]]
     moving: frozenset[str]
     with_tool: frozenset[str]
 
@@ -127,6 +129,10 @@ def rig(world: BulletWorld, arm: Arm, openings: Array) -> Rig:
             objects=np.arange(len(own), len(own) + len(objects), dtype=np.int32),
         ),
         tree=build(solids, pose, np.arange(len(own) + len(objects), len(placed))),
+        pairs=[
+            frozenset((links[a], links[b]))
+            for a, b in np.concatenate([pairs[together], pairs[base], arm_pairs]).tolist()
+        ],
         moving=frozenset(links[:count]),
         with_tool=frozenset(links[:hands]),
     )

@@ -1,0 +1,174 @@
+"""Brute force through Pinocchio and Coal: the same candidates, each asked in turn until one is free.
+
+Needs the extra ``bench`` (``pip install 'symgrasp[bench]'``); importing this module fails without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import coal  # pyright: ignore[reportMissingImports]
+import numpy as np
+import pinocchio  # pyright: ignore[reportMissingImports]
+
+from symgrasp.ik import ClosedFormIK
+from symgrasp.meshes import read_mesh
+from symgrasp.poses import Array, axis_frame
+from symgrasp.robot import Arm, RobotModel
+from symgrasp.scene_build import Obstacle
+from symgrasp.world import BulletWorld, Shape, checked_self_pairs
+
+__all__ = ["BruteForce"]
+
+
+class BruteForce:
+    """An arm among everything that a map asks about: the robot moves, all else stands still.
+
+    Takes the shapes and pairs that PyBullet has; beside meshes without the ball that it rounds links
+    by, a millimetre or less, because Coal cannot measure from rounded shapes to triangles.
+
+    Args:
+        world: a world of the scene.
+        arm: the arm.
+        ik: its inverse kinematics, shared with the other methods.
+        T_world_object: object pose (4, 4).
+    """
+
+    def __init__(self, world: BulletWorld, arm: Arm, ik: ClosedFormIK, T_world_object: Array) -> None:
+        self.arm, self.ik = arm, ik
+        self._rounding = not any(o.kind == "mesh" for o in world.scene.obstacles)
+        robot = arm.robot
+        self._model = pinocchio.buildModelFromXML(robot.model.collision_urdf().decode())
+        self._data = self._model.createData()
+        self._geometry = pinocchio.GeometryModel()
+        own = self._add_robot(world)
+        still = self._add_still(world, T_world_object)
+        self._pairs(own, still)
+        self._geometry_data = self._geometry.createData()
+        for request in self._geometry_data.collisionRequests:
+            request.security_margin = 0.0
+        self._joints = [j for j in robot.model.joints if j.source >= 0]
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs that a configuration is checked for."""
+        return len(self._geometry.collisionPairs)
+
+    def feasible(self, T_base_tool: Array, opening: float) -> bool:
+        """Whether any candidate of a tool pose (4, 4) is inside the limits and free."""
+        solutions = self.ik.solve(T_base_tool)
+        return any(self.free(q, opening) for q in solutions.q[solutions.inside])
+
+    def free(self, q: Array, opening: float) -> bool:
+        """Whether the arm at joint values (n,) with its hand open by ``opening`` (m) touches nothing."""
+        values = self.arm.robot_values(q, opening)
+        configuration = pinocchio.neutral(self._model)
+        for joint in self._joints:
+            moved = self._model.joints[self._model.getJointId(joint.name)]
+            value = joint.ratio * values[joint.source] + joint.offset
+            if moved.nq == 2:  # a joint without limits is a point on the circle
+                configuration[moved.idx_q : moved.idx_q + 2] = np.cos(value), np.sin(value)
+            else:
+                configuration[moved.idx_q] = value
+        return not pinocchio.computeCollisions(
+            self._model, self._data, self._geometry, self._geometry_data, configuration, True
+        )
+
+    def _add(self, name: str, joint: int, pose: Array, shape: Any) -> int:
+        placement = pinocchio.SE3(np.ascontiguousarray(pose[:3, :3]), pose[:3, 3].copy())
+        return self._geometry.addGeometryObject(
+            pinocchio.GeometryObject(f"{name} {self._geometry.ngeoms}", joint, placement, shape)
+        )
+
+    def _rounded(self, shape: Shape) -> Any:
+        hull = _hull(shape.vertices)
+        if self._rounding:
+            hull.setSweptSphereRadius(float(shape.rounding))
+        return hull
+
+    def _add_robot(self, world: BulletWorld) -> dict[str, list[int]]:
+        own: dict[str, list[int]] = {}
+        for link, shapes in world.shapes(self.arm.robot.name).items():
+            frame = self._model.frames[self._model.getFrameId(link)]
+            own[link] = [
+                self._add(link, frame.parentJoint, frame.placement.homogeneous, self._rounded(shape))
+                for shape in shapes
+            ]
+        return own
+
+    def _add_still(self, world: BulletWorld, T_world_object: Array) -> dict[str, list[int]]:
+        """Add the object, the obstacles and the other robots, as seen from the robot's base."""
+        scene, robot = world.scene, self.arm.robot
+        T_base_world = np.linalg.inv(robot.T_world_base)
+        add = lambda name, pose, shape: self._add(name, 0, T_base_world @ pose, shape)  # noqa: E731
+        axis = axis_frame(T_world_object)
+        still = {"object": [add("object", axis, _hull(v)) for v in scene.profile.convex_pieces()]}
+        still["rest"] = [
+            add(o.name, T @ o.T_world_obstacle if o.kind != "urdf" else T, shape)
+            for o in scene.obstacles
+            for T, shape in self._obstacle(world, o)
+        ]
+        for name, other in scene.robots.items():
+            if name != robot.name:
+                links = other.T_world_base @ other.model.forward(other.home)
+                still["rest"] += [
+                    add(name, links[other.model.link_index(link)], self._rounded(shape))
+                    for link, shapes in world.shapes(name).items()
+                    for shape in shapes
+                ]
+        return still
+
+    def _obstacle(self, world: BulletWorld, o: Obstacle) -> Iterator[tuple[Array, Any]]:
+        """Yield the shapes of an obstacle in its frame; those of a URDF in the world."""
+        if o.kind == "box":
+            yield np.eye(4), coal.Box(*o.size)
+        elif o.kind == "cylinder":
+            yield np.eye(4), coal.Cylinder(*o.size)
+        elif o.kind == "sphere":
+            yield np.eye(4), coal.Sphere(o.size[0])
+        elif o.kind == "mesh":
+            assert o.path is not None
+            mesh = read_mesh(o.path, f"obstacle {o.name}")
+            yield np.eye(4), _triangles(mesh.vertices, mesh.faces)
+        else:
+            assert o.path is not None
+            model = RobotModel(o.path)
+            links = o.T_world_obstacle @ model.forward(np.zeros(len(model.joint_names)))
+            for link, shapes in world.shapes(o.name).items():
+                for shape in shapes:
+                    yield links[model.link_index(link)], self._rounded(shape)
+
+    def _pairs(self, own: dict[str, list[int]], still: dict[str, list[int]]) -> None:
+        arm, scene_links = self.arm, set(own) - set(self.arm.robot.model.mount_links())
+        pairs = [(a, b) for x, y in checked_self_pairs(arm.robot.model) for a in own[x] for b in own[y]]
+        pairs += [
+            (a, b)
+            for link in own
+            if link not in arm.hand.touch_links
+            for a in own[link]
+            for b in still["object"]
+        ]
+        pairs += [(a, b) for link in scene_links for a in own[link] for b in still["rest"]]
+        for a, b in pairs:
+            self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
+
+
+def _points(vertices: Array) -> Any:
+    points = coal.StdVec_Vec3s()
+    points.extend([np.array(v, dtype=float) for v in vertices])
+    return points
+
+
+def _hull(vertices: Array) -> Any:
+    return coal.ConvexBase.convexHull(_points(vertices), True, "Qt")
+
+
+def _triangles(vertices: Array, faces: np.ndarray) -> Any:
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(faces), len(vertices))
+    triangles = coal.StdVec_Triangle()
+    triangles.extend([coal.Triangle(*map(int, face)) for face in faces])
+    mesh.addSubModel(_points(vertices), triangles)
+    mesh.endModel()
+    return mesh
