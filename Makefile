@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures
+.PHONY: app test figures bench
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -29,3 +29,7 @@ $(VENV)/dev.stamp: pyproject.toml | $(BIN)/python
 
 figures: $(VENV)/dev.stamp  ## make the pictures of the README and docs/ again
 	$(BIN)/python -m docs.figures $(ARGS)
+
+bench: $(VENV)/dev.stamp  ## measure, and write the README's table of times (minutes)
+	$(BIN)/symgrasp bench --out docs/bench.json
+	$(BIN)/python -m docs.speed

@@ -1,0 +1,93 @@
+"""Writes the README's table of times from what the benchmark measured: ``make bench``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symgrasp.files import write_atomically
+
+__all__ = ["BEGIN", "BENCH", "END", "ROWS", "keyed", "table", "write"]
+
+ROOT = Path(__file__).parent.parent
+
+BENCH = ROOT / "docs" / "bench.json"
+"""What ``symgrasp bench --out`` wrote when the table was made."""
+
+BEGIN, END = "<!-- measured: make bench -->", "<!-- end -->"
+
+NEXT = "## Security"
+"""The section that the table's own stands before."""
+
+ROWS: Mapping[str, str] = {
+    "one grasp for 50 tasks on 48 × 96 maps, once the maps exist": "one grasp for 50 tasks, maps given",
+    "two hands, complete search with whole robots": "best placement of two hands, maps given",
+    "two hands, hill climbing as printed": "the same by hill climbing (Algorithm 3), where it finds one",
+}
+"""Name of a figure of the benchmark → what the table calls it.
+
+A figure that belongs to another one is named ``that one: it``.
+"""
+
+
+def keyed(figures: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Return figures by name; indented ones belong to the one above them."""
+    found, above = {}, ""
+    for figure in figures:
+        name = figure["name"]
+        if name.startswith(" "):
+            name = f"{above}: {name.strip()}"
+        else:
+            above = name
+        found[name] = figure
+    return found
+
+
+def table(content: Mapping[str, Any]) -> str:
+    """Return the table as Markdown.
+
+    Raises:
+        KeyError: a row's figure was not measured.
+    """
+    figures = keyed(content["figures"])
+    machine = content["machine"]
+    lines = [
+        f"Median and spread, measured by `symgrasp bench` on {machine['cpus']} cores ({machine['machine']}), "
+        f"Python {machine['python']}.",
+        "",
+        "| what | median | from | to |",
+        "|---|---:|---:|---:|",
+    ]
+    for name, words in ROWS.items():
+        figure = figures[name]
+        low, middle, high = (_short(v) for v in np.quantile(figure["values"], [0.0, 0.5, 1.0]))
+        lines.append(f"| {words} | {middle} {figure['unit']} | {low} | {high} |")
+    return "\n".join(lines) + "\n"
+
+
+def write(content: Mapping[str, Any], page: Path) -> None:
+    """Put the table between the markers of a page; without any, in a section of its own.
+
+    Raises:
+        KeyError: a row's figure was not measured.
+    """
+    text = page.read_text(encoding="utf-8")
+    if BEGIN not in text:
+        place = text.index(NEXT)
+        text = f"{text[:place]}## How fast\n\n{BEGIN}\n{END}\n\n{text[place:]}"
+    before, after = text.index(BEGIN) + len(BEGIN), text.index(END)
+    with write_atomically(page) as file:
+        file.write(f"{text[:before]}\n{table(content)}{text[after:]}".encode())
+
+
+def _short(value: float) -> str:
+    """Return three digits, without an exponent."""
+    return f"{float(f'{value:.3g}'):,.10g}"
+
+
+if __name__ == "__main__":
+    write(json.loads(BENCH.read_text(encoding="utf-8")), ROOT / "README.md")
