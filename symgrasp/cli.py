@@ -110,9 +110,7 @@ def _parser() -> argparse.ArgumentParser:
     text = "write the K-th best plan (default: 1), as numbered by --list"
     plan.add_argument("--number", metavar="K", type=_whole(1), default=1, help=text)
     plan.add_argument("--arm", metavar="NAME", help="sequential: the arm (default: the first task's)")
-    text = "; ".join(
-        f"{kind}: {methods[0]} (default), {', '.join(methods[1:])}" for kind, methods in METHODS.items()
-    )
+    text = "; ".join(f"{kind}: {', '.join(methods)}" for kind, methods in METHODS.items())
     plan.add_argument("--method", metavar="METHOD", help=f"{text}; the first is the default")
     plan.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
     plan.add_argument("--seed", type=_whole(0), default=0, help="hill_climb: seed (default: %(default)s)")
@@ -154,8 +152,10 @@ def _app(args: argparse.Namespace) -> int:
 
 
 def _scenes(args: argparse.Namespace) -> int:
-    for name in shipped_scenes():
-        print(f"{name:20} {Scene.load(name).file.description}")
+    names = shipped_scenes()
+    width = max(map(len, names))
+    for name in names:
+        print(f"{name:{width}}  {Scene.load(name).file.description}")
     return 0
 
 

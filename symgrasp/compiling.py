@@ -9,7 +9,7 @@ from numba.core import event
 
 __all__ = ["COMPILING", "telling_of_compiling"]
 
-COMPILING = "compiling, once on this machine; this takes up to a minute"
+COMPILING = "compiling what this needs, once on this machine; it takes up to a minute"
 """What to tell people meanwhile."""
 
 
