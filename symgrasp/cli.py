@@ -33,7 +33,7 @@ METHODS = {
     "handover": ("exact",),
 }
 EXPORT_FORMATS = ("csv", "trajectory", "tsr")
-MAP_ENDINGS = (".npz", ".png", ".json")
+MAP_ENDINGS = (".npz", ".png", ".svg", ".json")
 
 # The heavy imports (PyBullet, viser) stand inside the commands that need them: `--help`,
 # `scenes` and error messages answer at once.
@@ -88,7 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     add_scene(map_)
     map_.add_argument("--task", metavar="NAME", help="task (default: the first)")
     map_.add_argument("--arm", metavar="NAME", help="arm (default: the task's first)")
-    map_.add_argument("--out", metavar="FILE", type=Path, help="write the map: .npz, .png or .json")
+    map_.add_argument("--out", metavar="FILE", type=Path, help="write the map: .npz, .png, .svg or .json")
 
     explain = add("explain", _explain, "List every candidate of one cell of a map and what becomes of it.")
     add_scene(explain)
@@ -212,8 +212,12 @@ def _explain(args: argparse.Namespace) -> int:
 
 
 def _map_content(the_map: FeasibilityMap, ending: str) -> bytes:
+    from symgrasp.pictures import to_svg
+
     if ending == ".png":
         return the_map._repr_png_()
+    if ending == ".svg":
+        return to_svg(the_map.plot())
     if ending == ".json":
         return (json.dumps(the_map.to_dict(), allow_nan=False) + "\n").encode()
     return the_map.to_npz()

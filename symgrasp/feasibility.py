@@ -20,6 +20,7 @@ from symgrasp.margins import cells_to_infeasible
 from symgrasp.poses import Array, rotation_z
 from symgrasp.profile import Profile
 from symgrasp.reason import Reason
+from symgrasp.views import View, colour
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -208,11 +209,27 @@ class FeasibilityMap:
             clearance=np.where(drop, np.nan, self.clearance),
         )
 
-    def plot(self) -> Figure:
-        """Draw both rolls of the map with axes, reasons and counts."""
+    def values(self, view: View) -> Array:
+        """(R, H, A) what a view shows, in its unit; NaN where infeasible, and where it has no unit."""
+        if view is View.CLEARANCE:
+            return 1e3 * self.clearance
+        if view is View.ALONG:
+            found = 1e3 * self.margins[..., 0]
+        elif view is View.AROUND:
+            found = np.rad2deg(self.margins[..., 1])
+        elif view is View.OPENING:
+            found = 1e3 * self.opening[:, None]
+        else:
+            found = np.nan
+        return np.where(self.feasible, found, np.nan)
+
+    def plot(self, view: View = View.REASON) -> Figure:
+        """Draw both rolls of the map with axes, a legend and counts, or the scale of the values."""
         m = self.manifold
         title = f"{self.scene} · {self.task} · {self.arm}"
-        return pictures.draw_map(self.reason, (m.profile.h_min, m.profile.h_max), m.theta_start, title)
+        coloured = colour(view, self.reason, self.values(view))
+        heights = (m.profile.h_min, m.profile.h_max)
+        return pictures.draw_map(coloured, heights, m.theta_start, title, ("roll 0°", "roll 180°"))
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows."""

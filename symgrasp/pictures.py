@@ -11,41 +11,56 @@ import numpy as np
 from symgrasp.measure import Measurement
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
+from symgrasp.views import Colouring
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_map", "draw_object", "draw_openings", "to_png"]
+__all__ = ["draw_map", "draw_object", "draw_openings", "to_png", "to_svg"]
 
 
-def draw_map(reason: np.ndarray, heights: tuple[float, float], theta_start: float, title: str) -> Figure:
-    """Draw a map, one panel for each roll, with a legend of reasons and counts.
+def draw_map(
+    coloured: Colouring,
+    heights: tuple[float, float],
+    theta_start: float,
+    title: str,
+    panels: Sequence[str],
+    marks: Sequence[tuple[float, float]] = (),
+) -> Figure:
+    """Draw a coloured map with axes, and its legend or scale.
 
     Args:
-        reason: (rolls, heights, angles) of `Reason`.
+        coloured: its index has the shape (panels, H, A).
         heights: bottom and top of the object (m).
         theta_start: angle (rad) where the grid begins.
         title: text above the panels.
+        panels: text above each panel.
+        marks: grasps (h, θ) (m, rad) to circle in all panels.
     """
-    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    colors = ListedColormap([r.color for r in Reason])
-    norm = BoundaryNorm(np.arange(len(Reason) + 1) - 0.5, len(Reason))
     start = np.rad2deg(theta_start)
-    extent = (start, start + 360, 100 * heights[0], 100 * heights[1])
-    figure = Figure(figsize=(11, 3.6), layout="constrained")
-    axes = figure.subplots(1, len(reason), sharey=True, squeeze=False)[0]
-    for panel, cells, name in zip(axes, reason, ("roll 0°", "roll 180°"), strict=True):
-        panel.imshow(cells, origin="lower", aspect="auto", extent=extent, cmap=colors, norm=norm)
-        panel.set(xlabel="θ (°)", title=name, xticks=np.arange(-180, 181, 60), xlim=extent[:2])
+    bottom, top = 100 * heights[0], 100 * heights[1]
+    figure = Figure(figsize=(2.6 + 4.2 * len(panels), 3.6), layout="constrained")
+    axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for panel, cells, name in zip(axes, coloured.colors[coloured.index], panels, strict=True):
+        for turn in (0, 360):  # a shifted grid begins a little before -180°: its end comes round again
+            extent = (start + turn, start + turn + 360, bottom, top)
+            # "none" writes the cells as they are, so that an SVG stays crisp at any size.
+            panel.imshow(cells, origin="lower", aspect="auto", extent=extent, interpolation="none")
+        for h, theta in marks:
+            panel.plot(np.rad2deg(theta), 100 * h, "o", ms=7, mew=2, mfc="none", mec="#e6007e", clip_on=False)
+        panel.set(xlabel="θ (°)", title=name, xticks=np.arange(-180, 181, 60))
+        panel.set(xlim=(-180, 180), ylim=(bottom, top))
     axes[0].set_ylabel("h (cm)")
-    patches = [
-        Patch(color=r.color, label=f"{r.label} ({np.count_nonzero(reason == r)})")
-        for r in reversed(Reason)
-        if (reason == r).any()
-    ]
+    if coloured.scale:
+        _, high, colors = coloured.scale
+        mappable = ScalarMappable(Normalize(0, high), ListedColormap(list(colors / 255)))
+        figure.colorbar(mappable, ax=list(axes), label=coloured.scale.label)
+    patches = [Patch(color=color, label=f"{label} ({count})") for color, label, count in coloured.swatches]
     figure.legend(handles=patches, loc="outside right center", frameon=False)
     figure.suptitle(title)
     return figure
@@ -140,4 +155,14 @@ def to_png(figure: Figure) -> bytes:
     """Render a figure as PNG."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=120)
+    return buffer.getvalue()
+
+
+def to_svg(figure: Figure) -> bytes:
+    """Render a figure as SVG, the same bytes every time."""
+    from matplotlib import rc_context
+
+    buffer = io.BytesIO()
+    with rc_context({"svg.hashsalt": "symgrasp"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()

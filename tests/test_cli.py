@@ -31,7 +31,7 @@ def test_scenes_lists_what_ships(capsys):
     assert [line.split()[0] for line in lines] == SHIPPED
 
 
-@pytest.mark.parametrize("ending", ["npz", "png", "json"])
+@pytest.mark.parametrize("ending", ["npz", "png", "svg", "json"])
 def test_map_writes_every_format(small, tmp_path, capsys, ending):
     out = tmp_path / f"map.{ending}"
     assert main(["map", str(small), "--out", str(out)]) == 0
