@@ -5,11 +5,65 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.values import MapRequest
+from symgrasp.explain import Explanation
+from symgrasp.feasibility import Cell, FeasibilityMap
 
-__all__ = ["Busy", "Request"]
+__all__ = ["Busy", "Check", "CheckRequest", "ExplainRequest", "Explained", "Request"]
 
-Request = MapRequest
+
+@dataclass(frozen=True)
+class CheckRequest:
+    """Compute the map of the turned object from scratch, to compare it with the shifted one.
+
+    Attributes:
+        map: the map that is shifted.
+        delta: by how much (rad).
+    """
+
+    map: MapRequest
+    delta: float
+
+    def differs_in_pose(self, other: object) -> bool:
+        """Whether the other one only turns the object further."""
+        return isinstance(other, CheckRequest) and self.map == other.map
+
+
+@dataclass(frozen=True)
+class ExplainRequest:
+    """Judge every candidate of a cell.
+
+    Attributes:
+        map: the map.
+        cell: a cell of it, before it is shifted.
+    """
+
+    map: MapRequest
+    cell: Cell
+
+    def differs_in_pose(self, other: object) -> bool:
+        """Never: what becomes of another cell is of no use."""
+        return False
+
+
+Request = MapRequest | CheckRequest | ExplainRequest
 """What follows from the state and is computed unasked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """A map computed from scratch, over the grid of the shifted one, and how many cells differ."""
+
+    request: CheckRequest
+    map: FeasibilityMap
+    differing: int
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What becomes of the candidates of a cell."""
+
+    request: ExplainRequest
+    explanation: Explanation
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import viser
 
-from app.palette import INK, PICK, PRINTS, REASONS, faded, rgb
-from app.prints import on_surface, print_index, shown_prints
+from app.coloured import cell_colors
+from app.palette import INK, PICK, rgb
+from app.prints import on_surface
 from app.profile_view import deviation_colors
 from app.stage import Viewpoint, add_links, place, stand_around
 from app.state import State
@@ -88,8 +89,7 @@ class ObjectView:
             colors = deviation_colors(state.thing.measurement, self.grid)
             self.surface.paint(on_surface(state, colors))
         elif state.result:
-            reason, prints = state.roll.reason(state.result.map), shown_prints(state)
-            self.surface.paint(_colors(state, reason, [on_surface(state, cells) for cells in prints]))
+            self.surface.paint(cell_colors(state, state.result.map))
         self.pick.visible = state.pick is not None
         if state.pick:
             self.pick.position = self.grid.contact(state.pick.h, state.pick.theta)
@@ -123,7 +123,7 @@ class FlatMap:
         """Bring it up to the state."""
         self.frame.visible = state.board
         if state.map:
-            self.cells.paint(_colors(state, state.roll.reason(state.map), shown_prints(state)))
+            self.cells.paint(cell_colors(state, state.map))
             # What a turn leaves over beside whole cells moves the start of the grid.
             rest = (state.map.manifold.theta_start + np.pi) / (2 * np.pi)
             self.cells.node.position = (rest * FLAT_SIZE[0], 0.0, 0.0)
@@ -140,14 +140,6 @@ def board_position(state: State, view: Viewpoint) -> Array:
     position = centre + away * (profile.r_max + 0.07 + FLAT_SIZE[0] / 2) * view.right
     position[2] = max(position[2], FLAT_SIZE[1] / 2 + 0.06)
     return position
-
-
-def _colors(state: State, reason: np.ndarray, prints: Sequence[np.ndarray]) -> np.ndarray:
-    colors = REASONS[reason] if state.is_fresh else faded(REASONS[reason])
-    if not prints:
-        return colors
-    index = print_index(prints)
-    return np.where(index[..., None] > 0, PRINTS[index], colors)
 
 
 def _add_seam(client: viser.ClientHandle, name: str, profile: Profile) -> None:

@@ -8,9 +8,11 @@ import time
 from collections import OrderedDict
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
+from app.asking import Check, CheckRequest, Explained, ExplainRequest
 from app.meshes import link_visuals
 from app.things import OWN, Thing, from_library
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
@@ -21,6 +23,7 @@ from symgrasp.maps import MapMaker
 from symgrasp.meshes import read_mesh
 from symgrasp.plan import Hold, Plan
 from symgrasp.planning import plan_bimanual, plan_sequential
+from symgrasp.poses import rotation_z
 from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
@@ -174,6 +177,26 @@ class Workbench:
         result = MapResult(request, the_map, contacts)
         self.store.keep(result)
         return result
+
+    def check(self, request: CheckRequest, known: FeasibilityMap, progress: Progress) -> Check:
+        """Compute the map of the turned object from scratch, and compare it with the shifted one.
+
+        Args:
+            request: which map, and by how much the object is turned.
+            known: that map.
+            progress: told the finished share; may raise `Cancelled`.
+        """
+        shifted, task = known.shift(request.delta), request.map.moved_task()
+        turned = replace(task, T_world_object=task.T_world_object @ rotation_z(request.delta))
+        maker = self.maker(request.map.scene)
+        fresh = maker.map(request.map.arm, turned, manifold=shifted.manifold, progress=progress)
+        return Check(request, fresh, int(np.count_nonzero(fresh.reason != shifted.reason)))
+
+    def explain(self, request: ExplainRequest, progress: Progress) -> Explained:
+        """Judge every candidate of a cell."""
+        maker, the_map = self.maker(request.map.scene), request.map
+        found = maker.explain(the_map.arm, the_map.moved_task(), request.cell, progress=progress)
+        return Explained(request, found)
 
     def _contacts(self, world: BulletWorld, request: MapRequest) -> tuple[str, ...]:
         """Say what the object is inside of, deepest first, each obstacle once."""

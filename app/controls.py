@@ -14,6 +14,7 @@ from app.panels.panel import Actions, Panel
 from app.panels.plan_panel import PlanMapsPanel, PlanPanel
 from app.panels.scene_panel import ScenePanel
 from app.panels.status_panel import NotesPanel, StatusPanel
+from app.panels.view_panel import ViewPanel
 from app.state import State
 
 __all__ = ["Controls", "panel_widths"]
@@ -46,6 +47,7 @@ class Controls:
             map_tab = [
                 MapPanel(gui, actions),
                 NotesPanel(gui, actions),
+                ViewPanel(gui, actions),
                 GraspPanel(gui, actions),
                 PlanMapsPanel(gui, actions),
             ]

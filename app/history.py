@@ -102,7 +102,10 @@ def _what(before: State, after: State, origin: str) -> frozenset[object]:
 
 def _chosen(state: State) -> State:
     """Leave out what is computed; a plan cannot be made again at once, so it stays."""
-    return replace(state, history=History(), result=None, refused=None, busy=None, problem="")
+    looking = state.looking.chosen()
+    return replace(
+        state, history=History(), looking=looking, result=None, refused=None, busy=None, problem=""
+    )
 
 
 def _restored(now: State, then: State, history: History) -> State:

@@ -15,23 +15,26 @@ from html import escape
 import numpy as np
 from PIL import Image
 
-from app.palette import OVERLAP, PRINTS, REASONS, faded
+from app.coloured import coloured
+from app.palette import OVERLAP, PRINTS, faded
 from app.prints import hand_color, print_index
 from app.state import State
 from app.values import PlanResult, RollChoice
 from symgrasp.feasibility import FeasibilityMap
 from symgrasp.manifold import Manifold, wrap
 from symgrasp.plan import PlanTask
-from symgrasp.reason import Reason
+from symgrasp.views import Scale, View
 
 __all__ = [
     "COLUMNS",
     "Mark",
     "legend_html",
     "map_html",
+    "marks_of",
     "plan_html",
     "prints_html",
     "sample_columns",
+    "scale_html",
     "to_png",
 ]
 
@@ -68,12 +71,20 @@ def to_png(indices: np.ndarray, colors: np.ndarray, alpha: Sequence[int] | None 
     return buffer.getvalue()
 
 
+def marks_of(state: State) -> list[Mark]:
+    """Return the grasps that are marked on the map: all of a plan's task, or the picked one."""
+    if state.shown and len(state.shown.holds) > 1:
+        return [Mark(hold.grasp.h, hold.grasp.theta, hold.arm) for hold in state.shown.holds]
+    return [Mark(state.pick.h, state.pick.theta)] if state.pick else []
+
+
 def map_html(
     m: FeasibilityMap,
     roll: RollChoice,
     marks: Sequence[Mark] = (),
     prints: Sequence[np.ndarray] = (),
     *,
+    view: View = View.REASON,
     stale: bool = False,
     height: int = 230,
     name: str = "map",
@@ -85,13 +96,15 @@ def map_html(
         roll: which rolls to show.
         marks: grasps to circle.
         prints: cells (H, A) under each hand, over the grid that begins at -π.
+        view: what the colours stand for.
         stale: wash the colours out.
         height: of the picture (px).
         name: alternative text of the picture.
     """
     grid = m.manifold
-    picture = roll.reason(m)[::-1, sample_columns(grid)]
-    layers = [_img(to_png(picture, faded(REASONS) if stale else REASONS), name)]
+    found = coloured(m, roll, view)
+    picture = found.index[::-1, sample_columns(grid)]
+    layers = [_img(to_png(picture, faded(found.colors) if stale else found.colors), name)]
     still = Manifold(grid.profile, grid.heights, grid.angles)
     if prints:
         index = print_index(prints)[::-1, sample_columns(still)]
@@ -103,24 +116,35 @@ def map_html(
     )
 
 
-def legend_html(m: FeasibilityMap, roll: RollChoice) -> str:
-    """List the reasons that occur, with their colours and how many cells have them."""
-    shown = roll.reason(m)
-    values, counts = np.unique(shown, return_counts=True)
+def legend_html(m: FeasibilityMap, roll: RollChoice, view: View = View.REASON) -> str:
+    """List what occurs on a map, with its colours and how many cells have them, or show the scale."""
+    found = coloured(m, roll, view)
     rows = []
-    for value, count in sorted(zip(values.tolist(), counts.tolist(), strict=True), reverse=True):
-        reason = Reason(value)
-        share = f"{100 * count / shown.size:.0f}" if 200 * count >= shown.size else "<1"
+    for color, label, count in found.swatches:
+        share = (
+            f"{100 * count / found.index.size:.0f}" if 200 * count >= found.index.size or not count else "<1"
+        )
         rows.append(
-            f'<div><i style="background:{reason.color}"></i><span>{escape(reason.label)}</span>'
+            f'<div><i style="background:{color}"></i><span>{escape(label)}</span>'
             f"<small>{count} · {escape(share)} %</small></div>"
         )
-    return f'<div class="sg-legend">{"".join(rows)}</div>'
+    scale = scale_html(found.scale) if found.scale else ""
+    return f'{scale}<div class="sg-legend">{"".join(rows)}</div>'
 
 
-def prints_html(task: PlanTask, prints: Sequence[np.ndarray]) -> str:
-    """List the colours of the hands on a map, and that of their overlap if there is one."""
-    rows = [(hand_color(k), f"hand of {hold.arm}") for k, hold in enumerate(task.holds)]
+def scale_html(scale: Scale) -> str:
+    """Draw a colour scale with its ends."""
+    stops = ", ".join(f"rgb{tuple(color)}" for color in scale.colors[::36].tolist())
+    return (
+        f'<div class="sg sg-rows sg-scale" role="img" aria-label="scale"><span>{escape(scale.label)}</span>'
+        f'<span>0</span><i style="background:linear-gradient(to right, {stops})"></i>'
+        f"<span>{scale.high:g}</span></div>"
+    )
+
+
+def prints_html(names: Sequence[str], prints: Sequence[np.ndarray]) -> str:
+    """List the colours of the hands of some arms on a map, and that of their overlap if there is one."""
+    rows = [(hand_color(k), f"hand of {name}") for k, name in enumerate(names)]
     if OVERLAP in print_index(prints):
         rows.append((OVERLAP, "both hands"))
     swatches = (

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from app.palette import OVERLAP, PRINTS
 from app.state import State
+from symgrasp.handprint import Handprint
+from symgrasp.manifold import Manifold
+from symgrasp.robot import Arm
 
-__all__ = ["hand_color", "on_surface", "print_index", "shown_prints"]
+__all__ = ["hand_color", "on_surface", "print_index", "print_names", "shown_prints"]
 
 
 def print_index(prints: Sequence[np.ndarray]) -> np.ndarray:
@@ -31,10 +35,29 @@ def hand_color(k: int) -> int:
 
 
 def shown_prints(state: State) -> list[np.ndarray]:
-    """Return the prints (H, A), in the object's frame, of the hands that hold the object together."""
-    if not state.plan or not state.shown or len(state.shown.holds) < 2:
-        return []
-    return [state.plan.prints[state.shown.name, hold.arm] for hold in state.shown.holds]
+    """Return the prints (H, A), in the object's frame, of the hands that hold the object.
+
+    Of those that hold it together in a plan, or of the picked grasp where that is asked for.
+    """
+    if state.plan and state.shown and len(state.shown.holds) > 1:
+        return [state.plan.prints[state.shown.name, hold.arm] for hold in state.shown.holds]
+    if state.looking.handprint and state.pick and state.cell:
+        grid = state.scene.manifold
+        row, column = grid.cell(state.pick.h, state.pick.theta)
+        return [_print(state.scene.arm(state.arm), grid, row, state.cell.roll).on(grid, column)]
+    return []
+
+
+def print_names(state: State) -> list[str]:
+    """Return the arms that the shown prints belong to."""
+    if state.shown and len(state.shown.holds) > 1:
+        return [hold.arm for hold in state.shown.holds]
+    return [state.arm]
+
+
+@lru_cache(maxsize=64)
+def _print(arm: Arm, grid: Manifold, row: int, roll: int) -> Handprint:
+    return arm.handprint(grid, row, roll)
 
 
 def on_surface(state: State, cells: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from app.state import State
 from symgrasp.manifold import ROLLS
 from symgrasp.poses import Array
 
-__all__ = ["grasp_html", "map_title", "notes_html", "plan_line", "postures", "status_html"]
+__all__ = ["check_html", "grasp_html", "map_title", "notes_html", "plan_line", "postures", "status_html"]
 
 
 def postures(state: State) -> dict[str, Array]:
@@ -37,6 +37,18 @@ def map_title(state: State) -> str:
     age = "" if state.is_fresh or not state.result else " — of an earlier pose"
     busy = "false" if state.is_current and not state.busy else "true"
     return f'<div class="sg sg-title" aria-busy="{busy}">{names}{age}</div>'
+
+
+def check_html(state: State) -> str:
+    """Say how many cells of the shifted map, drawn above this line, differ from the one drawn below it."""
+    check = state.looking.check
+    if check is None:
+        return '<div class="sg sg-faint">The map is being computed from scratch …</div>'
+    turn, cells = np.rad2deg(check.request.delta), check.map.reason.size
+    return (
+        f'<div class="sg sg-check" role="status">Above: shifted. Below: from scratch for {turn:.2f}°: '
+        f"<b>{check.differing} of {cells} cells differ.</b></div>"
+    )
 
 
 def grasp_html(state: State) -> str:

@@ -13,12 +13,14 @@ from typing import Any
 
 import viser
 
-from app.asking import Request
+from app.asking import CheckRequest, Request
 from app.compute import Store, Workbench, check_visuals
 from app.controls import Controls, panel_widths
 from app.history import remember
+from app.map_picture import map_picture, picture_name
 from app.state import State
 from app.things import Thing, check_size, from_mesh
+from app.values import MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
 from symgrasp.errors import SymgraspError
@@ -169,6 +171,18 @@ class Session:
         """Stop the computation, the picture stays as it is; or begin again what was stopped."""
         self.change(lambda s: s.stopped(s.busy.ticket) if s.busy else s.retry())
 
+    def save_map(self, kind: str) -> None:
+        """Send the map as it is shown to the browser; see `app.map_picture.FORMATS`."""
+        state = self.state
+        if state is None:
+            return
+        try:
+            content = map_picture(state, kind)
+        except SymgraspError as error:
+            self.change(lambda s, problem=str(error): s.failed(problem))
+            return
+        self.client.send_file_download(picture_name(state, kind), content, save_immediately=True)
+
     def download(self) -> None:
         """Send the plan to the browser."""
         if self.state and self.state.plan:
@@ -195,16 +209,30 @@ class Session:
                 self.state = replace(state, busy=None)
             if self.state.busy is None:
                 self.worker.cancel()
-        elif known := self.store.map(request):
+        elif isinstance(request, MapRequest) and (known := self.store.map(request)):
             self.worker.cancel()
             self._take(replace(state, busy=None, result=known), origin)
         else:
+            self._answer(request, state)
+
+    def _answer(self, request: Request, state: State) -> None:
+        """Compute what the state lacks."""
+        if isinstance(request, MapRequest):
             self._submit(
                 f"Computing the map of {request.task}",
                 lambda progress: self.bench.map(request, progress),
                 lambda ticket, result: self.change(lambda s: s.map_arrived(ticket, result)),
                 request,
             )
+            return
+        if isinstance(request, CheckRequest):
+            assert state.result  # the check is of the map that is shown
+            label, known = f"Recomputing the map of {request.map.task}", state.result.map
+            run = lambda progress: self.bench.check(request, known, progress)  # noqa: E731
+        else:
+            label = "Trying every way to hold it here"
+            run = lambda progress: self.bench.explain(request, progress)  # noqa: E731
+        self._submit(label, run, lambda t, found: self.change(lambda s: s.found(t, found)), request)
 
     def _submit(
         self,

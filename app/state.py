@@ -12,11 +12,13 @@ from functools import cached_property
 
 import numpy as np
 
-from app.asking import Busy, Request
+from app.asking import Busy, Check, Explained, ExplainRequest, Request
 from app.history import History
+from app.looking import Looking
 from app.things import OWN, Thing
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.errors import InputError
+from symgrasp.explain import Explanation, Verdict
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import wrap
 from symgrasp.plan import PlanTask
@@ -54,6 +56,7 @@ class State:
         result: the newest map, maybe of an earlier request.
         refused: what was cancelled or failed: not tried again unasked.
         pick: the grasp picked.
+        looking: how the map is looked at, and what was found out about it for that.
         plan: the newest plan.
         step: which of its tasks is shown; None once the person has moved on.
         busy: what is being computed.
@@ -77,6 +80,7 @@ class State:
     result: MapResult | None = None
     refused: Request | None = None
     pick: Pick | None = None
+    looking: Looking = field(default_factory=Looking)
     plan: PlanResult | None = None
     step: int | None = None
     busy: Busy | None = None
@@ -123,7 +127,9 @@ class State:
     @property
     def unmet(self) -> Request | None:
         """What is asked for first and not there."""
-        return None if self.is_current else self.request
+        if not self.is_current:
+            return self.request
+        return self.looking.unmet(self.request, self.delta, self.base_cell)
 
     @property
     def lacking(self) -> Request | None:
@@ -160,6 +166,7 @@ class State:
         return (
             self.scene, self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick,
             self.step, self.gizmo, self.errors, self.board, self.dark, self.thing, self.uploaded,
+            *self.looking.inputs,
         )  # fmt: skip
 
     @cached_property
@@ -175,6 +182,41 @@ class State:
         row, column = self.map.manifold.cell(self.pick.h, self.pick.theta)
         roll = self.roll.roll(self.map, row, column) if self.pick.roll is None else self.pick.roll
         return Cell(roll, row, column)
+
+    @cached_property
+    def base_cell(self) -> Cell | None:
+        """The same cell of the map before it is shifted: it has the same tool pose."""
+        if self.cell is None or self.result is None:
+            return None
+        grid = self.result.map.manifold
+        return self.cell.turned(grid.shift(self.delta)[1], grid.angles)
+
+    @property
+    def explanation(self) -> Explanation | None:
+        """What becomes of the candidates of the picked cell, once that is known."""
+        found = self.looking.explained
+        if found is None or not self.is_current or self.base_cell is None:
+            return None
+        return found.explanation if found.request == ExplainRequest(self.request, self.base_cell) else None
+
+    @property
+    def candidate(self) -> int | None:
+        """Index of the candidate shown: the one chosen, else the map's witness or what came closest."""
+        if self.explanation is None or not self.explanation.verdicts:
+            return None
+        if self.looking.candidate is not None:
+            return min(self.looking.candidate, len(self.explanation.verdicts) - 1)
+        witness = self.map.witness(self.cell) if self.map and self.cell else None
+        picks = [(verdict.sample, verdict.branch) for verdict in self.explanation.verdicts]
+        pick = witness and (witness.sample, witness.branch)
+        return picks.index(pick) if pick in picks else 0
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The candidate shown."""
+        if self.explanation is None or self.candidate is None:
+            return None
+        return self.explanation.verdicts[self.candidate]
 
     @property
     def contacts(self) -> tuple[str, ...]:
@@ -202,7 +244,10 @@ class State:
     def open_scene(self, scene: Scene, name: str) -> State:
         """Show another scene; what belongs to none stays."""
         new = State.of(scene, name)
-        return replace(new, uploaded=self.uploaded, board=self.board, dark=self.dark, history=self.history)
+        return replace(
+            new, uploaded=self.uploaded, looking=self.looking.elsewhere(), board=self.board, dark=self.dark,
+            history=self.history,
+        )  # fmt: skip
 
     def choose_object(self, scene: Scene, thing: Thing | None) -> State:
         """Show the scene with another object in it, or with its own again (None)."""
@@ -227,7 +272,7 @@ class State:
     def choose_roll(self, roll: RollChoice) -> State:
         """Show other rolls; a pick keeps its place and takes the roll shown."""
         pick = replace(self.pick, roll=None) if self.pick else None
-        return replace(self, roll=roll, pick=pick)
+        return replace(self, roll=roll, pick=pick, looking=self.looking.another_cell())
 
     def turn(self, delta: float) -> State:
         """Turn the object to δ (rad) about its axis: nothing is recomputed."""
@@ -271,7 +316,12 @@ class State:
             expected = f"{100 * profile.h_min:g} to {100 * profile.h_max:g} cm"
             raise InputError("grasp", "h (cm)", round(100 * h, 3), expected)
         theta = float(wrap(_finite("θ", theta)))
-        return replace(self, pick=Pick(float(h), theta), step=None, problem="")
+        looking = self.looking.another_cell()
+        return replace(self, pick=Pick(float(h), theta), looking=looking, step=None, problem="")
+
+    def choose_candidate(self, candidate: int) -> State:
+        """Show a candidate of the picked cell, by its index; the best is the first."""
+        return replace(self, looking=self.looking.choose_candidate(candidate), step=None)
 
     def choose_cell(self, row: int, column: int) -> State:
         """Pick the centre of a cell of the map as it is shown."""
@@ -289,7 +339,7 @@ class State:
 
     def clear_pick(self) -> State:
         """Let go: the arms park."""
-        return replace(self, pick=None, step=None)
+        return replace(self, pick=None, looking=self.looking.another_cell(), step=None)
 
     def started(self, ticket: int, label: str, request: Request | None = None) -> State:
         """A computation began; it replaces the one before."""
@@ -310,6 +360,13 @@ class State:
         if result.request != self.request and not follows:
             return state
         return replace(state, result=result, refused=None)
+
+    def found(self, ticket: int, found: Check | Explained) -> State:
+        """Take what was found out about the map, unless it is about an earlier one."""
+        if self.busy is None or self.busy.ticket != ticket:
+            return self
+        looking = self.looking.take(found) if found.request.map == self.request else self.looking
+        return replace(self, busy=None, looking=looking)
 
     def stopped(self, ticket: int, problem: str = "") -> State:
         """The computation was cancelled or failed: do not begin it again by itself."""
@@ -349,6 +406,7 @@ class State:
             arm=hold.arm,
             delta=task.delta,
             pick=pick,
+            looking=self.looking.another_cell(),
             result=self.plan.maps[task.name, hold.arm],
             problem="",
         )

@@ -13,6 +13,7 @@ from symgrasp.plan import Plan
 from symgrasp.poses import Array, axis_frame, rotation_z, spin
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
+from symgrasp.views import View
 
 __all__ = ["MapRequest", "MapResult", "ObjectPose", "PlanResult", "RollChoice", "moved"]
 
@@ -60,17 +61,27 @@ class RollChoice(Enum):
     ZERO = "0°"
     HALF_TURN = "180°"
 
-    def reason(self, m: FeasibilityMap) -> np.ndarray:
-        """Return the reasons (H, A) that are shown; of either roll the one that got furthest."""
+    def rolls(self, m: FeasibilityMap) -> np.ndarray:
+        """Return the index (H, A) of the roll that is shown: what got furthest, with most clearance."""
         if self is RollChoice.EITHER:
-            return m.reason.max(axis=0)
-        return m.reason[0 if self is RollChoice.ZERO else 1]
+            return (m.reason + np.nan_to_num(m.clearance)).argmax(axis=0)
+        return np.full(m.reason.shape[1:], 0 if self is RollChoice.ZERO else 1)
+
+    def reason(self, m: FeasibilityMap) -> np.ndarray:
+        """Return the reasons (H, A) that are shown."""
+        return self.of(m, m.reason)
+
+    def values(self, m: FeasibilityMap, view: View) -> np.ndarray:
+        """Return the values (H, A) of a view that are shown, in its unit."""
+        return self.of(m, m.values(view))
+
+    def of(self, m: FeasibilityMap, cells: np.ndarray) -> np.ndarray:
+        """Return what is shown (H, A) of cells (R, H, A) of both rolls."""
+        return np.take_along_axis(cells, self.rolls(m)[None], axis=0)[0]
 
     def roll(self, m: FeasibilityMap, row: int, column: int) -> int:
-        """Return the index of the roll that `reason` shows at a cell."""
-        if self is RollChoice.EITHER:
-            return int(m.reason[:, row, column].argmax())
-        return 0 if self is RollChoice.ZERO else 1
+        """Return the index of the roll that is shown at a cell."""
+        return int(self.rolls(m)[row, column])
 
 
 @dataclass(frozen=True)
@@ -93,8 +104,10 @@ class MapRequest:
         """The base pose (4, 4)."""
         return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
 
-    def differs_in_pose(self, other: MapRequest) -> bool:
-        """Whether only the object's pose is another."""
+    def differs_in_pose(self, other: object) -> bool:
+        """Whether the other one is for the same map, but for the object's pose."""
+        if not isinstance(other, MapRequest):
+            return False
         return self.scene is other.scene and (self.arm, self.task) == (other.arm, other.task)
 
     def moved_task(self) -> Task:

@@ -163,6 +163,6 @@ def to_svg(figure: Figure) -> bytes:
     from matplotlib import rc_context
 
     buffer = io.BytesIO()
-    with rc_context({"svg.hashsalt": "symgrasp"}):
+    with rc_context({"svg.hashsalt": "symgrasp", "image.composite_image": False}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()

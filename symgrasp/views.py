@@ -49,6 +49,9 @@ which the tritanopic see as near white."""
 STEPS = 255
 """Steps of the scale in a picture."""
 
+SMALLEST = 0.001
+"""Smallest end of a scale."""
+
 NICE = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """Where a scale may end, times a power of ten."""
 
@@ -129,8 +132,8 @@ def colour(view: View, reason: np.ndarray, values: Array) -> Colouring:
 
 def _nice(value: float) -> float:
     """Return a round number that is not smaller, for the end of a scale."""
-    if value <= 0:
-        return 1.0
+    if value < SMALLEST:
+        return SMALLEST
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * next(step for step in NICE if step * power >= value * (1 - 1e-9)))
 

@@ -14,9 +14,9 @@ ORDER = [
     "errors", "files", "compiling", "poses", "meshes", "meridian", "axis", "mesh_io", "outline", "surface",
     "measure", "profile", "objects", "manifold", "assembly", "hand", "handprint", "robot_model", "robot",
     "gripper", "measure_hand", "ik", "scene_file", "scene_build", "scene", "reason", "margins", "views",
-    "pictures",    "fit", "object_report", "world", "candidates", "feasibility", "explain", "algorithm1", "engine", "maps",
-    "planners", "plan", "plan_writing", "solving", "planning", "listing", "exports", "verify", "plan_check",
-    "bench", "cli", "__main__",
+    "pictures", "fit", "object_report", "world", "candidates", "feasibility", "explain", "algorithm1",
+    "engine", "maps", "planners", "plan", "plan_writing", "solving", "planning", "listing", "exports",
+    "verify", "plan_check", "bench", "cli", "__main__",
 ]  # fmt: skip
 
 

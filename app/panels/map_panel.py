@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import viser
 
-from app.map_view import Mark, legend_html, map_html, prints_html
+from app.map_view import legend_html, map_html, marks_of, prints_html
 from app.panels.panel import Actions, Panel
-from app.prints import shown_prints
+from app.prints import print_names, shown_prints
 from app.profile_view import holds_html, profile_html, symmetry_html
-from app.readout import map_title
+from app.readout import check_html, map_title
 from app.state import State
 
 __all__ = ["MapPanel"]
+
+HEIGHT = 230
+"""Of the map's picture (px)."""
+
+HEIGHT_OF_TWO = 140
+"""Of each picture where there are two to compare."""
 
 
 class MapPanel(Panel):
@@ -21,22 +27,39 @@ class MapPanel(Panel):
         super().__init__(gui, actions)
         self.title = self.html('<div class="sg sg-title">Loading …</div>')
         self.map = self.html()
+        self.check = self.html()
         self.legend = self.html()
         self.holds = self.html()
 
     def show(self, state: State) -> None:
-        """Draw the map."""
+        """Draw the map, and under it the one it is compared with."""
         self.title.show(map_title(state))
         self.holds.show(holds_html(state) + symmetry_html(state))
         if state.map is None:
             self.map.show('<div class="sg sg-faint">The map is being computed …</div>')
+            self.check.show("")
             self.legend.show("")
             return
-        marks = [Mark(state.pick.h, state.pick.theta)] if state.pick else []
-        prints, legend = shown_prints(state), legend_html(state.map, state.roll)
-        if prints and state.shown:
-            legend += prints_html(state.shown, prints)
-            marks = [Mark(h.grasp.h, h.grasp.theta, h.arm) for h in state.shown.holds]
-        shown = map_html(state.map, state.roll, marks, prints, stale=not state.is_fresh)
-        self.map.show(f'<div class="sg-side">{shown}{profile_html(state)}</div>')
+        look = state.looking
+        height = HEIGHT_OF_TWO if look.compare else HEIGHT
+        prints, legend = shown_prints(state), legend_html(state.map, state.roll, look.view)
+        if prints:
+            legend += prints_html(print_names(state), prints)
+        shown = map_html(
+            state.map, state.roll, marks_of(state), prints,
+            view=look.view, stale=not state.is_fresh, height=height,
+        )  # fmt: skip
+        self.map.show(f'<div class="sg-side">{shown}{profile_html(state, height)}</div>')
         self.legend.show(legend)
+        self.check.show(self._check(state) if look.compare else "")
+
+    def _check(self, state: State) -> str:
+        """Draw the map that was computed from scratch, and say how many cells differ."""
+        check = state.looking.check
+        if check is None:
+            return check_html(state)
+        shown = map_html(
+            check.map, state.roll, view=state.looking.view, height=HEIGHT_OF_TWO, name="recomputed map"
+        )
+        room = profile_html(state, HEIGHT_OF_TWO)
+        return f'{check_html(state)}<div class="sg-side">{shown}{room}</div>'

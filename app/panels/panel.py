@@ -42,6 +42,9 @@ class Actions(Protocol):
     def stop_or_retry(self) -> None:
         """Stop the computation, or begin the one that was stopped again."""
 
+    def save_map(self, kind: str) -> None:
+        """Send the map as it is shown as a picture."""
+
     def download(self) -> None:
         """Send the plan as a file."""
 

@@ -108,7 +108,7 @@ def test_each_hand_has_its_colour_their_overlap_a_third_and_the_rest_is_clear():
         assert np.array_equal(image[..., 3] > 0, a | b)
         for cells, color in ((a & ~b, PRINTS[1]), (b & ~a, PRINTS[2]), (a & b, PRINTS[OVERLAP])):
             assert (image[cells][:, :3] == color).all()
-        assert ("both hands" in prints_html(state.shown, [left, other])) == bool((a & b).any())
+        assert ("both hands" in prints_html(["left", "right"], [left, other])) == bool((a & b).any())
 
 
 def test_prints_on_the_surface_stay_under_the_hand_when_the_object_turns():

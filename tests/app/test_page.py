@@ -24,7 +24,7 @@ from tests.conftest import load_small, write_scene
 
 
 def test_state_and_computing_know_no_browser():
-    pure = "app.state, app.values, app.worker, app.compute, app.readout, app.map_view, app.palette"
+    pure = "app.state, app.worker, app.compute, app.readout, app.map_view, app.map_picture"
     code = f"import sys, {pure}; sys.exit('viser' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

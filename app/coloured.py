@@ -1,0 +1,40 @@
+"""The map in the colours of the view that was chosen, the same on the object, board and panel."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from app.palette import PRINTS, faded
+from app.prints import print_index, shown_prints
+from app.state import State
+from app.values import RollChoice
+from symgrasp.feasibility import FeasibilityMap
+from symgrasp.views import Colouring, View, colour
+
+__all__ = ["cell_colors", "coloured"]
+
+
+@lru_cache(maxsize=16)
+def coloured(m: FeasibilityMap, roll: RollChoice, view: View = View.REASON) -> Colouring:
+    """Colour a map as one panel (H, A)."""
+    return colour(view, roll.reason(m), roll.values(m, view))
+
+
+def cell_colors(state: State, m: FeasibilityMap) -> np.ndarray:
+    """Return the colours (H, A, 3), sRGB, of a map of the state with the prints over it.
+
+    Args:
+        state: the state.
+        m: the map over the object as it is turned, or as computed.
+    """
+    found = coloured(m, state.roll, state.looking.view)
+    colors = (found.colors if state.is_fresh else faded(found.colors))[found.index]
+    prints = shown_prints(state)
+    if not prints:
+        return colors
+    index = print_index(prints)
+    if m is not state.map:  # the object's surface does not turn with it
+        index = np.roll(index, m.manifold.shift(state.delta)[1], axis=1)
+    return np.where(index[..., None] > 0, PRINTS[index], colors)

@@ -1,0 +1,40 @@
+"""How the map is looked at, and the map as a file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import viser
+
+from app.map_picture import FORMATS
+from app.panels.panel import Actions, Panel
+from app.state import State
+from symgrasp.views import View
+
+__all__ = ["ViewPanel"]
+
+
+class ViewPanel(Panel):
+    """Chooses what the colours stand for, and saves the picture."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        self.view = self.choice("Colours show", tuple(View))
+        self.on(self.view, lambda s, v: replace(s, looking=replace(s.looking, view=View(v))))
+        self.handprint = gui.add_checkbox(
+            "Handprint", False, hint="The cells under the hand of the picked grasp."
+        )
+        self.on(self.handprint, lambda s, v: replace(s, looking=replace(s.looking, handprint=v)))
+        self.compare = gui.add_checkbox(
+            "Recompute as well", False,
+            hint="Also compute the map of the turned object from scratch, and count the cells that differ.",
+        )  # fmt: skip
+        self.on(self.compare, lambda s, v: replace(s, looking=s.looking.choose_compare(v)))
+        self.save = gui.add_button_group("Save map as", tuple(FORMATS))
+        self.save.on_click(lambda _: actions.save_map(self.save.value))
+
+    def write_inputs(self, state: State) -> None:
+        """Show what is chosen."""
+        self.view.value = state.looking.view
+        self.handprint.value = state.looking.handprint
+        self.compare.value = state.looking.compare

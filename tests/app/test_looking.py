@@ -1,0 +1,230 @@
+"""How the map is looked at: views, prints, the recomputed map, and the candidates of a cell."""
+
+# A map, a pick or a plan may be None in general, but not where these tests look.
+# pyright: reportOptionalMemberAccess=false, reportArgumentType=false
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from app.asking import Check, CheckRequest, Explained, ExplainRequest
+from app.coloured import cell_colors, coloured
+from app.compute import Store, Workbench
+from app.map_picture import map_picture, picture_name
+from app.map_view import legend_html
+from app.prints import shown_prints
+from app.readout import check_html
+from app.state import State
+from app.values import RollChoice
+from symgrasp.errors import SymgraspError
+from symgrasp.feasibility import Cell
+from symgrasp.reason import Reason
+from symgrasp.views import View
+from tests.app.test_state import opened
+
+
+@pytest.fixture(scope="module")
+def bench():
+    bench = Workbench(Store("bottle_on_table"))
+    yield bench
+    bench.close()
+
+
+def quiet(share: float) -> None:
+    """Progress that nobody watches."""
+
+
+def looking(state: State, **changes: object) -> State:
+    return replace(state, looking=replace(state.looking, **changes))
+
+
+def cell_with(state: State, reason: Reason) -> tuple[int, int]:
+    return tuple(np.argwhere(RollChoice.EITHER.reason(state.map) == reason)[0].tolist())
+
+
+# -- views ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("view", View)
+def test_all_that_is_shown_of_a_cell_belongs_to_one_roll(view):
+    m = opened().map
+    reason, values = RollChoice.EITHER.reason(m), RollChoice.EITHER.values(m, view)
+    for row, column in np.ndindex(*reason.shape):
+        roll = RollChoice.EITHER.roll(m, row, column)
+        assert m.reason[:, row, column].max() == reason[row, column] == m.reason[roll, row, column]
+        assert np.array_equal(m.values(view)[roll, row, column], values[row, column], equal_nan=True)
+        if reason[row, column] == Reason.FEASIBLE:
+            assert m.clearance[roll, row, column] == np.nanmax(m.clearance[:, row, column])
+
+
+@pytest.mark.parametrize("view", View)
+def test_turning_the_object_only_rolls_any_view(view):
+    state = looking(opened(), view=view)
+    grid = state.scene.manifold
+    before = cell_colors(state, state.map)
+    turned = state.turn(3 * grid.dtheta)
+    assert np.array_equal(cell_colors(turned, turned.map), np.roll(before, -3, axis=1))
+    assert np.array_equal(cell_colors(turned, turned.result.map), before)  # the surface stays where it is
+    assert legend_html(turned.map, turned.roll, view) == legend_html(state.map, state.roll, view)
+
+
+def test_the_legend_of_values_is_a_scale_in_their_unit():
+    state = opened()
+    html = legend_html(state.map, state.roll, View.CLEARANCE)
+    high = coloured(state.map, state.roll, View.CLEARANCE).scale.high
+    assert "clearance (mm)" in html
+    assert f"<span>{high:g}</span>" in html
+    assert high >= 1e3 * np.nanmax(state.map.clearance)
+    assert "scale" not in legend_html(state.map, state.roll, View.REASON)
+
+
+def test_the_print_of_the_picked_grasp_lies_around_it():
+    state = opened()
+    row, column = cell_with(state, Reason.FEASIBLE)
+    picked = state.choose_cell(row, column)
+    assert shown_prints(picked) == []
+    assert shown_prints(looking(state, handprint=True)) == []
+    (cells,) = shown_prints(looking(picked, handprint=True))
+    assert cells[row, column]
+    assert 0 < cells.sum() < cells.size / 2
+    painted = cell_colors(looking(picked, handprint=True), picked.map)
+    assert np.array_equal((painted != cell_colors(picked, picked.map)).any(axis=-1), cells)
+
+
+@pytest.mark.parametrize("view", [View.REASON, View.CLEARANCE])
+def test_the_picture_of_the_map_is_a_file(view):
+    state = looking(opened().turn(0.3), view=view)
+    row, column = cell_with(state, Reason.FEASIBLE)
+    state = looking(state.choose_cell(row, column), handprint=True)
+    assert Image.open(io.BytesIO(map_picture(state, "PNG"))).width > 400
+    assert ElementTree.fromstring(map_picture(state, "SVG")).tag.endswith("svg")
+    assert picture_name(state, "SVG") == f"bottle_on_table_pick_panda_{view}.svg"
+    with pytest.raises(SymgraspError, match="none for this pose yet"):
+        map_picture(state.move(x=0.5), "PNG")
+
+
+# -- shifted against recomputed --------------------------------------------------------------
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.one_of(st.integers(-20, 20).map(lambda k: k * np.pi / 8), st.floats(-4, 4)))
+def test_the_recomputed_map_is_the_shifted_one(delta):
+    state = looking(opened(), compare=True).turn(delta)
+    assert state.wanted == CheckRequest(state.request, state.delta)
+    bench = Workbench(Store("bottle_on_table"))
+    try:
+        check = bench.check(state.wanted, state.result.map, quiet)
+    finally:
+        bench.close()
+    assert check.differing == 0
+    assert np.array_equal(check.map.reason, state.map.reason)
+    assert np.array_equal(check.map.manifold.theta, state.map.manifold.theta)
+    assert np.allclose(check.map.T_world_object, state.map.T_world_object)
+    checked = state.started(1, "", state.wanted).found(1, check)
+    assert checked.wanted is None
+    assert f"{np.rad2deg(delta):.2f}°: <b>0 of {check.map.reason.size} cells differ" in check_html(checked)
+
+
+def test_the_comparison_counts_what_differs(bench):
+    state = looking(opened(), compare=True).turn(0.4)
+    keep = np.ones(state.map.reason.shape, dtype=bool)
+    keep[tuple(np.argwhere(state.result.map.feasible)[0])] = False
+    wrong = state.result.map.masked(keep)
+    assert bench.check(state.wanted, wrong, quiet).differing == 1
+
+
+def test_the_comparison_follows_the_slider():
+    state = looking(opened(), compare=True)
+    first = state.started(1, "", state.wanted)
+    turned = first.turn(0.5)
+    assert turned.wanted is None  # finished first: the slider would interrupt it for ever
+    check = CheckRequest(state.request, 0.0)
+    arrived = turned.found(1, compute_nothing(check, state))
+    assert arrived.looking.check.request == check
+    assert arrived.wanted == CheckRequest(state.request, 0.5)
+    moved = first.move(x=0.5)
+    assert moved.wanted == moved.request  # a new map goes first
+    late = first.progressed(1, 0.1, late=True).turn(0.5)
+    assert late.wanted == CheckRequest(state.request, 0.5)
+
+
+def compute_nothing(request: CheckRequest, state: State) -> Check:
+    return Check(request, state.map, 0)
+
+
+def test_no_comparison_unless_asked_for():
+    state = opened().turn(0.3)
+    assert state.wanted is None
+    compared = looking(state, compare=True)
+    got = compared.started(1, "", compared.wanted).found(1, compute_nothing(compared.wanted, state))
+    off = replace(got, looking=got.looking.choose_compare(False))
+    assert off.looking.check is None
+    assert off.wanted is None
+
+
+def test_a_stopped_comparison_stays_stopped_until_something_else_is_asked():
+    state = looking(opened(), compare=True)
+    stopped = state.started(1, "", state.wanted).stopped(1)
+    assert stopped.wanted is None
+    assert stopped.retry().wanted == CheckRequest(state.request, 0.0)
+    assert stopped.turn(0.1).wanted == CheckRequest(state.request, 0.1)
+
+
+# -- candidates -----------------------------------------------------------------------------
+
+
+def explained(bench: Workbench, state: State) -> State:
+    request = state.wanted
+    assert isinstance(request, ExplainRequest)
+    return state.started(1, "", request).found(1, bench.explain(request, quiet))
+
+
+@pytest.mark.parametrize("delta", [0.0, 0.3, np.pi / 8])
+@pytest.mark.parametrize("reason", [Reason.FEASIBLE, Reason.SCENE_COLLISION, Reason.UNREACHABLE])
+def test_the_candidates_are_those_of_the_picked_cell(bench, reason, delta):
+    state = opened().turn(delta)
+    state = explained(bench, state.choose_cell(*cell_with(state, reason)))
+    assert state.wanted is None
+    assert state.explanation.reason == reason == state.map.reason[state.cell]
+    tools = state.map.manifold.tool_poses(state.T_world_object, state.scene.arm().hand.finger_depth)
+    assert np.allclose(state.explanation.T_world_tool, tools[state.cell], atol=1e-8)
+    if reason == Reason.UNREACHABLE:
+        assert (state.candidate, state.verdict) == (None, None)
+        return
+    assert state.verdict.reason == reason
+    if reason == Reason.FEASIBLE:  # the arm does not jump when the candidates arrive
+        assert np.allclose(state.verdict.q, state.map.witness(state.cell).q)
+    else:
+        assert state.candidate == 0
+
+
+def test_candidates_are_stepped_through_and_forgotten_with_the_cell(bench):
+    state = opened()
+    state = explained(bench, state.choose_cell(*cell_with(state, Reason.FEASIBLE)))
+    last = len(state.explanation.verdicts) - 1
+    assert state.choose_candidate(last).verdict is state.explanation.verdicts[-1]
+    assert state.choose_candidate(last + 5).candidate == last
+    assert state.choose_candidate(-1).candidate == 0
+    other = state.choose_candidate(last).choose_cell(*cell_with(state, Reason.SCENE_COLLISION))
+    assert (other.explanation, other.candidate) == (None, None)
+    assert state.move(x=0.5).explanation is None
+    assert state.clear_pick().explanation is None
+    assert opened().choose_candidate(3).candidate is None
+
+
+def test_an_answer_about_another_cell_does_not_count(bench):
+    state = opened()
+    first = state.choose_cell(*cell_with(state, Reason.FEASIBLE))
+    second = first.started(1, "", first.wanted).choose_cell(*cell_with(state, Reason.SCENE_COLLISION))
+    assert second.wanted == ExplainRequest(state.request, second.base_cell)  # takes its place at once
+    answer = Explained(ExplainRequest(state.request, Cell(0, 0, 0)), None)
+    assert second.started(2, "", second.wanted).found(1, answer).looking.explained is None
+    assert second.found(1, answer).explanation is None
