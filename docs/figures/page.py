@@ -17,7 +17,7 @@ from tests.e2e.page import GraspPage
 
 __all__ = ["page", "page_two_robots"]
 
-SIZE: ViewportSize = {"width": 1280, "height": 800}
+SIZE: ViewportSize = {"width": 1440, "height": 900}
 
 
 def page() -> None:
