@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import argparse
 import errno
-import io
 import logging
 import socket
 import sys
 import threading
-from contextlib import redirect_stdout
-
-import viser
 
 from app.compute import Store
 from app.front_door import FrontDoor
 from app.reception import Reception
+from app.snapshot import quiet_server
 from symgrasp.compiling import COMPILING, telling_of_compiling
 from symgrasp.errors import InputError, SymgraspError
 
@@ -35,9 +32,7 @@ def serve(scene: str, host: str, port: int) -> None:
     """
     _check_free(host, port)
     store = _warm_store(scene)
-    with redirect_stdout(io.StringIO()):  # viser's own banner
-        server = viser.ViserServer(host="127.0.0.1", port=_any_port(), verbose=False)
-    server.scene.world_axes.visible = False
+    server = quiet_server()
     reception = Reception(store, lambda client_id: client_id in server.get_clients())
     server.on_client_connect(reception.arrived)
     server.on_client_disconnect(reception.left)
@@ -64,12 +59,6 @@ def _warm_store(scene: str) -> Store:
         store = Store(scene)
         store.warm()
     return store
-
-
-def _any_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def _check_free(host: str, port: int) -> None:

@@ -9,15 +9,18 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from app.asking import Check, CheckRequest, Explained, ExplainRequest
+from app.links import Link
 from app.meshes import link_visuals
 from app.things import OWN, Thing, from_library
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
-from symgrasp.errors import Cancelled, SymgraspError
+from symgrasp.errors import Cancelled, SceneError, SymgraspError, one_of
 from symgrasp.feasibility import FeasibilityMap, Progress
+from symgrasp.files import SCENES_DIR
 from symgrasp.manifold import ROLLS
 from symgrasp.maps import MapMaker
 from symgrasp.meshes import read_mesh
@@ -60,6 +63,8 @@ class Store:
         self._maps: OrderedDict[MapRequest, MapResult] = OrderedDict()
         self.first = first
         self.names = tuple(dict.fromkeys([first, *shipped_scenes()]))
+        own = [] if first in shipped_scenes() else [Path(first).resolve().parent]
+        self.folders = (*own, SCENES_DIR)
         self.scene(first)
 
     def scene(self, name: str) -> Scene:
@@ -72,6 +77,8 @@ class Store:
             known = self._scenes.get(name)
         if known:
             return known
+        if name not in self.names:  # a page can ask for any name, but for no file
+            raise SceneError("page", "scene", name, one_of(self.names, name))
         scene = Scene.load(name)
         check_tasks(scene)
         check_visuals(scene)
@@ -95,6 +102,19 @@ class Store:
         changed = scene.with_object(thing.name, thing.profile), thing
         with self._lock:
             return self._with.setdefault((name, choice), changed)
+
+    def linked(self, link: Link) -> tuple[Scene, Thing | None]:
+        """Return the scene of a link with its object and hands.
+
+        Raises:
+            InputError: there is none of that name.
+        """
+        scene, thing = self.scene_with(link.scene or self.first, link.object or OWN)
+        for arm, hand in link.hands.items():
+            if scene.mounted.get(arm) != hand:
+                scene = scene.with_hand(arm, hand)
+                check_visuals(scene)
+        return scene, thing
 
     def map(self, request: MapRequest) -> MapResult | None:
         """Return a map that was computed before."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import viser
 
+from app.panels.files_panel import FilesPanel
 from app.panels.grasp_panel import GraspPanel
 from app.panels.keyboard import Keyboard
 from app.panels.map_panel import MapPanel
@@ -51,6 +52,8 @@ class Controls:
                 GraspPanel(gui, actions),
                 PlanMapsPanel(gui, actions),
             ]
+        with left.add_tab("Files", viser.Icon.FILES):
+            files_tab = [FilesPanel(gui, actions), NotesPanel(gui, actions)]
         left.dock_left()
         map_width, controls_width = panel_widths(client.camera.image_width)
         left.set_width(map_width)
@@ -63,7 +66,7 @@ class Controls:
             PlanPanel(gui, actions),
             Keyboard(gui, actions, scenes),
         ]
-        self.panels: tuple[Panel, ...] = (*map_tab, *main)
+        self.panels: tuple[Panel, ...] = (*map_tab, *files_tab, *main)
 
     def show(self, state: State, *, write_inputs: bool) -> None:
         """Bring the panels up to the state.

@@ -20,7 +20,7 @@ import ipaddress
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from urllib.parse import urlsplit
+from urllib.parse import urlsplit, urlunsplit
 
 __all__ = ["HELLO", "FrontDoor", "Visit", "is_foreign"]
 
@@ -45,10 +45,12 @@ class Visit:
     Attributes:
         token: the secret name it knew.
         query: what stood behind the ``?`` of the address it opened.
+        address: the address without that.
     """
 
     token: str
-    query: str
+    query: str = ""
+    address: str = "/"
 
 
 @dataclass(frozen=True)
@@ -157,8 +159,9 @@ class FrontDoor:
             writer.close()
 
     def _greet(self, request: _Request, writer: asyncio.StreamWriter) -> None:
-        query = urlsplit(request.headers.get("referer", "")).query
-        visit = Visit(request.path.removeprefix(HELLO), query)
+        opened = urlsplit(request.headers.get("referer", "/"))
+        address = urlunsplit((opened.scheme, opened.netloc, opened.path, "", ""))
+        visit = Visit(request.path.removeprefix(HELLO), opened.query, address)
         if _is_own_picture(request.headers) and self._on_visit(visit):
             _reply(writer, "200 OK", PICTURE, "image/svg+xml")
         else:

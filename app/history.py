@@ -112,4 +112,4 @@ def _restored(now: State, then: State, history: History) -> State:
     result = now.result if now.scene is then.scene else None
     if then.plan and then.shown:
         result = then.plan.maps.get((then.task, then.arm), result)
-    return replace(then, history=history, result=result, uploaded=now.uploaded)
+    return replace(then, history=history, result=result, uploaded=now.uploaded, loaded=now.loaded)

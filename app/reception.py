@@ -77,7 +77,7 @@ class Reception:
     def _open(self, client: viser.ClientHandle, greeting: viser.GuiHtmlHandle, visit: Visit) -> None:
         try:
             greeting.remove()
-            session = Session(client, self._store)
+            session = Session(client, self._store, visit)
         except Exception:
             log.exception("a session could not be opened")
             return

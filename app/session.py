@@ -9,25 +9,32 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import viser
 
 from app.asking import CheckRequest, Request
 from app.compute import Store, Workbench, check_visuals
 from app.controls import Controls, panel_widths
+from app.front_door import Visit
 from app.history import remember
+from app.links import Camera, link_of, parse_link
 from app.map_picture import map_picture, picture_name
+from app.scene_files import Loaded, read_scene, scene_yaml
+from app.snapshot import snapshot_html
 from app.state import State
-from app.things import Thing, check_size, from_mesh
+from app.things import OWN, Thing, check_size, from_library, from_mesh
 from app.values import MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import Progress
 from symgrasp.scene import Scene
+from symgrasp.world import check_tasks
 
 __all__ = ["Session"]
+
+T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
@@ -44,10 +51,11 @@ class Session:
     Args:
         client: the browser.
         store: what all browsers share.
+        visit: the address it opened, which may say what to show first.
     """
 
-    def __init__(self, client: viser.ClientHandle, store: Store) -> None:
-        self.client, self.store = client, store
+    def __init__(self, client: viser.ClientHandle, store: Store, visit: Visit) -> None:
+        self.client, self.store, self.visit = client, store, visit
         self.state: State | None = None
         self._tickets = itertools.count(1)
         self._changed = threading.Condition()
@@ -66,7 +74,7 @@ class Session:
         )
         self._painter = threading.Thread(target=self._paint, name=f"painter {client.client_id}", daemon=True)
         self._painter.start()
-        self.open_scene(store.first)
+        self._open_first()
 
     def close(self) -> None:
         """End both threads and free the physics world; a second call does nothing."""
@@ -91,13 +99,43 @@ class Session:
     def open_scene(self, name: str) -> None:
         """Load a scene on the worker and show it."""
 
-        def done(ticket: int, scene: Scene) -> None:
-            with self._changed:
-                old = self.state
-                if old is None or (old.busy and old.busy.ticket == ticket):
-                    self._take(old.open_scene(scene, name) if old else State.of(scene, name), "")
+        own = self.state.loaded if self.state else None
+        known = own.scene if own and own.choice == name else None
+        self._change_scene(
+            f"Loading {name}",
+            lambda: known or self.store.scene(name),
+            lambda s, scene: s.open_scene(scene, name),
+        )
 
-        self._submit(f"Loading {name}", lambda _: self.store.scene(name), done)
+    def load_scene(self, name: str, content: bytes) -> None:
+        """Read an uploaded scene on the worker and show it."""
+
+        def run() -> Loaded:
+            loaded = read_scene(name, content, self.store.folders)
+            check_tasks(loaded.scene)
+            check_visuals(loaded.scene)
+            return loaded
+
+        self._change_scene(f"Opening {name}", run, State.load_scene)
+
+    def _open_first(self) -> None:
+        """Show what the address says, or the first scene and why not."""
+
+        def run(_: Progress) -> tuple[State, Camera | None]:
+            first = self.store.first
+            try:
+                link = parse_link(self.visit.query)
+                scene, thing = self.store.linked(link)
+                return link.apply(replace(State.of(scene, link.scene or first), thing=thing)), link.camera
+            except SymgraspError as error:
+                return State.of(self.store.scene(first), first).failed(str(error)), None
+
+        def done(_: int, found: tuple[State, Camera | None]) -> None:
+            state, self.view.camera = found
+            with self._changed:
+                self._take(state, "")
+
+        self._submit("Loading", run, done)
 
     def choose_object(self, choice: str) -> None:
         """Put another object into the scene, on the worker."""
@@ -138,6 +176,10 @@ class Session:
 
     def _load(self, state: State, choice: str) -> tuple[Scene, Thing | None]:
         """Return the scene with its own object or one of the library, sharing what others computed."""
+        if own := state.own_scene:
+            return (
+                (own, None) if choice == OWN else self._put(replace(state, scene=own), from_library(choice))
+            )
         scene, thing = self.store.scene_with(state.scene_name, choice)
         if scene.robots is state.scene.robots:
             return scene, thing
@@ -146,6 +188,12 @@ class Session:
     def _put(self, state: State, thing: Thing) -> tuple[Scene, Thing]:
         """Return the scene with an object in place of its own."""
         return state.scene.with_object(thing.name, thing.profile), thing
+
+    def _change_scene(self, label: str, run: Callable[[], T], show: Callable[[State, T], State]) -> None:
+        def done(ticket: int, found: T) -> None:
+            self.change(lambda s: show(s, found) if s.busy and s.busy.ticket == ticket else s)
+
+        self._submit(label, lambda _: run(), done)
 
     def _change_object(self, label: str, run: Callable[[], tuple[Scene, Thing | None]]) -> None:
         def done(ticket: int, found: tuple[Scene, Thing | None]) -> None:
@@ -188,7 +236,41 @@ class Session:
         if self.state and self.state.plan:
             plan = self.state.plan.plan
             name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
-            self.client.send_file_download(f"{name}.json", plan.to_json().encode(), save_immediately=True)
+            self._send(f"{name}.json", plan.to_json())
+
+    def save_scene(self) -> None:
+        """Send the scene, as it was changed, to the browser."""
+        if self.state:
+            scene = self.state.moved_scene()
+            self._send(re.sub(r"\W+", "_", scene.name) + ".yaml", scene_yaml(scene))
+
+    def make_link(self) -> None:
+        """Put what is shown into an address."""
+
+        def make(state: State) -> State:
+            return replace(state, link=f"{self.visit.address}?{link_of(state, self._camera())}", problem="")
+
+        self.change(make)
+
+    def save_view(self) -> None:
+        """Draw the 3D view into a file on the worker, and send it to the browser."""
+        state = self.state
+        if state is None:
+            return
+        camera, fov = self._camera(), self.client.camera.fov
+
+        def done(ticket: int, html: str) -> None:
+            self._send(re.sub(r"\W+", "_", state.scene.name) + ".html", html)
+            self.change(lambda s: s.stopped(ticket))
+
+        self._submit("Drawing the 3D view", lambda _: snapshot_html(state, camera, fov), done)
+
+    def _camera(self) -> Camera:
+        camera = self.client.camera
+        return tuple(float(v) for v in (*camera.position, *camera.look_at))
+
+    def _send(self, name: str, content: str) -> None:
+        self.client.send_file_download(name, content.encode(), save_immediately=True)
 
     # -- computing --------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ import numpy as np
 from app.asking import Busy, Check, Explained, ExplainRequest, Request
 from app.history import History
 from app.looking import Looking
+from app.scene_files import Loaded
 from app.things import OWN, Thing
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.errors import InputError
@@ -65,6 +66,8 @@ class State:
         errors: whether the object's surface shows the symmetry error of its mesh and not the map.
         board: whether the map is laid out in the scene as well.
         dark: whether the page is dark.
+        loaded: the scene that was uploaded last.
+        link: the address that was made last, to open the page as it was then.
         history: what can be undone and redone.
     """
 
@@ -89,6 +92,8 @@ class State:
     errors: bool = False
     board: bool = True
     dark: bool = False
+    loaded: Loaded | None = None
+    link: str = ""
     history: History = field(default_factory=History)
 
     @staticmethod
@@ -118,6 +123,11 @@ class State:
     def choice(self) -> str:
         """What the object was chosen by."""
         return self.thing.choice if self.thing else OWN
+
+    @property
+    def own_scene(self) -> Scene | None:
+        """The uploaded scene, if that is the one shown, whatever was put into it."""
+        return self.loaded.scene if self.loaded and self.loaded.choice == self.scene_name else None
 
     @property
     def is_current(self) -> bool:
@@ -165,7 +175,7 @@ class State:
         """Everything that a widget or the gizmo shows and can change."""
         return (
             self.scene, self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick,
-            self.step, self.gizmo, self.errors, self.board, self.dark, self.thing, self.uploaded,
+            self.step, self.gizmo, self.errors, self.board, self.dark, self.thing, self.uploaded, self.loaded,
             *self.looking.inputs,
         )  # fmt: skip
 
@@ -243,11 +253,19 @@ class State:
 
     def open_scene(self, scene: Scene, name: str) -> State:
         """Show another scene; what belongs to none stays."""
-        new = State.of(scene, name)
         return replace(
-            new, uploaded=self.uploaded, looking=self.looking.elsewhere(), board=self.board, dark=self.dark,
+            State.of(scene, name),
+            uploaded=self.uploaded,
+            loaded=self.loaded,
+            looking=self.looking.elsewhere(),
+            board=self.board,
+            dark=self.dark,
             history=self.history,
-        )  # fmt: skip
+        )
+
+    def load_scene(self, loaded: Loaded) -> State:
+        """Show a scene that was uploaded."""
+        return replace(self, loaded=loaded).open_scene(loaded.scene, loaded.choice)
 
     def choose_object(self, scene: Scene, thing: Thing | None) -> State:
         """Show the scene with another object in it, or with its own again (None)."""

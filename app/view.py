@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import numpy as np
 import viser
 
 from app.bodies import FlatMap, ObjectView, RobotView
@@ -41,6 +42,7 @@ class SceneView:
         self._scene: Scene | None = None
         self._builds = 0
         self._dark = False
+        self.camera: Sequence[float] | None = None  # where the first scene is looked at from, and whereto
         self._root = self._object_root = ""
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
@@ -68,8 +70,9 @@ class SceneView:
         with client.atomic():
             client.camera.fov = FIELD_OF_VIEW
             client.camera.up_direction = (0.0, 0.0, 1.0)
-            client.camera.position = view.camera(self._aspect())
-            client.camera.look_at = view.look_at
+            given, self.camera = self.camera, None
+            client.camera.position = np.array(given[:3]) if given else view.camera(self._aspect())
+            client.camera.look_at = np.array(given[3:]) if given else view.look_at
         client.scene.add_frame(root, show_axes=False)
         add_lights(client, root, view)
         self._dark = state.dark

@@ -48,6 +48,18 @@ class Actions(Protocol):
     def download(self) -> None:
         """Send the plan as a file."""
 
+    def save_scene(self) -> None:
+        """Send the scene as a file."""
+
+    def load_scene(self, name: str, content: bytes) -> None:
+        """Open the scene in a file."""
+
+    def make_link(self) -> None:
+        """Put what is shown into an address."""
+
+    def save_view(self) -> None:
+        """Send the 3D view as a file."""
+
 
 class Html:
     """A piece of HTML that is only sent when it changes."""

@@ -28,7 +28,7 @@ class ScenePanel(Panel):
     def __init__(self, gui: viser.GuiApi, actions: Actions, scenes: tuple[str, ...]) -> None:
         super().__init__(gui, actions)
         with gui.add_folder("Scene"):
-            self.scene = self.choice("Scene", scenes)
+            self._scenes, self.scene = scenes, self.choice("Scene", scenes)
             self.task = self.choice("Task")
             self.arm = self.choice("Arm")
             self.hand = self.choice("Hand", MOUNTABLE, visible=False)
@@ -40,7 +40,10 @@ class ScenePanel(Panel):
         self.on(self.board, lambda s, v: replace(s, board=v))
 
     def show(self, state: State) -> None:
-        """Offer what the scene has."""
+        """Offer what the scene has, and the scene that was uploaded."""
+        scenes = (*self._scenes, *([state.loaded.choice] if state.loaded else []))
+        if self.scene.options != scenes:
+            self.scene.options = scenes
         if self.task.options != (tasks := tuple(state.scene.tasks)):
             self.task.options = tasks
         if self.arm.options != (arms := state.scene.task(state.task).arms):

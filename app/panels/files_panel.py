@@ -1,0 +1,54 @@
+"""What goes in and out: scene files, a link, the 3D view as a file; and light or dark."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html import escape
+
+import viser
+
+from app.panels.panel import Actions, Panel
+from app.scene_files import SCENE_LIMIT
+from app.state import State
+
+__all__ = ["FilesPanel"]
+
+
+class FilesPanel(Panel):
+    """Saves, opens and shares."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        with gui.add_folder("Scene file"):
+            self.button(
+                "Save the scene (YAML)", viser.Icon.DOWNLOAD, actions.save_scene, color="gray",
+                hint="With the object, hands and poses as they are now",
+            )  # fmt: skip
+            self.upload = gui.add_upload_button(
+                "Open a scene (YAML)", icon=viser.Icon.UPLOAD, color="gray", mime_type=".yaml,.yml",
+                hint=f"At most {SCENE_LIMIT / 1e6:g} MB",
+            )  # fmt: skip
+            self.upload.on_upload(
+                lambda _: actions.load_scene(self.upload.value.name, self.upload.value.content)
+            )
+        with gui.add_folder("Share"):
+            self.button(
+                "Make a link", viser.Icon.LINK, actions.make_link, color="gray",
+                hint="Opens the same scene, poses, grasp and view on this server",
+            )  # fmt: skip
+            self.link = self.html()
+            self.button(
+                "Save the 3D view (HTML)", viser.Icon.FILE_EXPORT, actions.save_view, color="gray",
+                hint="One file, to be opened anywhere without a network",
+            )  # fmt: skip
+        self.dark = gui.add_checkbox("Dark", False)
+        self.on(self.dark, lambda s, v: replace(s, dark=v))
+
+    def show(self, state: State) -> None:
+        """Show the link that was made."""
+        link = escape(state.link, quote=True)
+        self.link.show(f'<div class="sg"><a class="sg-link" href="{link}">{link}</a></div>' if link else "")
+
+    def write_inputs(self, state: State) -> None:
+        """Show whether it is dark."""
+        self.dark.value = state.dark
