@@ -43,6 +43,9 @@ GRAZE = 1e-12
 """By how much (of one, or m²) a square root may fall below zero and count as zero: at the edge of
 the reach both branches are one, and rounding decides."""
 
+CLEARLY = 1e-9
+"""A joint is outside its limits without asking for its angle when a cosine says so by more than this."""
+
 STRICT: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 """How to compile: plain IEEE arithmetic. The last entry spares the counting of references to arrays,
 of which nothing below makes any."""
@@ -54,10 +57,11 @@ class Chain(NamedTuple):
     K redundancy values, n joints, of which six are free, in the order above.
 
     Attributes:
-        geometry: (K, 49) a `_Structure` in each row.
+        geometry: (K, 53) a `_Structure` in each row.
         joint: (8,) index of each free joint in the arm, of the locked one (or -1), and whether
             the arm is read backwards.
-        limits: (3, n) lower and upper limits, and the middle that joint values are turned to.
+        limits: (6, n) lower and upper limits, the middle that joint values are turned to, its cosine
+            and sine, and the cosine of half the range, less `CLEARLY`.
         forward: (2 n + 5, 3) axes (n), offsets (n + 1), orientation of the tool at zero (3), and
             the tolerances (m, rad, -).
     """
@@ -141,11 +145,13 @@ class SphericalIK(ClosedFormIK):
         bounded = np.isfinite(arm.lower) & np.isfinite(arm.upper)
         middle = np.zeros(arm.dof)
         middle[bounded] = 0.5 * (arm.lower + arm.upper)[bounded]
+        half = np.minimum(np.where(bounded, 0.5 * (arm.upper - arm.lower), np.inf), np.pi)
+        least = np.cos(half) - CLEARLY
         tolerance = [self.tolerance.position, self.tolerance.rotation, 0.0]
         return Chain(
             geometry=np.array([np.concatenate([np.ravel(part) for part in row[1:]]) for row in rows]),
             joint=np.array([*(free[::-1] if backwards else free), locked, backwards]),
-            limits=np.array([arm.lower, arm.upper, middle]),
+            limits=np.array([arm.lower, arm.upper, middle, np.cos(middle), np.sin(middle), least]),
             forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
         )
 
@@ -162,8 +168,8 @@ class _Structure(NamedTuple):
         W: (3,) where the pair meets.
         a: (3,) S seen from the middle joint.
         b: (3,) W seen from the middle joint.
-        middle: (3,) constants of subproblem 3, see `_middle`.
-        triple: (3,) constants of subproblem 4, see `_middle`.
+        middle: (5,) constants of subproblem 3, see `_middle`.
+        triple: (5,) constants of subproblem 4, see `_middle`.
         phi: φ.
     """
 
@@ -181,7 +187,7 @@ class _Structure(NamedTuple):
 
 
 # Where they lie in a row of `Chain.geometry`.
-_H, _R0, _P0, _S, _W, _A, _B, _MIDDLE, _TRIPLE, _PHI = 0, 18, 27, 30, 33, 36, 39, 42, 45, 48
+_H, _R0, _P0, _S, _W, _A, _B, _MIDDLE, _TRIPLE, _PHI = 0, 18, 27, 30, 33, 36, 39, 42, 47, 52
 
 
 def _structures(arm: Arm, locked: int | None, phi: Array) -> list[_Structure] | None:
@@ -208,7 +214,7 @@ def _structure(arm: Arm, locked: int | None, phi: float) -> _Structure | None:
         if S is not None and W is not None:
             a, b = S - points[3], W - points[3]
             # |R4⁻¹ a − b|² = |t|² as b·R4⁻¹ a = …, and h1ᵀ R2 h3 = h1ᵀ M h3.
-            middle = _middle(axes[3], a, b) + np.array([0.0, 0.0, -0.5 * (a @ a + b @ b)])
+            middle = _middle(axes[3], a, b) + np.array([0.0, 0.0, -0.5 * (a @ a + b @ b), 0.0, 0.0])
             triple = _middle(axes[1], axes[2], axes[0])
             if middle[1] > PARALLEL * MEET and triple[1] > PARALLEL:
                 return _Structure(backwards, axes, R0, p0, S, W, a, b, middle, triple, phi)
@@ -216,10 +222,14 @@ def _structure(arm: Arm, locked: int | None, phi: float) -> _Structure | None:
 
 
 def _middle(k: Array, a: Array, b: Array) -> Array:
-    """Return (middle, length, even part) of ``b·R(k, x) a = length·cos(x − middle) + even part``."""
+    """Return (middle, length, even part) of ``b·R(k, x) a = length·cos(x − middle) + even part``.
+
+    Then come the sine and cosine of the middle.
+    """
     part = float((k @ a) * (k @ b))
     sine, cosine = float(b @ np.cross(k, a)), float(a @ b) - part
-    return np.array([np.arctan2(sine, cosine), np.hypot(sine, cosine), part])
+    middle = np.arctan2(sine, cosine)
+    return np.array([middle, np.hypot(sine, cosine), part, np.sin(middle), np.cos(middle)])
 
 
 def _meeting(h: Array, o: Array) -> Array | None:
@@ -273,17 +283,27 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
     R, p = _motion(g, joint[7], T)
     a = _vec(g, _A)
     t = _minus(_back(R, _minus(_vec(g, _S), p)), _vec(g, _W))  # G⁻¹ S − W
-    # Subproblem 3: |R4⁻¹ a − b| = |t|.
+    # Subproblem 3: |R4⁻¹ a − b| = |t|. Sines and cosines come without their angles where they can:
+    # most branches end at a limit, and few angles are ever needed.
     middle, length, part = _vec(g, _MIDDLE)
-    swing = _swing((-0.5 * _dot(t, t) - part) / length)
-    if swing < 0.0:
+    sm, cm = g[_MIDDLE + 3], g[_MIDDLE + 4]
+    c = (-0.5 * _dot(t, t) - part) / length
+    s = _sine(c)
+    if s < 0.0:
         return False
+    swing = math.atan2(s, c)
     for i in range(2):
-        q4 = _turned(limits, joint[3], -(middle + swing) if i == 0 else swing - middle)
+        if i == 0:
+            q4, s4, c4 = -(middle + swing), -(sm * c + cm * s), cm * c - sm * s
+        else:
+            q4, s4, c4 = swing - middle, s * cm - c * sm, cm * c + sm * s
+        if inside_only and _outside(limits, joint[3], s4, c4):
+            continue
+        q4 = _turned(limits, joint[3], q4)
         if inside_only and not _within(limits, joint[3], q4):
             continue
-        u = _minus(_turn(_vec(g, _H + 9), -math.sin(q4), math.cos(q4), a), _vec(g, _B))  # e4⁻¹ S − W
-        _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside)
+        u = _minus(_turn(_vec(g, _H + 9), -s4, c4, a), _vec(g, _B))  # e4⁻¹ S − W
+        _pairs(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside)
     for i in range(BRANCHES):
         if exists[i] and _misses(forward, q[i], T):
             exists[i] = False
@@ -292,18 +312,16 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
 
 
 @njit(**STRICT)
-def _swing(cosine):
-    """Return the arc cosine, or -1 where there is none."""
+def _sine(cosine):
+    """Return the sine of the arc cosine, which is not negative, or -1 where there is none."""
     rest = 1.0 - cosine * cosine
-    if rest < -GRAZE:
-        return -1.0
-    return math.atan2(math.sqrt(max(rest, 0.0)), cosine)
+    return math.sqrt(max(rest, 0.0)) if rest >= -GRAZE else -1.0
 
 
 @njit(**STRICT)
-def _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside):
+def _pairs(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside):
     """Subproblem 2: R5⁻¹ u = R6 t."""
-    h5, h6 = _vec(g, _H + 12), _vec(g, _H + 15)
+    h4, h5, h6 = _vec(g, _H + 9), _vec(g, _H + 12), _vec(g, _H + 15)
     c = _dot(h5, h6)
     across = 1.0 - c * c
     along5, along6 = _dot(h5, u), _dot(h6, t)
@@ -314,6 +332,9 @@ def _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside):
         return
     gamma = math.sqrt(max(rest, 0.0))
     normal = _cross(h5, h6)
+    h3 = _vec(g, _H + 6)
+    side = _perpendicular(h3)
+    v3, vside = _turn(h4, -s4, c4, h3), _turn(h4, -s4, c4, side)
     for j in range(2):
         out = gamma if j == 0 else -gamma
         z = (
@@ -321,42 +342,54 @@ def _pairs(g, joint, limits, R, t, u, q4, i, inside_only, q, exists, inside):
             alpha * h5[1] + beta * h6[1] + out * normal[1],
             alpha * h5[2] + beta * h6[2] + out * normal[2],
         )
-        q6 = _turned(limits, joint[5], _angle(h6, t, z))
+        y6, x6 = _angle(h6, t, z)
+        s6, c6 = _unit(y6, x6)
+        if inside_only and _outside(limits, joint[5], s6, c6):
+            continue
+        y5, x5 = _angle(h5, z, u)
+        s5, c5 = _unit(y5, x5)
+        if inside_only and _outside(limits, joint[4], s5, c5):
+            continue
+        q6 = _turned(limits, joint[5], math.atan2(y6, x6))
         if inside_only and not _within(limits, joint[5], q6):
             continue
-        q5 = _turned(limits, joint[4], -_angle(h5, u, z))
+        q5 = _turned(limits, joint[4], math.atan2(y5, x5))
         if inside_only and not _within(limits, joint[4], q5):
             continue
-        _triple(g, joint, limits, R, q4, q5, q6, 4 * i + 2 * j, inside_only, q, exists, inside)
+        # M = R_G R6⁻¹ R5⁻¹ R4⁻¹, of h3 and of what stands across it
+        M3 = _times(R, _turn(h6, -s6, c6, _turn(h5, -s5, c5, v3)))
+        Mside = _times(R, _turn(h6, -s6, c6, _turn(h5, -s5, c5, vside)))
+        _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, 4 * i + 2 * j, inside_only, q, exists, inside)
 
 
 @njit(**STRICT)
-def _triple(g, joint, limits, R, q4, q5, q6, branch, inside_only, q, exists, inside):
-    """Subproblem 4: R1 R2 R3 = M with M = R_G R6⁻¹ R5⁻¹ R4⁻¹, so h1ᵀ R2 h3 = h1ᵀ M h3."""
+def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside):
+    """Subproblem 4: R1 R2 R3 = M, so h1ᵀ R2 h3 = h1ᵀ M h3."""
     h1, h2, h3 = _vec(g, _H), _vec(g, _H + 3), _vec(g, _H + 6)
-    h4, h5, h6 = _vec(g, _H + 9), _vec(g, _H + 12), _vec(g, _H + 15)
-    s4, c4, s5, c5 = math.sin(q4), math.cos(q4), math.sin(q5), math.cos(q5)
-    s6, c6 = math.sin(q6), math.cos(q6)
-    v = _turn(h5, -s5, c5, _turn(h4, -s4, c4, h3))
-    M3 = _times(R, _turn(h6, -s6, c6, v))
     middle, length, part = _vec(g, _TRIPLE)
-    swing = _swing((_dot(h1, M3) - part) / length)
-    if swing < 0.0:
+    sm, cm = g[_TRIPLE + 3], g[_TRIPLE + 4]
+    c = (_dot(h1, M3) - part) / length
+    s = _sine(c)
+    if s < 0.0:
         return
-    side = _perpendicular(h3)
-    v = _turn(h5, -s5, c5, _turn(h4, -s4, c4, side))
-    Mside = _times(R, _turn(h6, -s6, c6, v))
     for i in range(2):
-        q2 = _turned(limits, joint[1], middle + swing if i == 0 else middle - swing)
-        if inside_only and not _within(limits, joint[1], q2):
+        way = s if i == 0 else -s
+        s2, c2 = sm * c + cm * way, cm * c - sm * way
+        if inside_only and _outside(limits, joint[1], s2, c2):
             continue
-        s2, c2 = math.sin(q2), math.cos(q2)
-        q1 = _turned(limits, joint[0], _angle(h1, _turn(h2, s2, c2, h3), M3))
-        if inside_only and not _within(limits, joint[0], q1):
+        y1, x1 = _angle(h1, _turn(h2, s2, c2, h3), M3)
+        s1, c1 = _unit(y1, x1)
+        if inside_only and _outside(limits, joint[0], s1, c1):
             continue
         # R3 from all of R2⁻¹ R1⁻¹ M: where q1 is free, because h1 and h3 align, q3 makes up for it.
-        back = _turn(h2, -s2, c2, _turn(h1, -math.sin(q1), math.cos(q1), Mside))
-        q3 = _turned(limits, joint[2], _angle(h3, side, back))
+        y3, x3 = _angle(h3, side, _turn(h2, -s2, c2, _turn(h1, -s1, c1, Mside)))
+        q2 = _turned(limits, joint[1], middle + math.atan2(way, c))
+        if inside_only and not _within(limits, joint[1], q2):
+            continue
+        q1 = _turned(limits, joint[0], math.atan2(y1, x1))
+        if inside_only and not _within(limits, joint[0], q1):
+            continue
+        q3 = _turned(limits, joint[2], math.atan2(y3, x3))
         if inside_only and not _within(limits, joint[2], q3):
             continue
         row = q[branch + i]
@@ -428,6 +461,24 @@ def _within(limits, joint, value):
 
 
 @njit(**STRICT)
+def _outside(limits, joint, s, c):
+    """Whether the sine and cosine of a joint's angle say that no turn of it is inside the limits.
+
+    The turn nearest to the middle is inside when it is no further from it than half the range.
+    """
+    return c * limits[3, joint] + s * limits[4, joint] < limits[5, joint]
+
+
+@njit(**STRICT)
+def _unit(y, x):
+    """Return sine and cosine of ``atan2(y, x)``."""
+    length = math.sqrt(y * y + x * x)
+    if length == 0.0:
+        return 0.0, 1.0
+    return y / length, x / length
+
+
+@njit(**STRICT)
 def _misses(forward, q, T):
     """Whether forward kinematics is further from the pose than the tolerances allow."""
     n = q.shape[0]
@@ -458,8 +509,8 @@ def _turn(axis, s, c, v):
 
 @njit(**STRICT)
 def _angle(axis, a, b):
-    """Subproblem 1: the angle about an axis that turns a into b."""
-    return math.atan2(_dot(axis, _cross(a, b)), _dot(a, b) - _dot(axis, a) * _dot(axis, b))
+    """Subproblem 1: y and x of the angle ``atan2(y, x)`` about an axis that turns a into b."""
+    return _dot(axis, _cross(a, b)), _dot(a, b) - _dot(axis, a) * _dot(axis, b)
 
 
 @njit(**STRICT)
