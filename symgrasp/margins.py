@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from symgrasp.compiling import njit
 
 __all__ = ["cells_to_infeasible"]
 

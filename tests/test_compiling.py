@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import ast
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 from numba import njit
 
+import symgrasp
 from symgrasp.cli import main
-from symgrasp.compiling import COMPILING, telling_of_compiling
+from symgrasp.compiling import COMPILING, SOURCES, telling_of_compiling
 
 PROGRAM = """
 from numba import njit
@@ -55,3 +59,47 @@ def test_the_command_line_says_so(capsys, monkeypatch, tmp_path):
 def _compiles_something(*args, progress, **options):
     njit(lambda x: x - 1)(1)
     raise FileNotFoundError(2, "stopped here", "test")
+
+
+ROOT = Path(symgrasp.__file__).parent
+
+
+def test_the_sources_of_compiled_code_are_known():
+    """All modules that compile, and those that they take constants from."""
+    known = {path for pattern in SOURCES for path in ROOT.glob(pattern)}
+    compiling = [p for p in ROOT.rglob("*.py") if "import njit" in p.read_text()]
+    assert len(compiling) > 5
+    for path in compiling:
+        assert path in known
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and any(alias.name.isupper() for alias in node.names):
+                source = (ROOT.parent / str(node.module).replace(".", "/")).with_suffix(".py")
+                assert source in known or not source.is_relative_to(ROOT), (path, node.module)
+
+
+def test_changed_sources_are_compiled_anew(tmp_path):
+    """A function in one file that calls one in another does not keep the old one."""
+    package = tmp_path / "symgrasp"
+    (package / "engine").mkdir(parents=True)
+    shutil.copy(ROOT / "compiling.py", package)
+    for name in ("__init__.py", "engine/__init__.py"):
+        (package / name).touch()
+    caller = "from symgrasp.compiling import njit\nfrom symgrasp.engine.inner import inner\n"
+    (package / "engine" / "outer.py").write_text(
+        caller + "@njit(cache=True)\ndef outer(x):\n    return inner(x)\n"
+    )
+    outputs = []
+    for factor in (2, 2, 3):
+        (package / "engine" / "inner.py").write_text(
+            "from symgrasp.compiling import njit\n"
+            f"@njit(cache=True)\ndef inner(x):\n    return {factor} * x\n"
+        )
+        program = (
+            "from symgrasp.compiling import telling_of_compiling\n"
+            "from symgrasp.engine.outer import outer\n"
+            "with telling_of_compiling(lambda: print('compiling')):\n    print(outer(7))\n"
+        )
+        command = [sys.executable, "-c", program]
+        done = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": ""}, capture_output=True, check=True)
+        outputs.append(done.stdout.decode())
+    assert outputs == ["compiling\n14\n", "14\n", "compiling\n21\n"]

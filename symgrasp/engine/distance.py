@@ -20,8 +20,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from symgrasp.compiling import njit
 from symgrasp.engine.solids import SEED_GRID
 
 __all__ = ["FAST", "distance_bounds"]

@@ -14,9 +14,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from symgrasp.candidates import RETREAT_TURN
+from symgrasp.compiling import njit
 from symgrasp.engine.checks import (
     FREE_BAND,
     UNDECIDED,

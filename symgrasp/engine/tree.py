@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from symgrasp.compiling import njit
 from symgrasp.engine.distance import FAST
 from symgrasp.engine.solids import Solids
 from symgrasp.poses import Array

@@ -22,8 +22,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
+from symgrasp.compiling import njit
 from symgrasp.ik.closed_form import ClosedFormIK, Solutions, Tolerance
 from symgrasp.poses import Array, rotation_about
 from symgrasp.robot import Arm

@@ -7,8 +7,8 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from symgrasp.compiling import njit
 from symgrasp.manifold import ROLLS, Manifold, grasp_to_tool
 from symgrasp.planners.passing import Hands
 from symgrasp.poses import Array

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
+from symgrasp.compiling import njit
 from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.solids import Piece, pack, pose_rows
 from symgrasp.poses import Array

@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from symgrasp.compiling import njit
 from symgrasp.poses import Array
 
 __all__ = ["Problem", "explore"]
