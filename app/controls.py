@@ -35,11 +35,17 @@ class Controls:
         client: the browser.
         actions: what the widgets do.
         scenes: names to choose from.
+
+    Attributes:
+        view_width: width (px) that is left for the 3D view.
     """
 
     def __init__(self, client: viser.ClientHandle, actions: Actions, scenes: tuple[str, ...]) -> None:
         gui = client.gui
         self.gui, self._dark = gui, False
+        window = client.camera.image_width  # read before the panels take their part of it
+        map_width, controls_width = panel_widths(window)
+        self.view_width = window - map_width - controls_width
         self._theme(dark=False)
         gui.set_panel_label("symgrasp")
         left = gui.add_panel()
@@ -55,7 +61,6 @@ class Controls:
         with left.add_tab("Files", viser.Icon.FILES):
             files_tab = [FilesPanel(gui, actions), NotesPanel(gui, actions)]
         left.dock_left()
-        map_width, controls_width = panel_widths(client.camera.image_width)
         left.set_width(map_width)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(controls_width)

@@ -15,7 +15,7 @@ import viser
 
 from app.asking import CheckRequest, Request
 from app.compute import Store, Workbench, check_visuals
-from app.controls import Controls, panel_widths
+from app.controls import Controls
 from app.front_door import Visit
 from app.history import remember
 from app.links import Camera, link_of, parse_link
@@ -67,7 +67,7 @@ class Session:
         self.controls = Controls(client, self, store.names)
         self.view = SceneView(
             client,
-            sum(panel_widths(client.camera.image_width)),
+            self.controls.view_width,
             on_surface=lambda i, j: self.change(lambda s: s.choose_surface_cell(i, j)),
             on_board=lambda i, j: self.change(lambda s: s.choose_cell(i, j)),
             on_drag=lambda pose: self.change(lambda s: s.drag(pose), "gizmo"),

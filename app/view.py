@@ -22,7 +22,7 @@ class SceneView:
 
     Args:
         client: the browser.
-        beside: width (px) of the panels beside the view.
+        width: width (px) of the view at first: browsers tell it only once its panels are in place.
         on_surface: called with the cell (row, column) that was clicked on the object.
         on_board: called with the cell that was clicked on the flat map.
         on_drag: called with the pose (4, 4) that the gizmo was dragged to.
@@ -31,14 +31,14 @@ class SceneView:
     def __init__(
         self,
         client: viser.ClientHandle,
-        beside: int,
+        width: int,
         on_surface: Callable[[int, int], None],
         on_board: Callable[[int, int], None],
         on_drag: Callable[[Array], None],
     ) -> None:
         self.client = client
         self.on_surface, self.on_board, self.on_drag = on_surface, on_board, on_drag
-        self._beside = beside
+        self._first_width: int | None = width
         self._scene: Scene | None = None
         self._builds = 0
         self._dark = False
@@ -101,7 +101,7 @@ class SceneView:
         return f"{new}{self._builds}"
 
     def _aspect(self) -> float:
-        """Return width by height of the 3D view, of which the panels take their part at first."""
+        """Return width by height of the 3D view."""
         camera = self.client.camera
-        width, self._beside = camera.image_width - self._beside, 0
+        width, self._first_width = self._first_width or camera.image_width, None
         return width / max(camera.image_height, 1)
