@@ -14,7 +14,7 @@ from app.profile_view import deviation_colors
 from app.stage import Viewpoint, add_links, place, stand_around
 from app.state import State
 from app.surface import CellQuads, around, flat
-from symgrasp.poses import Array, from_position_quat, from_rotation
+from symgrasp.poses import Array, from_position_quat, from_rotation, rotation_z
 from symgrasp.profile import Profile
 from symgrasp.robot import Robot
 from symgrasp.scene import Scene
@@ -83,8 +83,8 @@ class ObjectView:
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
         """Bring it up to the state."""
-        place(self.body, state.T_world_object)
-        place(self.surface.node, state.request.T_world_object)
+        place(self.body, state.T_world_seen)
+        place(self.surface.node, state.T_world_seen @ rotation_z(-state.delta))
         if state.errors and state.thing and state.thing.measurement:
             colors = deviation_colors(state.thing.measurement, self.grid)
             self.surface.paint(on_surface(state, colors))

@@ -1,4 +1,4 @@
-"""What the page computes: scenes, maps and plans, with what can be used again kept."""
+"""What the page computes: scenes and maps, with what can be used again kept."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,15 +17,12 @@ from app.asking import Check, CheckRequest, Explained, ExplainRequest
 from app.links import Link
 from app.meshes import link_visuals
 from app.things import OWN, Thing, from_library
-from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
+from app.values import MapRequest, MapResult
 from symgrasp.errors import Cancelled, SceneError, SymgraspError, one_of
 from symgrasp.feasibility import FeasibilityMap, Progress
 from symgrasp.files import SCENES_DIR
-from symgrasp.manifold import ROLLS
 from symgrasp.maps import MapMaker
 from symgrasp.meshes import read_mesh
-from symgrasp.plan import Hold, Plan
-from symgrasp.planning import plan_bimanual, plan_sequential
 from symgrasp.poses import rotation_z
 from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene, shipped_scenes
@@ -60,7 +57,7 @@ class Store:
         self._lock = threading.Lock()
         self._scenes: dict[str, Scene] = {}
         self._with: dict[tuple[str, str], tuple[Scene, Thing]] = {}
-        self._maps: OrderedDict[MapRequest, MapResult] = OrderedDict()
+        self._maps: OrderedDict[tuple[object, ...], MapResult] = OrderedDict()
         self.first = first
         self.names = tuple(dict.fromkeys([first, *shipped_scenes()]))
         own = [] if first in shipped_scenes() else [Path(first).resolve().parent]
@@ -119,17 +116,19 @@ class Store:
     def map(self, request: MapRequest) -> MapResult | None:
         """Return a map that was computed before."""
         with self._lock:
-            if request in self._maps:
-                self._maps.move_to_end(request)
-            return self._maps.get(request)
+            known = self._maps.get(request.place)
+            if known:
+                self._maps.move_to_end(request.place)
+        return known.of(request) if known else None
 
     def keep(self, result: MapResult) -> None:
         """Remember a map."""
         with self._lock:
-            self._maps[result.request] = result
-            alike = [r for r in self._maps if r.pose and r.differs_in_pose(result.request)]
+            self._maps[result.request.place] = result
+            requests = [known.request for known in self._maps.values()]
+            alike = [r for r in requests if r.pose and r.differs_in_pose(result.request)]
             for request in alike[:-POSES_KEPT]:
-                del self._maps[request]
+                del self._maps[request.place]
             while len(self._maps) > MAPS_KEPT:
                 self._maps.popitem(last=False)
 
@@ -227,31 +226,10 @@ class Workbench:
                 deepest.setdefault(c.b.body, f"{c.a.body} is {1e3 * c.depth:.0f} mm inside {c.b.body}")
         return tuple(deepest.values())
 
-    def sequential(
-        self, scene: Scene, poses: Mapping[str, ObjectPose], arm: str, progress: Progress
-    ) -> PlanResult:
-        """Find one grasp of an arm for all tasks it does alone."""
-        tasks = [task.name for task in scene.tasks.values() if task.arms == (arm,)]
-        requests = [MapRequest(scene, arm, task, poses.get(task)) for task in tasks]
-        maps, rest = self._maps(requests, progress)
-        known = {task: result.map for (task, _), result in maps.items()}
-        return _shown(plan_sequential(moved(scene, poses), arm, known, progress=rest), scene, maps)
-
-    def bimanual(
-        self, scene: Scene, poses: Mapping[str, ObjectPose], task: str, progress: Progress
-    ) -> PlanResult:
-        """Place all arms of a task on the object."""
-        arms = scene.task(task).arms
-        if len(arms) < 2:  # says that one arm is not enough before anything is computed
-            plan_bimanual(scene, task)
-        maps, rest = self._maps([MapRequest(scene, arm, task, poses.get(task)) for arm in arms], progress)
-        known = {arm: result.map for (_, arm), result in maps.items()}
-        return _shown(plan_bimanual(moved(scene, poses), task, known, progress=rest), scene, maps)
-
-    def _maps(
-        self, requests: list[MapRequest], progress: Progress
+    def maps(
+        self, requests: Sequence[MapRequest], progress: Progress
     ) -> tuple[dict[tuple[str, str], MapResult], Progress]:
-        """Compute the maps of a plan, by task and arm; the planner's own progress comes after them."""
+        """Return maps by task and arm, and the progress of what comes after them."""
         parts = len(requests) + 1
 
         def part(k: int) -> Progress:
@@ -270,19 +248,3 @@ def check_visuals(scene: Scene) -> None:
             link_visuals(RobotModel(o.path).urdf)
         elif o.kind == "mesh" and o.path:
             read_mesh(o.path, f"obstacle {o.name}")
-
-
-def _shown(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], MapResult]) -> PlanResult:
-    prints = {
-        (task.name, hold.arm): _print(scene, maps[task.name, hold.arm].map, hold)
-        for task in plan.tasks
-        for hold in task.holds
-    }
-    return PlanResult(plan, maps, prints)
-
-
-def _print(scene: Scene, m: FeasibilityMap, hold: Hold) -> np.ndarray:
-    """Return the cells (H, A) under the hand, in the object's frame."""
-    row, column = m.manifold.cell(hold.grasp.h, hold.grasp.theta)
-    roll = ROLLS.index(hold.grasp.roll)
-    return scene.arm(hold.arm).handprint(m.manifold, row, roll).on(m.manifold, column)

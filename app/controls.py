@@ -8,12 +8,14 @@ import viser
 
 from app.panels.files_panel import FilesPanel
 from app.panels.grasp_panel import GraspPanel
+from app.panels.hands_panel import HandsPanel
 from app.panels.keyboard import Keyboard
 from app.panels.map_panel import MapPanel
 from app.panels.object_panel import ObjectPanel
 from app.panels.panel import Actions, Panel
-from app.panels.plan_panel import PlanMapsPanel, PlanPanel
+from app.panels.plan_panel import PlanFilePanel, PlanPanel
 from app.panels.scene_panel import ScenePanel
+from app.panels.sequence_panel import SequencePanel, TasksPanel
 from app.panels.status_panel import NotesPanel, StatusPanel
 from app.panels.view_panel import ViewPanel
 from app.state import State
@@ -56,8 +58,16 @@ class Controls:
                 NotesPanel(gui, actions),
                 ViewPanel(gui, actions),
                 GraspPanel(gui, actions),
-                PlanMapsPanel(gui, actions),
             ]
+        with left.add_tab("Sequence", viser.Icon.ROUTE):
+            sequence_tab = [
+                SequencePanel(gui, actions),
+                PlanPanel(gui, actions),
+                TasksPanel(gui, actions),
+                PlanFilePanel(gui, actions),
+            ]
+        with left.add_tab("Hands", viser.Icon.USERS):
+            hands_tab = [HandsPanel(gui, actions), PlanPanel(gui, actions), PlanFilePanel(gui, actions)]
         with left.add_tab("Files", viser.Icon.FILES):
             files_tab = [FilesPanel(gui, actions), NotesPanel(gui, actions)]
         left.dock_left()
@@ -68,10 +78,9 @@ class Controls:
             StatusPanel(gui, actions),
             ScenePanel(gui, actions, scenes),
             ObjectPanel(gui, actions),
-            PlanPanel(gui, actions),
             Keyboard(gui, actions, scenes),
         ]
-        self.panels: tuple[Panel, ...] = (*map_tab, *files_tab, *main)
+        self.panels: tuple[Panel, ...] = (*map_tab, *sequence_tab, *hands_tab, *files_tab, *main)
 
     def show(self, state: State, *, write_inputs: bool) -> None:
         """Bring the panels up to the state.

@@ -59,12 +59,13 @@ def remember(before: State, after: State, origin: str, now: float) -> State:
     Args:
         before: the state that was changed.
         after: the changed one.
-        origin: "inputs" or "gizmo" where the change may be part of a drag.
+        origin: "inputs", "gizmo" or "scrub" where the change may be part of a drag; "play" where
+            nobody chose anything.
         now: the time (s), from any beginning.
     """
     if after.history is not before.history:  # the change was an undo or a redo
         return after
-    if after.inputs == before.inputs:
+    if after.inputs == before.inputs or origin == "play":
         return after
     history = before.history
     what = _what(before, after, origin)
@@ -93,8 +94,8 @@ def redo(state: State) -> State:
 
 
 def _what(before: State, after: State, origin: str) -> frozenset[object]:
-    """Name what a change is about: the gizmo changes several values at once, widgets one or two."""
-    if origin == "gizmo":
+    """Name what a change is about: gizmo and scrubbers change several values at once, widgets one or two."""
+    if origin in ("gizmo", "scrub"):
         return frozenset([origin])
     pairs = zip(before.inputs, after.inputs, strict=True)
     return frozenset(k for k, (old, new) in enumerate(pairs) if old != new)
@@ -112,4 +113,5 @@ def _restored(now: State, then: State, history: History) -> State:
     result = now.result if now.scene is then.scene else None
     if then.plan and then.shown:
         result = then.plan.maps.get((then.task, then.arm), result)
-    return replace(then, history=history, result=result, uploaded=now.uploaded, loaded=now.loaded)
+    kept = {"uploaded": now.uploaded, "loaded": now.loaded}
+    return replace(then, history=history, result=result, book=then.book.still(), **kept)

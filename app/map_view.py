@@ -19,19 +19,20 @@ from app.coloured import coloured
 from app.palette import OVERLAP, PRINTS, faded
 from app.prints import hand_color, print_index
 from app.state import State
-from app.values import PlanResult, RollChoice
+from app.values import RollChoice
 from symgrasp.feasibility import FeasibilityMap
 from symgrasp.manifold import Manifold, wrap
-from symgrasp.plan import PlanTask
 from symgrasp.views import Scale, View
 
 __all__ = [
     "COLUMNS",
+    "THETA_AXIS",
     "Mark",
+    "circle",
+    "h_axis",
     "legend_html",
     "map_html",
     "marks_of",
-    "plan_html",
     "prints_html",
     "sample_columns",
     "scale_html",
@@ -109,10 +110,10 @@ def map_html(
     if prints:
         index = print_index(prints)[::-1, sample_columns(still)]
         layers.append(_img(to_png(index, PRINTS, (0, *[SHADE] * OVERLAP)), "handprints"))
-    layers += [_circle(mark, grid) for mark in marks]
+    layers += [circle(mark, grid) for mark in marks]
     return (
         f'<div class="sg-map" style="height:{height + 48}px">'
-        f'<div class="sg-picture">{"".join(layers)}</div>{_h_axis(grid, height)}{THETA_AXIS}</div>'
+        f'<div class="sg-picture">{"".join(layers)}</div>{h_axis(grid, height)}{THETA_AXIS}</div>'
     )
 
 
@@ -154,34 +155,13 @@ def prints_html(names: Sequence[str], prints: Sequence[np.ndarray]) -> str:
     return f'<div class="sg-legend">{"".join(swatches)}</div>'
 
 
-def plan_html(plan: PlanResult, state: State) -> str:
-    """Draw the maps of a plan, each turned by its δ, with the grasp in all and the prints under it."""
-    blocks = []
-    for k, task in enumerate(plan.plan.tasks):
-        several = len(task.holds) > 1
-        prints = [plan.prints[task.name, hold.arm] for hold in task.holds] if several else []
-        for hold in task.holds:
-            m = plan.maps[task.name, hold.arm].map.shift(task.delta)
-            roll = RollChoice.ZERO if np.cos(hold.grasp.roll) > 0 else RollChoice.HALF_TURN
-            marks = [Mark(h.grasp.h, h.grasp.theta, h.arm if several else "") for h in task.holds]
-            now = " sg-now" if k == state.step and hold.arm == state.arm else ""
-            name = f"plan map {task.name} {hold.arm}"
-            blocks.append(f'<div class="sg sg-small{now}">{_plan_title(task, hold.arm, roll)}</div>')
-            blocks.append(map_html(m, roll, marks, prints, height=96, name=name))
-    return "".join(blocks)
-
-
-def _plan_title(task: PlanTask, arm: str, roll: RollChoice) -> str:
-    turn = f"object turned by {np.rad2deg(task.delta):.1f}°, " if len(task.holds) == 1 else ""
-    return f"{escape(task.name)} · {escape(arm)} · {turn}roll {roll.value}"
-
-
 def _img(png: bytes, name: str) -> str:
     data = base64.b64encode(png).decode()
     return f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">'
 
 
-def _circle(mark: Mark, grid: Manifold) -> str:
+def circle(mark: Mark, grid: Manifold) -> str:
+    """Draw a mark on a picture of a map."""
     profile = grid.profile
     left = 100 * (float(wrap(mark.theta)) + np.pi) / (2 * np.pi)
     bottom = f"bottom:{100 * (mark.h - profile.h_min) / (profile.h_max - profile.h_min):.3f}%"
@@ -192,7 +172,8 @@ def _circle(mark: Mark, grid: Manifold) -> str:
     return circle + f'<span class="sg-label" style="{side};{bottom}">{escape(mark.label)}</span>'
 
 
-def _h_axis(grid: Manifold, height: int) -> str:
+def h_axis(grid: Manifold, height: int) -> str:
+    """Draw the axis of heights beside a picture of that height (px)."""
     low, high = 100 * grid.profile.h_min, 100 * grid.profile.h_max
     most = max(2, height / 28)
     step = next(s for s in (0.5, 1, 2, 5, 10, 20, 50, 100, np.inf) if (high - low) / s <= most)
@@ -207,3 +188,4 @@ def _theta_axis() -> str:
 
 
 THETA_AXIS = _theta_axis()
+"""The axis of angles below a picture."""

@@ -13,7 +13,7 @@ from symgrasp.handprint import Handprint
 from symgrasp.manifold import Manifold
 from symgrasp.robot import Arm
 
-__all__ = ["hand_color", "on_surface", "print_index", "print_names", "shown_prints"]
+__all__ = ["hand_color", "hand_print", "on_surface", "print_index", "print_names", "shown_prints"]
 
 
 def print_index(prints: Sequence[np.ndarray]) -> np.ndarray:
@@ -37,26 +37,35 @@ def hand_color(k: int) -> int:
 def shown_prints(state: State) -> list[np.ndarray]:
     """Return the prints (H, A), in the object's frame, of the hands that hold the object.
 
-    Of those that hold it together in a plan, or of the picked grasp where that is asked for.
+    Of those that hold it together in a plan or climb, or of the picked grasp where that is asked for.
     """
-    if state.plan and state.shown and len(state.shown.holds) > 1:
-        return [state.plan.prints[state.shown.name, hold.arm] for hold in state.shown.holds]
+    grid = state.scene.manifold
+    if state.climbed and state.book.climb:
+        arms = [state.scene.arm(name) for name in state.book.climb.arms]
+        return [
+            hand_print(arm, grid, cell.row, cell.roll).on(grid, cell.column)
+            for arm, cell in zip(arms, state.climbed.cells, strict=True)
+        ]
+    if state.plan and state.step is not None and state.shown and len(state.shown.holds) > 1:
+        return list(state.plan.prints[state.step].values())
     if state.looking.handprint and state.pick and state.cell:
-        grid = state.scene.manifold
         row, column = grid.cell(state.pick.h, state.pick.theta)
-        return [_print(state.scene.arm(state.arm), grid, row, state.cell.roll).on(grid, column)]
+        return [hand_print(state.scene.arm(state.arm), grid, row, state.cell.roll).on(grid, column)]
     return []
 
 
 def print_names(state: State) -> list[str]:
     """Return the arms that the shown prints belong to."""
+    if state.climbed and state.book.climb:
+        return list(state.book.climb.arms)
     if state.shown and len(state.shown.holds) > 1:
         return [hold.arm for hold in state.shown.holds]
     return [state.arm]
 
 
-@lru_cache(maxsize=64)
-def _print(arm: Arm, grid: Manifold, row: int, roll: int) -> Handprint:
+@lru_cache(maxsize=4096)
+def hand_print(arm: Arm, grid: Manifold, row: int, roll: int) -> Handprint:
+    """Return an arm's handprint at column 0; kept, as a replay asks for the same ones again and again."""
     return arm.handprint(grid, row, roll)
 
 

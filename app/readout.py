@@ -6,11 +6,24 @@ from html import escape
 
 import numpy as np
 
+from app.motion import plan_postures
 from app.state import State
 from symgrasp.manifold import ROLLS
 from symgrasp.poses import Array
 
-__all__ = ["check_html", "grasp_html", "map_title", "notes_html", "plan_line", "postures", "status_html"]
+__all__ = [
+    "check_html",
+    "counted",
+    "grasp_html",
+    "hands_line",
+    "map_title",
+    "notes_html",
+    "postures",
+    "sequence_html",
+    "solution_html",
+    "status_html",
+    "tasks_html",
+]
 
 
 def postures(state: State) -> dict[str, Array]:
@@ -19,12 +32,19 @@ def postures(state: State) -> dict[str, Array]:
     Robots park at home, except the arms that hold the object in the plan's task that is shown,
     or the chosen arm at the witness of the picked cell.
     """
-    values = {robot.name: robot.home.copy() for robot in state.scene.robots.values()}
+    if state.motion:
+        return state.motion.postures
     if state.shown:
-        for hold in state.shown.holds:
-            names = state.scene.robots[hold.robot].model.joint_names
-            for joint, value in (hold.joints | hold.hand_joints).items():
-                values[hold.robot][names.index(joint)] = value
+        return plan_postures(state.scene, state.shown)
+    values = {robot.name: robot.home.copy() for robot in state.scene.robots.values()}
+    if state.climbed and state.book.climb:
+        for name, cell in zip(state.book.climb.arms, state.climbed.cells, strict=True):
+            arm = state.scene.arm(name)
+            witness = state.book.maps[state.task, name].map.witness(cell)
+            if witness:
+                q = arm.robot_values(witness.q, witness.opening)
+                moved = q != arm.robot.home
+                values[arm.robot.name][moved] = q[moved]
     elif state.is_current and state.map and state.cell and (witness := state.map.witness(state.cell)):
         arm = state.scene.arm(state.arm)
         values[arm.robot.name] = arm.robot_values(witness.q, witness.opening)
@@ -96,22 +116,53 @@ def notes_html(state: State) -> str:
     return "".join(notes + [_note(contact, "warning") for contact in state.contacts])
 
 
-def plan_line(state: State) -> str:
-    """Sum the plan up in a line."""
-    if state.plan is None:
-        if state.can_plan("bimanual"):
-            return ""
+def sequence_html(state: State) -> str:
+    """Say what the sequential planner plans."""
+    names = [task.name for task in state.scene.tasks.values() if task.arms == (state.arm,)]
+    if not names:
+        text = f"{state.arm} does no task alone: the tab Hands plans for several arms."
+        return f'<div class="sg sg-faint">{escape(text)}</div>'
+    return f'<div class="sg sg-what">{escape(state.arm)}: {escape(" → ".join(names))}</div>'
+
+
+def hands_line(state: State) -> str:
+    """Say what the planner for several arms plans."""
+    if not state.can_plan("bimanual"):
         return '<div class="sg sg-faint">Every task of this scene is for one arm.</div>'
+    task = state.scene.task(state.together)
+    return f'<div class="sg sg-what">{escape(task.name)}: {escape(" and ".join(task.arms))}</div>'
+
+
+def tasks_html(state: State) -> str:
+    """List the tasks in their order, the chosen one marked."""
+    rows = []
+    for k, task in enumerate(state.scene.tasks.values(), start=1):
+        now = ' class="sg-now"' if task.name == state.task else ""
+        rows.append(
+            f"<div{now}>{k} · {escape(task.name)} <small>{escape(', '.join(task.arms))}</small></div>"
+        )
+    return f'<div class="sg sg-tasks">{"".join(rows)}</div>'
+
+
+def solution_html(state: State) -> str:
+    """Sum the plan that is shown up in a line."""
+    if state.plan is None:
+        return ""
     plan = state.plan.plan
     first = plan.tasks[0].holds
-    if plan.kind == "sequential":
+    grasps = len({(hold.arm, hold.grasp) for task in plan.tasks for hold in task.holds})
+    if plan.kind == "handover":
+        text = f"Handed over in {counted(len(plan.tasks), 'task')} with {counted(grasps, 'grasp')}."
+    elif plan.kind == "bimanual":
+        text = f"{len(first)} arms hold the object together in {plan.tasks[0].name}."
+    elif grasps > 1:
+        text = f"{counted(grasps, 'grasp')}, the object set down in between."
+    else:
         grasp = first[0].grasp
         text = (
-            f"One grasp for {_count(len(plan.tasks), 'task')}: {_place(grasp.h, grasp.theta)}, "
+            f"One grasp for {counted(len(plan.tasks), 'task')}: {_place(grasp.h, grasp.theta)}, "
             f"roll {np.rad2deg(grasp.roll):.0f}°."
         )
-    else:
-        text = f"{len(first)} arms hold the object together in {plan.tasks[0].name}."
     return f'<div class="sg">{escape(text)}</div>'
 
 
@@ -119,7 +170,8 @@ def _place(h: float, theta: float) -> str:
     return f"h = {round(100 * h, 2):g} cm, θ = {round(np.rad2deg(theta), 2):g}°"
 
 
-def _count(n: int, noun: str) -> str:
+def counted(n: int, noun: str) -> str:
+    """Say how many there are."""
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 

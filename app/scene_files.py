@@ -21,7 +21,7 @@ from symgrasp.files import SCENES_DIR, package_dir, parse_yaml, resolve
 from symgrasp.scene import Scene
 from symgrasp.scene_file import SceneFile, describe
 
-__all__ = ["SCENE_LIMIT", "Loaded", "read_scene", "scene_yaml"]
+__all__ = ["SCENE_LIMIT", "Loaded", "read_scene", "refuse_foreign_files", "scene_yaml"]
 
 SCENE_LIMIT = 1_000_000
 """Largest scene file (bytes) that is looked at."""
@@ -98,6 +98,26 @@ def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> Loaded:
     for field, holder, key in _references(plain):
         holder[key] = str(_allowed(source, field, holder[key], roots))
     return Loaded(f"{source} (upload)", Scene.from_content(plain, source))
+
+
+def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable[Path]) -> None:
+    """Refuse the content of a scene that came with a plan if it refers to a file that it may not.
+
+    A plan is checked as it is written, so its paths have to be absolute.
+
+    Raises:
+        SceneError: it does, or is no content of a scene.
+    """
+    try:
+        plain = SceneFile.model_validate(content).model_dump(mode="json", exclude_none=True)
+    except ValidationError as error:
+        raise SceneError(source, *describe(error, content)) from None
+    roots = [folder.resolve() for folder in folders]
+    for field, holder, key in _references(plain):
+        reference = holder[key]
+        if not reference.startswith("package://") and not Path(reference).is_absolute():
+            raise SceneError(source, field, reference, "package://<package>/<path>, or an absolute path")
+        _allowed(source, field, reference, roots)
 
 
 def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> Path | str:

@@ -20,6 +20,7 @@ from app.front_door import Visit
 from app.history import remember
 from app.links import Camera, link_of, parse_link
 from app.map_picture import map_picture, picture_name
+from app.plan_desk import PlanDesk
 from app.scene_files import Loaded, read_scene, scene_yaml
 from app.snapshot import snapshot_html
 from app.state import State
@@ -63,7 +64,8 @@ class Session:
         self._write_inputs = self._move_gizmo = True
         self._closed = False
         self.bench = Workbench(store)
-        self.worker = Worker(f"worker {client.client_id}", self.bench.close, self.bench.restart)
+        self.plans = PlanDesk(self, self.bench)
+        self.worker = Worker(f"worker {client.client_id}", self._finish, self._restart)
         self.controls = Controls(client, self, store.names)
         self.view = SceneView(
             client,
@@ -81,7 +83,16 @@ class Session:
         with self._changed:
             self._closed = True
             self._changed.notify()
+        self.plans.close()
         self.worker.close()
+
+    def _finish(self) -> None:
+        self.plans.finish()
+        self.bench.close()
+
+    def _restart(self) -> None:
+        self.plans.restart()
+        self.bench.restart()
 
     # -- what widgets ask for ---------------------------------------------------------------
 
@@ -135,7 +146,7 @@ class Session:
             with self._changed:
                 self._take(state, "")
 
-        self._submit("Loading", run, done)
+        self.submit("Loading", run, done)
 
     def choose_object(self, choice: str) -> None:
         """Put another object into the scene, on the worker."""
@@ -193,27 +204,13 @@ class Session:
         def done(ticket: int, found: T) -> None:
             self.change(lambda s: show(s, found) if s.busy and s.busy.ticket == ticket else s)
 
-        self._submit(label, lambda _: run(), done)
+        self.submit(label, lambda _: run(), done)
 
     def _change_object(self, label: str, run: Callable[[], tuple[Scene, Thing | None]]) -> None:
         def done(ticket: int, found: tuple[Scene, Thing | None]) -> None:
             self.change(lambda s: s.choose_object(*found) if s.busy and s.busy.ticket == ticket else s)
 
-        self._submit(label, lambda _: run(), done)
-
-    def plan(self, kind: str) -> None:
-        """Run a planner on the worker."""
-        state = self.state
-        if state is None:
-            return
-        scene, poses = state.scene, state.poses
-        if kind == "sequential":
-            run = lambda progress: self.bench.sequential(scene, poses, state.arm, progress)  # noqa: E731
-        else:
-            together = [t.name for t in scene.tasks.values() if len(t.arms) > 1]
-            task = together[0] if together and state.task not in together else state.task
-            run = lambda progress: self.bench.bimanual(scene, poses, task, progress)  # noqa: E731
-        self._submit("Planning", run, lambda t, plan: self.change(lambda s: s.plan_arrived(t, plan)))
+        self.submit(label, lambda _: run(), done)
 
     def stop_or_retry(self) -> None:
         """Stop the computation, the picture stays as it is; or begin again what was stopped."""
@@ -229,20 +226,13 @@ class Session:
         except SymgraspError as error:
             self.change(lambda s, problem=str(error): s.failed(problem))
             return
-        self.client.send_file_download(picture_name(state, kind), content, save_immediately=True)
-
-    def download(self) -> None:
-        """Send the plan to the browser."""
-        if self.state and self.state.plan:
-            plan = self.state.plan.plan
-            name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
-            self._send(f"{name}.json", plan.to_json())
+        self.send(picture_name(state, kind), content)
 
     def save_scene(self) -> None:
         """Send the scene, as it was changed, to the browser."""
         if self.state:
             scene = self.state.moved_scene()
-            self._send(re.sub(r"\W+", "_", scene.name) + ".yaml", scene_yaml(scene))
+            self.send(re.sub(r"\W+", "_", scene.name) + ".yaml", scene_yaml(scene).encode())
 
     def make_link(self) -> None:
         """Put what is shown into an address."""
@@ -260,17 +250,18 @@ class Session:
         camera, fov = self._camera(), self.client.camera.fov
 
         def done(ticket: int, html: str) -> None:
-            self._send(re.sub(r"\W+", "_", state.scene.name) + ".html", html)
+            self.send(re.sub(r"\W+", "_", state.scene.name) + ".html", html.encode())
             self.change(lambda s: s.stopped(ticket))
 
-        self._submit("Drawing the 3D view", lambda _: snapshot_html(state, camera, fov), done)
+        self.submit("Drawing the 3D view", lambda _: snapshot_html(state, camera, fov), done)
 
     def _camera(self) -> Camera:
         camera = self.client.camera
         return tuple(float(v) for v in (*camera.position, *camera.look_at))
 
-    def _send(self, name: str, content: str) -> None:
-        self.client.send_file_download(name, content.encode(), save_immediately=True)
+    def send(self, name: str, content: bytes) -> None:
+        """Send a file to the browser."""
+        self.client.send_file_download(name, content, save_immediately=True)
 
     # -- computing --------------------------------------------------------------------------
 
@@ -300,7 +291,7 @@ class Session:
     def _answer(self, request: Request, state: State) -> None:
         """Compute what the state lacks."""
         if isinstance(request, MapRequest):
-            self._submit(
+            self.submit(
                 f"Computing the map of {request.task}",
                 lambda progress: self.bench.map(request, progress),
                 lambda ticket, result: self.change(lambda s: s.map_arrived(ticket, result)),
@@ -314,9 +305,9 @@ class Session:
         else:
             label = "Trying every way to hold it here"
             run = lambda progress: self.bench.explain(request, progress)  # noqa: E731
-        self._submit(label, run, lambda t, found: self.change(lambda s: s.found(t, found)), request)
+        self.submit(label, run, lambda t, found: self.change(lambda s: s.found(t, found)), request)
 
-    def _submit(
+    def submit(
         self,
         label: str,
         run: Callable[[Progress], Any],

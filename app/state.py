@@ -6,7 +6,7 @@ computed for, and δ, the turn about the object's own axis, only shifts that map
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,7 +15,10 @@ import numpy as np
 from app.asking import Busy, Check, Explained, ExplainRequest, Request
 from app.history import History
 from app.looking import Looking
+from app.motion import Motion
+from app.plan_book import Kind, OpenedPlan, PlanBook
 from app.scene_files import Loaded
+from app.task_list import TaskList
 from app.things import OWN, Thing
 from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.errors import InputError
@@ -23,6 +26,7 @@ from symgrasp.explain import Explanation, Verdict
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import wrap
 from symgrasp.plan import PlanTask
+from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.poses import Array, rotation_z
 from symgrasp.scene import Scene
 
@@ -58,8 +62,8 @@ class State:
         refused: what was cancelled or failed: not tried again unasked.
         pick: the grasp picked.
         looking: how the map is looked at, and what was found out about it for that.
-        plan: the newest plan.
-        step: which of its tasks is shown; None once the person has moved on.
+        book: the plans that were found, and how they are leafed through.
+        step: which task of the plan is shown; None once the person has moved on.
         busy: what is being computed.
         problem: one line about what went wrong last.
         gizmo: whether the handles that drag the object are seen.
@@ -84,7 +88,7 @@ class State:
     refused: Request | None = None
     pick: Pick | None = None
     looking: Looking = field(default_factory=Looking)
-    plan: PlanResult | None = None
+    book: PlanBook = field(default_factory=PlanBook)
     step: int | None = None
     busy: Busy | None = None
     problem: str = ""
@@ -177,6 +181,7 @@ class State:
             self.scene, self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick,
             self.step, self.gizmo, self.errors, self.board, self.dark, self.thing, self.uploaded, self.loaded,
             *self.looking.inputs,
+            *self.book.inputs,
         )  # fmt: skip
 
     @cached_property
@@ -233,17 +238,52 @@ class State:
         """What the object is inside of."""
         return self.result.contacts if self.result and self.is_current else ()
 
+    @property
+    def plan(self) -> PlanResult | None:
+        """The plan that is shown, or was until the person moved on."""
+        return self.book.plan
+
     @cached_property
     def shown(self) -> PlanTask | None:
         """The task of the plan that is shown."""
         return self.plan.plan.tasks[self.step] if self.plan and self.step is not None else None
 
-    def can_plan(self, kind: str) -> bool:
-        """Whether there are tasks for the sequential planner with this arm, or for the bimanual one."""
+    @cached_property
+    def motion(self) -> Motion | None:
+        """Where the play is, while it is between two tasks."""
+        if self.plan is None or self.step is None or not self.book.is_between:
+            return None
+        start, share = self.book.leg
+        before, after = self.plan.plan.tasks[start : start + 2]
+        return Motion(self.scene, before, after, share)
+
+    @cached_property
+    def T_world_seen(self) -> Array:
+        """Where the object is drawn (4, 4): in the hand, while the arms are played."""
+        return self.motion.T_world_object if self.motion else self.T_world_object
+
+    @cached_property
+    def climbed(self) -> ClimbStep | None:
+        """The step of the hill climbing that is shown, if nothing else is."""
+        climb, frame = self.book.climb, self.book.frame
+        if climb is None or frame is None or self.task != climb.task or self.delta or self.pick:
+            return None
+        return climb.steps[frame]
+
+    def can_plan(self, kind: Kind) -> bool:
+        """Whether the scene has tasks for a planner."""
         tasks = self.scene.tasks.values()
         if kind == "sequential":
             return any(task.arms == (self.arm,) for task in tasks)
-        return any(len(task.arms) > 1 for task in tasks)
+        if kind == "bimanual":
+            return any(len(task.arms) > 1 for task in tasks)
+        return len(tasks) > 1 and len({arm for task in tasks for arm in task.arms}) > 1
+
+    @property
+    def together(self) -> str:
+        """The task for several arms that is planned: the chosen one, or the first."""
+        names = [task.name for task in self.scene.tasks.values() if len(task.arms) > 1]
+        return self.task if self.task in names or not names else names[0]
 
     def moved_scene(self) -> Scene:
         """Return the scene with all tasks where they were moved to."""
@@ -325,7 +365,7 @@ class State:
     def _without_plan(self) -> State:
         """Drop the plan, also one that is being made."""
         busy = self.busy if self.busy and self.busy.request else None
-        return replace(self, plan=None, step=None, busy=busy, refused=None, problem="")
+        return replace(self, book=self.book.cleared(), step=None, busy=busy, refused=None, problem="")
 
     def choose(self, h: float, theta: float) -> State:
         """Pick the grasp at height h (m) and angle θ (rad) in the object's frame."""
@@ -403,22 +443,75 @@ class State:
         """Compute the map after all."""
         return replace(self, refused=None, problem="")
 
-    def plan_arrived(self, ticket: int, plan: PlanResult) -> State:
-        """Take a plan and show its first task, unless nobody waits for it any more."""
+    def change_tasks(self, change: Callable[[TaskList], TaskList]) -> State:
+        """Add, remove, rename or reorder tasks. A plan for the others is dropped."""
+        before = TaskList(self.scene, self.poses, self.task)
+        after = change(before)
+        if after == before:
+            return self
+        arms = after.scene.task(after.task).arms
+        stays = np.array_equal(after.T_world_object, before.T_world_object)
+        return replace(
+            self._without_plan(),
+            scene=after.scene,
+            poses=after.poses,
+            task=after.task,
+            arm=self.arm if self.arm in arms else arms[0],
+            delta=self.delta if stays else 0.0,
+        )
+
+    def add_task(self) -> State:
+        """Add a task with the object where it stands."""
+        pose = self.request.T_world_object
+        return self.change_tasks(lambda tasks: tasks.added(pose))
+
+    def booked(self, ticket: int, book: PlanBook) -> State:
+        """Take what a planner found and show its first task, unless nobody waits for it any more."""
         if self.busy is None or self.busy.ticket != ticket:
             return self
-        return replace(self, plan=plan, busy=None, problem="").show_step(0)
+        return replace(self, book=book, busy=None, problem="", step=None, pick=None).show_step(0)
+
+    def listed(self, ticket: int, plans: tuple[PlanResult, ...], more: bool) -> State:
+        """Take further plans of the list and show the first of them."""
+        if self.busy is None or self.busy.ticket != ticket:
+            return self
+        state = replace(self, book=self.book.extended(plans, more=more), busy=None, problem="")
+        return state.choose_plan(len(self.book.plans)) if plans else state
+
+    def opened(self, opened: OpenedPlan, scene: Loaded | None, plan: PlanResult | None) -> State:
+        """Take a plan from a file, with its scene; one that does not hold is only reported."""
+        if scene is None or plan is None:
+            return replace(self, busy=None, problem="", book=replace(self.book, opened=opened))
+        book = PlanBook(self.book.sequence_method, self.book.hands_method, self.book.seed)
+        book = replace(book.found(plan.plan.kind, (plan,), more=False), opened=opened)
+        return replace(self.load_scene(scene), book=book).show_step(0)
+
+    def turn_book(self, change: Callable[[PlanBook], PlanBook]) -> State:
+        """Change what is shown of the plans, if that is all that changes."""
+        book = change(self.book)
+        return self if book is self.book else replace(self, book=book)
+
+    def choose_plan(self, page: int) -> State:
+        """Show another plan of the list, at the same task."""
+        step = self.step or 0
+        return replace(self, book=self.book.turned_to(page)).show_step(step)
 
     def show_step(self, step: int) -> State:
         """Show a task of the plan: the object turned by δᵢ and the grasp on its map."""
+        return self.show_position(step)
+
+    def show_position(self, position: float) -> State:
+        """Show the plan at a position of the play: the task nearest to it, the arms maybe between two."""
         if self.plan is None:
             return self
-        step = int(np.clip(step, 0, len(self.plan.plan.tasks) - 1))
+        book = self.book.at(position)
+        step = book.nearest
         task = self.plan.plan.tasks[step]
         hold = next((h for h in task.holds if h.arm == self.arm), task.holds[0])
         pick = Pick(hold.grasp.h, hold.grasp.theta, 0 if np.cos(hold.grasp.roll) > 0 else 1)
         return replace(
             self,
+            book=book,
             step=step,
             task=task.name,
             arm=hold.arm,
@@ -428,6 +521,47 @@ class State:
             result=self.plan.maps[task.name, hold.arm],
             problem="",
         )
+
+    def show_frame(self, frame: int) -> State:
+        """Show a step of the hill climbing: the hands on the maps as they were computed."""
+        climb = self.book.climb
+        if climb is None:
+            return self
+        arm = self.arm if self.arm in climb.arms else climb.arms[0]
+        return replace(
+            self,
+            book=self.book.at_frame(frame),
+            step=None,
+            task=climb.task,
+            arm=arm,
+            delta=0.0,
+            pick=None,
+            result=self.book.maps[climb.task, arm],
+            problem="",
+        )
+
+    def play_arms(self) -> State:
+        """Start or stop the play of the plan."""
+        return replace(self, book=self.book.play_arms())._followed()
+
+    def play_climb(self) -> State:
+        """Start or stop the replay of the hill climbing."""
+        return replace(self, book=self.book.play_climb())._followed()
+
+    def played(self, seconds: float) -> State:
+        """Let what is played go on; it stops where the person has moved on to something else."""
+        moving = self.book.moving
+        if not moving:
+            return self
+        if (self.step if moving == "arms" else self.climbed) is None:
+            return self.turn_book(PlanBook.still)
+        return replace(self, book=self.book.advanced(seconds))._followed()
+
+    def _followed(self) -> State:
+        """Show what the book is open at."""
+        if self.book.moving == "climb" or self.book.frame is not None:
+            return self.show_frame(self.book.frame or 0)
+        return self.show_position(self.book.position)
 
 
 def _finite(name: str, value: float) -> float:

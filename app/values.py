@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
@@ -84,9 +85,9 @@ class RollChoice(Enum):
         return int(self.rolls(m)[row, column])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MapRequest:
-    """What a map is computed for; equal requests have equal maps.
+    """What a map is computed for; equal requests have equal maps, whatever other tasks the scene has.
 
     Attributes:
         scene: the scene as loaded.
@@ -104,11 +105,28 @@ class MapRequest:
         """The base pose (4, 4)."""
         return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
 
+    @cached_property
+    def place(self) -> tuple[object, ...]:
+        """All that the map depends on, so neither the task's name nor the scene's other tasks."""
+        return (*self._stage, self.T_world_object.tobytes())
+
+    @cached_property
+    def _stage(self) -> tuple[object, ...]:
+        scene = self.scene
+        shared = (scene.robots, scene.obstacles, scene.profile, scene.settings)
+        return (*map(id, shared), self.arm)  # the scene keeps them alive
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the map and its name are the same."""
+        return isinstance(other, MapRequest) and (self.task, self.place) == (other.task, other.place)
+
+    def __hash__(self) -> int:
+        """Return a number that equal requests share."""
+        return hash((self.task, self.place))
+
     def differs_in_pose(self, other: object) -> bool:
         """Whether the other one is for the same map, but for the object's pose."""
-        if not isinstance(other, MapRequest):
-            return False
-        return self.scene is other.scene and (self.arm, self.task) == (other.arm, other.task)
+        return isinstance(other, MapRequest) and (self.task, self._stage) == (other.task, other._stage)
 
     def moved_task(self) -> Task:
         """Return the task, moved there."""
@@ -134,6 +152,12 @@ class MapResult:
     map: FeasibilityMap
     contacts: tuple[str, ...] = ()
 
+    def of(self, request: MapRequest) -> MapResult:
+        """Return it as the answer to a request for the same place, maybe under another task's name."""
+        if request == self.request:
+            return self
+        return MapResult(request, replace(self.map, task=request.task), self.contacts)
+
 
 @dataclass(frozen=True, eq=False)
 class PlanResult:
@@ -142,9 +166,12 @@ class PlanResult:
     Attributes:
         plan: the plan.
         maps: for every (task, arm) the map it was made from, at δ = 0.
-        prints: for every (task, arm) the cells (H, A) under the hand.
+        prints: for every task of the plan, in order, arm → the cells (H, A) under its hand.
+        gaps: for every task of the plan the smallest gap (m) between two prints, negative where they
+            overlap, None where one hand holds alone.
     """
 
     plan: Plan
     maps: Mapping[tuple[str, str], MapResult]
-    prints: Mapping[tuple[str, str], np.ndarray]
+    prints: tuple[Mapping[str, np.ndarray], ...]
+    gaps: tuple[float | None, ...]

@@ -49,7 +49,7 @@ class SceneView:
         """Bring the view up to the state; the gizmo only moves along if nobody is dragging it."""
         if self._scene is None or state.scene.robots is not self._scene.robots:
             self._build(state)
-        elif state.scene is not self._scene:
+        elif (state.scene.profile, state.scene.settings) != (self._scene.profile, self._scene.settings):
             self._build_object(state)
         if state.dark != self._dark:
             self._dark = state.dark

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -152,6 +152,32 @@ class Scene:
             self,
             file=self.file.model_copy(update={"tasks": files}),
             tasks={**self.tasks, task.name: task},
+        )
+
+    def with_tasks(self, tasks: Iterable[Task]) -> Scene:
+        """Return the scene with these tasks in this order; robots and object are shared.
+
+        Raises:
+            SceneError: there is none, a name is taken or no name, or an arm is unknown.
+        """
+        tasks = tuple(tasks)
+        names = [task.name for task in tasks]
+        if not names:
+            raise SceneError(self.source, "tasks", names, "at least one task")
+        files = []
+        for i, task in enumerate(tasks):
+            if task.name in names[:i]:
+                raise SceneError(self.source, "tasks: name", task.name, "a name that is not used twice")
+            for arm in task.arms:
+                self.arm(arm)
+            try:
+                files.append(TaskFile(name=task.name, arms=task.arms, pose=PoseFile.of(task.T_world_object)))
+            except ValidationError as error:
+                raise SceneError(f"tasks[{i}]", *describe(error, {"name": task.name})) from None
+        return replace(
+            self,
+            file=self.file.model_copy(update={"tasks": tuple(files)}),
+            tasks={task.name: task for task in tasks},
         )
 
     def with_object(self, name: str, profile: Profile) -> Scene:

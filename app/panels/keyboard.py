@@ -30,7 +30,7 @@ class Keyboard(Panel):
     def __init__(self, gui: viser.GuiApi, actions: Actions, scenes: Sequence[str]) -> None:
         super().__init__(gui, actions)
         self._scenes, self._scene = scenes, ""
-        change = actions.change
+        change, plans = actions.change, actions.plans
         self.command("Undo", lambda: change(undo), "Z", "cmd/ctrl")
         self.command("Redo", lambda: change(redo), "Z", "cmd/ctrl+shift")
         self.command("Cancel or compute again", actions.stop_or_retry, "escape")
@@ -42,8 +42,14 @@ class Keyboard(Panel):
         self.command("Flat map", lambda: change(lambda s: replace(s, board=not s.board)), "F")
         self.command("Drag handles", lambda: change(lambda s: replace(s, gizmo=not s.gizmo)), "G")
         self.command("Light or dark", lambda: change(lambda s: replace(s, dark=not s.dark)), "T")
-        self.command("Plan one grasp for all tasks", lambda: actions.plan("sequential"), "P")
-        self.command("Plan all arms together", lambda: actions.plan("bimanual"), "H")
+        self.command("Plan one grasp for all tasks", lambda: plans.run("sequential"), "P")
+        self.command("Plan all arms together", lambda: plans.run("bimanual"), "H")
+        self.command("Hand over: plan all tasks in order", lambda: plans.run("handover"))
+        self.command("List more solutions", plans.more)
+        self.command("Next solution", lambda: change(lambda s: s.choose_plan(s.book.page + 1)), "J")
+        self.command("Play or pause the plan", lambda: plans.play(State.play_arms), "K")
+        self.command("Replay or pause the climb", lambda: plans.play(State.play_climb), "C")
+        self.command("Add a task with the object here", lambda: change(State.add_task), "I")
         self.command("Next task of the plan", lambda: change(lambda s: _step(s, 1)), "pagedown")
         self.command("Previous task of the plan", lambda: change(lambda s: _step(s, -1)), "pageup")
         self.command("Next scene", self._next_scene, "N")

@@ -8,7 +8,7 @@ from app.map_view import legend_html, map_html, marks_of, prints_html
 from app.panels.panel import Actions, Panel
 from app.prints import print_names, shown_prints
 from app.profile_view import holds_html, profile_html, symmetry_html
-from app.readout import check_html, map_title
+from app.readout import check_html, map_title, solution_html
 from app.state import State
 
 __all__ = ["MapPanel"]
@@ -29,11 +29,13 @@ class MapPanel(Panel):
         self.map = self.html()
         self.check = self.html()
         self.legend = self.html()
+        self.plan = self.html()
         self.holds = self.html()
 
     def show(self, state: State) -> None:
         """Draw the map, and under it the one it is compared with."""
         self.title.show(map_title(state))
+        self.plan.show(solution_html(state) if state.shown else "")
         self.holds.show(holds_html(state) + symmetry_html(state))
         if state.map is None:
             self.map.show('<div class="sg sg-faint">The map is being computed …</div>')

@@ -8,6 +8,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 import viser
 
+from app.plan_desk import PlanDesk
 from app.state import State
 
 __all__ = ["Actions", "Change", "Html", "Panel", "within"]
@@ -36,17 +37,16 @@ class Actions(Protocol):
     def upload(self, name: str, content: bytes, scale: float) -> None:
         """Measure a mesh and put the object into the scene."""
 
-    def plan(self, kind: str) -> None:
-        """Run a planner."""
+    @property
+    def plans(self) -> PlanDesk:
+        """What runs planners and keeps their plans."""
+        ...
 
     def stop_or_retry(self) -> None:
         """Stop the computation, or begin the one that was stopped again."""
 
     def save_map(self, kind: str) -> None:
         """Send the map as it is shown as a picture."""
-
-    def download(self) -> None:
-        """Send the plan as a file."""
 
     def save_scene(self) -> None:
         """Send the scene as a file."""

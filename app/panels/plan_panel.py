@@ -1,66 +1,96 @@
-"""The planners: run them, see their maps, step through what they found."""
+"""What all plans have in common: choose one of the list, play it, keep it in a file."""
 
 from __future__ import annotations
 
 import viser
 
-from app.map_view import plan_html
 from app.panels.panel import Actions, Panel
-from app.readout import plan_line
+from app.plan_bench import PLAN_LIMIT
+from app.plan_desk import FORMATS
+from app.readout import solution_html
+from app.solutions_view import solutions_html
 from app.state import State
+from app.why_view import opened_html
 
-__all__ = ["PlanMapsPanel", "PlanPanel"]
+__all__ = ["PlanFilePanel", "PlanPanel"]
+
+NOT_A_MOTION = (
+    '<div class="sg sg-faint">Between tasks the arms only move for show: '
+    "this is no motion checked for collisions.</div>"
+)
 
 
 class PlanPanel(Panel):
-    """Runs the planners and steps through the plan."""
+    """Leafs through the plans that were found and plays them."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
-        with gui.add_folder("Plan"):
-            self.sequential = self.button(
-                "One grasp for all tasks",
-                viser.Icon.ROUTE,
-                lambda: actions.plan("sequential"),
-                hint="The grasp with most room in its worst task",
-            )
-            self.bimanual = self.button(
-                "All arms together",
-                viser.Icon.USERS,
-                lambda: actions.plan("bimanual"),
-                hint="Hands as far apart as the maps allow",
-            )
-            self.text = self.html()
-            self.step = gui.add_slider("Plan step", 1, 2, 1, 1, visible=False)
-            self.on(self.step, lambda s, v: s.show_step(int(v) - 1))
-            self.download = self.button(
-                "Download plan (JSON)", viser.Icon.DOWNLOAD, actions.download, visible=False
-            )
+        plans = actions.plans
+        self.solution = gui.add_slider("Solution", 1, 2, 1, 1, visible=False)
+        self.on(self.solution, lambda s, v: s.choose_plan(int(v) - 1), "scrub")
+        self.list = self.html()
+        self.text = self.html()
+        self.more = self.button(
+            "List more solutions", viser.Icon.LIST, plans.more, color="gray", visible=False
+        )
+        self.step = gui.add_slider("Plan step", 1.0, 2.0, 0.02, 1.0, visible=False)
+        self.on(self.step, lambda s, v: s.show_position(v - 1), "scrub")
+        self.play = self.button(
+            "Play", viser.Icon.PLAYER_PLAY, lambda: plans.play(State.play_arms), color="gray", visible=False
+        )
+        self.note = self.html()
 
     def show(self, state: State) -> None:
-        """Offer what can be planned, and sum up the plan."""
-        plan = state.plan
-        self.text.show(plan_line(state))
-        self.download.visible = plan is not None
-        self.sequential.disabled = not state.can_plan("sequential")
-        self.bimanual.disabled = not state.can_plan("bimanual")
-        self.step.visible = plan is not None and len(plan.plan.tasks) > 1
-        if plan and self.step.visible:
-            self.step.max = len(plan.plan.tasks)
+        """Offer what there is to leaf through."""
+        book = state.book
+        several = len(book.plans) > 1
+        if several:
+            self.solution.max = len(book.plans)
+        self.solution.visible = several
+        self.more.visible = book.more
+        self.list.show(solutions_html(state))
+        self.text.show(solution_html(state))
+        self.step.visible = self.play.visible = book.last > 0
+        if book.last:
+            self.step.max = float(book.last + 1)
+        playing = book.moving == "arms"
+        self.play.label = "Pause" if playing else "Play"
+        self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+        self.note.show(NOT_A_MOTION if book.last else "")
 
     def write_inputs(self, state: State) -> None:
-        """Show which task it is."""
-        if state.step is not None:
-            self.step.value = state.step + 1
+        """Show which plan and which task it is."""
+        book = state.book
+        if len(book.plans) > 1:
+            self.solution.value = book.page + 1
+        if book.last:
+            self.step.value = round(book.position + 1, 2)
 
 
-class PlanMapsPanel(Panel):
-    """The maps of the plan's tasks, each turned by its δ, with the common grasp in all."""
+class PlanFilePanel(Panel):
+    """Saves and opens plans."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
-        self.maps = self.html()
+        plans = actions.plans
+        with gui.add_folder("Plan file"):
+            self.form = self.choice("Format", tuple(FORMATS), visible=False)
+            self.download = self.button(
+                "Download plan", viser.Icon.DOWNLOAD, lambda: plans.download(self.form.value), visible=False
+            )
+            self.upload = gui.add_upload_button(
+                "Open a plan",
+                icon=viser.Icon.UPLOAD,
+                color="gray",
+                mime_type=".json",
+                hint=f"JSON; at most {PLAN_LIMIT / 1e6:g} MB. It is verified before it is shown.",
+            )
+            self.upload.on_upload(
+                lambda _: plans.open_file(self.upload.value.name, self.upload.value.content)
+            )
+            self.report = self.html()
 
     def show(self, state: State) -> None:
-        """Draw them."""
-        self.maps.show(plan_html(state.plan, state) if state.plan else "")
+        """Offer the plan, and say what became of the file that was opened."""
+        self.form.visible = self.download.visible = state.plan is not None
+        self.report.show(opened_html(state.book.opened) if state.book.opened else "")

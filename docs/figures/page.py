@@ -31,8 +31,9 @@ def page() -> None:
 def page_two_robots() -> None:
     """Both hands on the log, and their prints."""
     with _open("log_two_robots") as it:
+        it.tab("Hands")
         it.button("All arms together").click()
-        it.button("Download plan (JSON)").wait_for()
+        it.button("Download plan").wait_for()
         _shoot(it, "page_two_robots.png")
 
 

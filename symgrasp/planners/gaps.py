@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.compiling import njit
+from symgrasp.handprint import Handprint
 from symgrasp.manifold import ROLLS, Manifold, grasp_to_tool
 from symgrasp.planners.passing import Hands
 from symgrasp.poses import Array
 from symgrasp.robot import Arm
 
-__all__ = ["OVERLAP", "PASSING", "GapTable", "PrintGaps"]
+__all__ = ["OVERLAP", "PASSING", "GapTable", "PrintGaps", "print_gap"]
 
 OVERLAP = -1.0
 """The gap of prints that share a cell."""
@@ -145,6 +146,22 @@ class _Line(NamedTuple):
     radius: float
     first: int
     cells: np.ndarray
+
+
+def print_gap(a: Handprint, b: Handprint, columns: int, grid: Manifold) -> float:
+    """Return the gap (m) between two prints, the second at ``columns`` more than the first; see `PrintGaps`.
+
+    For a single pair: `PrintGaps` computes those of all at once.
+    """
+    first, second = (np.argwhere(p.cells) + np.array([p.first_row, 0]) for p in (a, b))
+    rows, turned = np.abs(np.moveaxis(first[:, None] - second - [0, columns], -1, 0))
+    turned %= grid.angles
+    apart = np.minimum(turned, grid.angles - turned)
+    if np.any((rows == 0) & (apart == 0)):
+        return OVERLAP
+    along = np.maximum(rows - 1, 0) * grid.dh
+    around = np.maximum(apart - 1, 0) * grid.dtheta * grid.profile.r_max
+    return float(np.maximum(along, around).min())
 
 
 def _same_hand(a: Arm, b: Arm, grid: Manifold) -> bool:

@@ -7,6 +7,8 @@ import pytest
 
 from app import compute
 from app.compute import Store, Workbench
+from app.plan_bench import PlanBench, PlanOrder
+from app.plan_book import PlanBook
 from app.state import State
 from app.things import OWN
 from app.values import MapRequest, MapResult
@@ -101,7 +103,11 @@ def test_what_the_object_is_inside_of_is_named_with_the_depth(bench):
 def test_plans_follow_the_objects_that_were_moved(bench):
     scene = load_small("pick_pour_place")
     state = State.of(scene, "").move(y=-0.3)
-    result = bench.sequential(scene, state.poses, "panda", quiet)
+    order = PlanOrder(scene, "sequential", "best", "panda", state.poses)
+    plans = PlanBench(bench)
+    result = plans.run(order, PlanBook(), quiet).plan
+    plans.close()
+    assert result
     assert result.plan.tasks[0].object_pose.position[1] == pytest.approx(-0.3)
     assert result.maps["pick", "panda"].request == state.request
     assert result.maps["pour", "panda"].request == MapRequest(scene, "panda", "pour")
@@ -109,7 +115,9 @@ def test_plans_follow_the_objects_that_were_moved(bench):
 
 def test_one_arm_is_not_enough_for_the_bimanual_planner(bench):
     with pytest.raises(SymgraspError, match="two or more arms"):
-        bench.bimanual(load_small("bottle_on_table"), {}, "pick", quiet)
+        PlanBench(bench).run(
+            PlanOrder(load_small("bottle_on_table"), "bimanual", name="pick"), PlanBook(), quiet
+        )
 
 
 def test_a_scene_is_loaded_once_and_checked(store, tmp_path, content):

@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from app.map_view import COLUMNS, Mark, legend_html, map_html, plan_html, prints_html, sample_columns
+from app.map_view import COLUMNS, Mark, legend_html, map_html, prints_html, sample_columns
 from app.palette import OVERLAP, PRINTS, REASONS, faded, rgb, to_linear
 from app.prints import on_surface, shown_prints
 from app.values import RollChoice
@@ -141,17 +141,6 @@ def test_hands_are_told_apart_by_the_colour_blind(sight):
     lightness = 116 * np.cbrt(np.maximum(luminance, 0.0089)) - 16
     for a, b in combinations(range(len(seen)), 2):
         assert abs(lightness[a] - lightness[b]) > 10
-
-
-def test_a_plan_shows_a_map_for_every_task_turned_by_its_delta():
-    state = with_plan("pick_pour_place", "sequential")
-    html = plan_html(state.plan, state)
-    for task in state.plan.plan.tasks:
-        (shown,) = pictures(html, f"plan map {task.name} panda")
-        m = state.plan.maps[task.name, "panda"].map.shift(task.delta)
-        roll = 0 if task.holds[0].grasp.roll == 0 else 1
-        assert np.array_equal(shown, REASONS[m.reason[roll][::-1, sample_columns(m.manifold)]])
-    assert html.count("sg-mark") == 3
 
 
 def test_colours_are_taken_to_linear_light_and_back():

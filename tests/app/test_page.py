@@ -13,7 +13,7 @@ import sys
 import pytest
 
 from app.__main__ import serve
-from app.readout import grasp_html, map_title, notes_html, plan_line, status_html
+from app.readout import grasp_html, map_title, notes_html, solution_html, status_html
 from app.state import State
 from app.values import MapResult
 from symgrasp.errors import InputError
@@ -73,7 +73,7 @@ def test_names_from_files_are_escaped_everywhere(content, tmp_path):
     scene = Scene.load(write_scene(tmp_path, content)).with_settings(heights=4, angles=8, redundancy=2)
     state = State.of(scene, HOSTILE)
     state = state.map_arrived(0, MapResult(state.request, create_map(scene), (HOSTILE,))).failed(HOSTILE)
-    shown = [f(state) for f in (map_title, status_html, notes_html, plan_line)]
+    shown = [f(state) for f in (map_title, status_html, notes_html, solution_html)]
     shown += [grasp_html(state.choose_cell(i, j)) for i in range(4) for j in range(8)]
     shown.append(status_html(state.started(1, HOSTILE)))
     assert not any("<script" in text for text in shown)
@@ -101,7 +101,7 @@ def test_the_joints_of_a_plan_are_read_out_as_the_plan_has_them():
 
 
 def test_the_plan_is_summed_up():
-    assert plan_line(with_plan("pick_pour_place", "sequential")).count("One grasp for 3 tasks: h = ") == 1
-    assert "2 arms hold the object together in lift" in plan_line(with_plan("log_two_robots", "bimanual"))
+    assert solution_html(with_plan("pick_pour_place", "sequential")).count("One grasp for 3 tasks: h = ") == 1
+    assert "2 arms hold the object together in lift" in solution_html(with_plan("log_two_robots", "bimanual"))
     assert load_small("bottle_on_table").name in map_title(opened())
     assert "of an earlier pose" in map_title(opened().move(x=0.5))

@@ -15,10 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.compute import Store, Workbench
+from app.plan_bench import PlanBench, PlanOrder
+from app.plan_book import Kind, PlanBook
 from app.readout import postures
 from app.state import State
 from app.things import OWN, from_library
-from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice
+from app.values import MapRequest, MapResult, ObjectPose, RollChoice
 from symgrasp.errors import SymgraspError
 from symgrasp.manifold import ROLLS, wrap
 from symgrasp.maps import create_map
@@ -43,19 +45,20 @@ def opened(name: str = "bottle_on_table") -> State:
 
 
 @cache
-def planned(name: str, kind: str) -> PlanResult:
+def planned(name: str, kind: Kind, method: str = "") -> PlanBook:
     scene = load_small(name)
+    order = PlanOrder(scene, kind, method, scene.arm().name if kind == "sequential" else scene.task().name)
     bench = Workbench(Store(name))
+    plans = PlanBench(bench)
     try:
-        if kind == "sequential":
-            return bench.sequential(scene, {}, scene.arm().name, lambda share: None)
-        return bench.bimanual(scene, {}, scene.task().name, lambda share: None)
+        return plans.run(order, PlanBook(), lambda share: None)
     finally:
+        plans.close()
         bench.close()
 
 
-def with_plan(name: str, kind: str) -> State:
-    return opened(name).started(1, "Planning").plan_arrived(1, planned(name, kind))
+def with_plan(name: str, kind: Kind, method: str = "") -> State:
+    return opened(name).started(1, "Planning").booked(1, planned(name, kind, method))
 
 
 # -- object poses ---------------------------------------------------------------------------
@@ -210,7 +213,7 @@ def test_last_words_of_an_earlier_computation_do_not_count():
     plan = planned("bottle_on_table", "sequential")
     assert state.progressed(1, 0.5) is state
     assert state.stopped(1, "failed") is state
-    assert state.plan_arrived(1, plan) is state
+    assert state.booked(1, plan) is state
     assert state.progressed(2, 0.5).busy.share == 0.5
 
 
@@ -361,7 +364,7 @@ def test_both_arms_hold_in_a_bimanual_plan_and_either_map_can_be_seen():
     assert other.shown is state.shown
     assert other.arm == "right"
     assert other.map.feasible[other.cell]
-    prints = [state.plan.prints["lift", arm] for arm in ("left", "right")]
+    prints = [state.plan.prints[0][arm] for arm in ("left", "right")]
     assert all(p.any() for p in prints)
     assert not (prints[0] & prints[1]).any()
 
@@ -405,7 +408,7 @@ CHANGES = st.one_of(
             lambda s: s.started(2, "Planning"),
             lambda s: replace(s, looking=s.looking.choose_compare(not s.looking.compare)),
             lambda s: s.choose_candidate(1),
-            lambda s: s if s.poses else s.plan_arrived(2, planned("pick_pour_place", "sequential")),
+            lambda s: s if s.poses else s.booked(2, planned("pick_pour_place", "sequential")),
         ]
     ),
 )

@@ -61,7 +61,8 @@ class GraspPage:
         return self.page.get_by_role("alert").filter(visible=True).and_(self.page.locator(".sg-note"))
 
     def text(self, text: str) -> Locator:
-        return self.page.get_by_text(text)
+        """What is seen of a text; tabs that were looked at before are still there, out of sight."""
+        return self.page.get_by_text(text).filter(visible=True)
 
     def expect_title(self, text: str) -> None:
         """Wait for the map of that scene, task or arm, up to date."""
@@ -119,8 +120,11 @@ class GraspPage:
     def button(self, name: str) -> Locator:
         return self.page.get_by_role("button", name=name, exact=True)
 
+    def tab(self, name: str) -> None:
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
     def choose(self, label: str, option: str) -> None:
-        self.page.get_by_label(label, exact=True).click()
+        self.page.get_by_label(label, exact=True).filter(visible=True).click()
         self.page.get_by_role("option", name=option, exact=True).click()
 
     def upload(self, path: Path) -> None:
@@ -141,7 +145,7 @@ class GraspPage:
 
     def slider_box(self, label: str) -> Locator:
         row = self.page.locator(f"xpath=//*[normalize-space(text())='{label}']/ancestor::*[.//input][1]")
-        return row.locator("input").last
+        return row.locator("input").filter(visible=True).last
 
     def at(self, scene: Scene, point: np.ndarray) -> tuple[float, float]:
         """Return the pixel of a point (3,) of the world, seen from where the page looks at first."""
@@ -177,7 +181,7 @@ class GraspPage:
 
     def download_plan(self, to: Path) -> dict[str, Any]:
         with self.page.expect_download() as download:
-            self.button("Download plan (JSON)").click()
+            self.button("Download plan").click()
         path = to / download.value.suggested_filename
         download.value.save_as(path)
         return json.loads(path.read_text(encoding="utf-8"))

@@ -1,0 +1,84 @@
+"""Several hands on one object: place them together, hand the object over, replay the hill climbing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import viser
+
+from app.hands_view import comparison_html, hands_html
+from app.panels.panel import Actions, Panel
+from app.readout import hands_line
+from app.state import State
+from app.why_view import why_html
+
+__all__ = ["HANDS_METHODS", "HandsPanel"]
+
+HANDS_METHODS: Mapping[str, str] = {
+    "widest gap (complete search)": "exact",
+    "hill climbing (Algorithm 3)": "hill_climb",
+}
+"""What the page calls a method → the method."""
+
+
+class HandsPanel(Panel):
+    """Plans for several arms, and shows their prints on their maps."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        plans = actions.plans
+        self.title = self.html()
+        self.method = self.choice("Method", tuple(HANDS_METHODS))
+        self.on(
+            self.method,
+            lambda s, v: s.turn_book(lambda book: replace(book, hands_method=HANDS_METHODS[v])),
+        )
+        self.seed = gui.add_number("Seed", 0, min=0, max=2**31 - 1, step=1, visible=False)
+        self.on(self.seed, lambda s, v: s.turn_book(lambda book: replace(book, seed=int(v))), "inputs")
+        self.run = self.button("All arms together", viser.Icon.USERS, lambda: plans.run("bimanual"))
+        self.handover = self.button(
+            "Hand over: all tasks in order",
+            viser.Icon.ARROWS_EXCHANGE,
+            lambda: plans.run("handover"),
+            visible=False,
+        )
+        self.why = self.html()
+        self.comparison = self.html()
+        self.frame = gui.add_slider("Climb", 1, 2, 1, 1, visible=False)
+        self.on(self.frame, lambda s, v: s.show_frame(int(v) - 1), "scrub")
+        self.replay = self.button(
+            "Replay the climb",
+            viser.Icon.PLAYER_PLAY,
+            lambda: plans.play(State.play_climb),
+            color="gray",
+            visible=False,
+        )
+        self.maps = self.html()
+
+    def show(self, state: State) -> None:
+        """Show the maps with the prints, or why there is no plan."""
+        book, climb = state.book, state.book.climb
+        refusal = book.refusal if book.kind != "sequential" else None
+        self.title.show(hands_line(state))
+        self.run.disabled = not state.can_plan("bimanual")
+        self.seed.visible = book.hands_method == "hill_climb"
+        self.handover.visible = state.can_plan("handover")
+        self.why.show(why_html(refusal, state.scene.manifold) if refusal else "")
+        self.comparison.show(comparison_html(climb) if climb else "")
+        self.frame.visible = climb is not None and len(climb.steps) > 1
+        self.replay.visible = self.frame.visible
+        if climb and self.frame.visible:
+            self.frame.max = len(climb.steps)
+        playing = book.moving == "climb"
+        self.replay.label = "Pause the climb" if playing else "Replay the climb"
+        self.replay.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+        self.maps.show(hands_html(state))
+
+    def write_inputs(self, state: State) -> None:
+        """Show what is chosen."""
+        book = state.book
+        self.method.value = next(k for k, method in HANDS_METHODS.items() if method == book.hands_method)
+        self.seed.value = book.seed
+        if book.climb and len(book.climb.steps) > 1:
+            self.frame.value = len(book.climb.steps) if book.frame is None else book.frame + 1

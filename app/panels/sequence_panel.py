@@ -1,0 +1,104 @@
+"""One grasp for a sequence of tasks: plan it, see it in all maps, change the tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import viser
+
+from app.panels.panel import Actions, Panel
+from app.readout import sequence_html, tasks_html
+from app.stack_view import stack_html
+from app.state import State
+from app.task_list import TaskList
+from app.why_view import regrasps, why_html
+
+__all__ = ["SEQUENCE_METHODS", "SequencePanel", "TasksPanel"]
+
+SEQUENCE_METHODS: Mapping[str, str] = {
+    "most room in the worst task": "best",
+    "first found (Algorithm 2)": "first",
+    "fewest regrasps": "regrasp",
+}
+"""What the page calls a method → the method."""
+
+
+class SequencePanel(Panel):
+    """Plans one grasp for all tasks of an arm, and shows it in their maps."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        plans = actions.plans
+        self.title = self.html()
+        self.method = self.choice("Method", tuple(SEQUENCE_METHODS))
+        self.on(
+            self.method,
+            lambda s, v: s.turn_book(lambda book: replace(book, sequence_method=SEQUENCE_METHODS[v])),
+        )
+        self.run = self.button("One grasp for all tasks", viser.Icon.ROUTE, lambda: plans.run("sequential"))
+        self.why = self.html()
+        self.regrasp = self.button(
+            "Plan with regrasps", viser.Icon.ROUTE, lambda: plans.run("sequential", "regrasp"), visible=False
+        )
+        self.stack = self.html()
+        self.slide = gui.add_slider(
+            "Slide by δ (%)", 0, 100, 1, 100, visible=False,
+            hint="Turning the object by δ slides a task's map until the common grasp is feasible in it.",
+        )  # fmt: skip
+        self.on(self.slide, lambda s, v: s.turn_book(lambda book: replace(book, slide=v / 100)), "inputs")
+
+    def show(self, state: State) -> None:
+        """Show the maps with the grasp, or why there is none."""
+        book = state.book
+        refusal = book.refusal if book.kind == "sequential" else None
+        count = regrasps(refusal)
+        self.title.show(sequence_html(state))
+        self.run.disabled = not state.can_plan("sequential")
+        self.why.show(why_html(refusal, state.scene.manifold) if refusal else "")
+        self.regrasp.visible = count > 0
+        self.regrasp.label = f"Plan with {count} regrasp{'s' * (count > 1)}"
+        self.stack.show(stack_html(state))
+        self.slide.visible = book.kind == "sequential" and book.last > 0
+
+    def write_inputs(self, state: State) -> None:
+        """Show what is chosen."""
+        self.method.value = _label(SEQUENCE_METHODS, state.book.sequence_method)
+        self.slide.value = round(100 * state.book.slide)
+
+
+class TasksPanel(Panel):
+    """Changes the list of tasks."""
+
+    def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
+        super().__init__(gui, actions)
+        with gui.add_folder("Tasks"):
+            self.list = self.html()
+            self.add = self.button(
+                "Add a task with the object here",
+                viser.Icon.PLUS,
+                lambda: actions.change(State.add_task),
+                color="gray",
+                hint="The object's present pose becomes a task after the chosen one",
+            )
+            self.name = gui.add_text("Task name", "")
+            changes: dict[str, Callable[[TaskList], TaskList]] = {
+                "Rename": lambda tasks: tasks.renamed(self.name.value),
+                "Earlier": lambda tasks: tasks.shifted(-1),
+                "Later": lambda tasks: tasks.shifted(1),
+                "Remove": TaskList.removed,
+            }
+            self.edit = gui.add_button_group("Chosen task", tuple(changes))
+            self.edit.on_click(lambda _: actions.change(lambda s: s.change_tasks(changes[self.edit.value])))
+
+    def show(self, state: State) -> None:
+        """List the tasks."""
+        self.list.show(tasks_html(state))
+
+    def write_inputs(self, state: State) -> None:
+        """Show the chosen task's name."""
+        self.name.value = state.task
+
+
+def _label(methods: Mapping[str, str], method: str) -> str:
+    return next(label for label, known in methods.items() if known == method)

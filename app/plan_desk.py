@@ -1,0 +1,145 @@
+"""What the widgets for plans ask for: planning, listing, playing, files."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any, Protocol
+
+from app.compute import Workbench
+from app.plan_bench import Opened, PlanBench, PlanOrder
+from app.plan_book import Kind
+from app.state import State
+from symgrasp.exports import EXPORTS
+from symgrasp.feasibility import Progress
+from symgrasp.plan import Plan
+
+__all__ = ["FORMATS", "Office", "PlanDesk"]
+
+FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
+    "JSON": (".json", Plan.to_json),
+    "CSV": (".csv", EXPORTS["csv"]),
+    "Trajectory": (".trajectory.json", EXPORTS["trajectory"]),
+    "TSR": (".tsr.yaml", EXPORTS["tsr"]),
+}
+"""What the page calls a format → ending of its files, and what writes them."""
+
+TICK = 0.05
+"""Time (s) between the pictures of a play."""
+
+
+class Office(Protocol):
+    """What the desk needs of a browser's session."""
+
+    state: State | None
+
+    def change(self, change: Callable[[State], State], origin: str = "") -> None:
+        """Apply a change to the state."""
+
+    def submit(self, label: str, run: Callable[[Progress], Any], done: Callable[[int, Any], None]) -> None:
+        """Give the worker something to do."""
+
+    def send(self, name: str, content: bytes) -> None:
+        """Send a file to the browser."""
+
+
+class PlanDesk:
+    """Plans for one browser.
+
+    Args:
+        office: the browser's session.
+        bench: the workbench of its worker.
+    """
+
+    def __init__(self, office: Office, bench: Workbench) -> None:
+        self.office = office
+        self._bench = PlanBench(bench)
+        self._ended = threading.Event()
+        self._player: threading.Thread | None = None
+
+    def close(self) -> None:
+        """Play nothing any more; may be called from anywhere."""
+        self._ended.set()
+
+    def finish(self) -> None:
+        """Free what the planners hold; on the worker's thread."""
+        self._bench.close()
+
+    def restart(self) -> None:
+        """Use nothing of the planners again after something broke; on the worker's thread."""
+        with suppress(Exception):  # nothing is known about what is broken
+            self._bench.close()
+
+    def run(self, kind: Kind, method: str = "") -> None:
+        """Run a planner, with the method chosen for it unless another is asked for."""
+        state = self.office.state
+        if state is None:
+            return
+        book, name = state.book, state.arm
+        if kind == "bimanual":
+            method, name = method or book.hands_method, state.together
+        elif kind == "sequential":
+            method = method or book.sequence_method
+        order = PlanOrder(state.scene, kind, method, name, state.poses, book.seed)
+        self.office.submit(
+            "Planning",
+            lambda progress: self._bench.run(order, book, progress),
+            lambda ticket, found: self.office.change(lambda s: s.booked(ticket, found)),
+        )
+
+    def more(self) -> None:
+        """List further plans."""
+        state = self.office.state
+        if state is None or not state.book.more:
+            return
+        maps = state.book.maps
+        self.office.submit(
+            "Listing more solutions",
+            lambda progress: self._bench.more(maps, progress),
+            lambda ticket, found: self.office.change(lambda s: s.listed(ticket, *found)),
+        )
+
+    def open_file(self, name: str, content: bytes) -> None:
+        """Verify a plan that was uploaded and show it if it holds."""
+
+        def done(ticket: int, opened: Opened) -> None:
+            self.office.change(
+                lambda s: (
+                    s.opened(opened.report, opened.scene, opened.plan)
+                    if s.busy and s.busy.ticket == ticket
+                    else s
+                )
+            )
+
+        label = f"Verifying {name}"
+        self.office.submit(label, lambda progress: self._bench.open(content, name, progress), done)
+
+    def download(self, form: str) -> None:
+        """Send the plan to the browser in one of `FORMATS`."""
+        state = self.office.state
+        if state and state.plan:
+            plan = state.plan.plan
+            ending, write = FORMATS[form]
+            name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
+            self.office.send(name + ending, write(plan).encode())
+
+    def play(self, change: Callable[[State], State]) -> None:
+        """Start or stop a play."""
+        self.office.change(change)
+        state = self.office.state
+        if state and state.book.moving and not (self._player and self._player.is_alive()):
+            self._player = threading.Thread(target=self._play, name="player", daemon=True)
+            self._player.start()
+
+    def _play(self) -> None:
+        last = time.monotonic()
+        while not self._ended.wait(TICK):
+            now = time.monotonic()
+            self.office.change(lambda s, seconds=now - last: s.played(seconds), "play")
+            last = now
+            state = self.office.state
+            if state is None or not state.book.moving:
+                return
