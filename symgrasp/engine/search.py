@@ -31,7 +31,8 @@ from symgrasp.engine.checks import (
 )
 from symgrasp.engine.solids import Solids
 from symgrasp.engine.tree import Tree
-from symgrasp.ik.spherical import BRANCHES, STRICT, Chain, branches_at
+from symgrasp.ik.branches import BRANCHES, STRICT, branches_at
+from symgrasp.ik.chain import Chain
 from symgrasp.poses import Array
 
 __all__ = [
