@@ -206,7 +206,7 @@ def test_the_other_robot_is_an_obstacle():
 
 @pytest.mark.parametrize("method", ["exact", "reference"])
 def test_progress_and_cancel(method, monkeypatch):
-    monkeypatch.setattr(exact, "AT_ONCE", 100)
+    monkeypatch.setattr(exact, "TELL", 0.0)
     shares = []
     scene = load_small("soda_can")
     create_map(scene, method=method, progress=shares.append)
@@ -224,7 +224,7 @@ def test_progress_and_cancel(method, monkeypatch):
 @pytest.mark.parametrize("method", ["exact", "reference"])
 def test_a_cancelled_map_leaves_no_trace(method, monkeypatch):
     """In the world of a map that was stopped half-way, the next map is what it is in a new world."""
-    monkeypatch.setattr(exact, "AT_ONCE", 100)
+    monkeypatch.setattr(exact, "TELL", 0.0)
     scene = load_small("log_two_robots")
 
     def stop(share):

@@ -7,6 +7,8 @@ through the very functions of the reference. So a cell is feasible here exactly 
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from time import perf_counter
 from typing import NamedTuple
 
 import numba
@@ -34,8 +36,8 @@ __all__ = ["ExactEngine"]
 PARTS = 4
 """Parts of a search for each thread, so that none waits long for the last."""
 
-AT_ONCE = 150_000
-"""Cells times redundancy samples that are searched before progress is told: some 50 ms."""
+TELL = 0.05
+"""Time (s) after which progress is told, and may cancel: rows are searched in bites of about that long."""
 
 _ALL_CORES = threading.Lock()
 """Of numba's thread pools, one does not bear two parallel searches at once, and none is faster for it."""
@@ -123,12 +125,18 @@ class ExactEngine:
         draft = Draft(self, grid)
         still = self._still()
         rows = np.array([row for row, stage in enumerate(self._fit) if stage is None], dtype=np.int64)
-        at_once = max(1, AT_ONCE // (len(ROLLS) * grid.angles * len(self.ik.phi)))
-        for first in range(0, len(rows), at_once):
-            part = rows[first : first + at_once]
-            self._search(draft, part, T_base_tool, still)
+        first, bite = 0, 1
+        while first < len(rows):
+            start = perf_counter()
+            part = rows[first : first + bite]
+            for _ in self._search(draft, part, T_base_tool, still):
+                if progress and perf_counter() - start > TELL:
+                    progress(first / len(rows))  # PyBullet takes its time: here one may cancel, too
+            first += len(part)
             if progress:
-                progress((first + len(part)) / len(rows))
+                progress(first / len(rows))
+            # Rows differ, so bites grow with care; what is found does not depend on them.
+            bite = max(1, min(2 * bite, int(len(part) * TELL / (perf_counter() - start))))
         world.set_arms(())
         if progress and not len(rows):
             progress(1.0)
@@ -154,8 +162,8 @@ class ExactEngine:
         rows: np.ndarray,
         T_base_tool: Array,
         still: _Still,
-    ) -> None:
-        """Search some rows of the map."""
+    ) -> Iterator[None]:
+        """Search some rows of the map; pause after every cell that PyBullet decided."""
         goals = search.Goals(
             order=self._order,
             T_world_base=self._T_world_base,
@@ -183,6 +191,7 @@ class ExactEngine:
         for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.open_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             self._decide(draft, cell, goals.T_base_tool[i], self._listed(found, int(i), goals.T_base_tool[i]))
+            yield
 
     def _listed(self, found: search.Found, i: int, T_base_tool: Array) -> list[tuple[Array, int, int]]:
         """Return the undecided candidates of an open cell, or all inside the limits where they are many."""
