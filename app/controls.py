@@ -6,6 +6,7 @@ from pathlib import Path
 
 import viser
 
+from app.panels.candidates_panel import CandidatesPanel
 from app.panels.files_panel import FilesPanel
 from app.panels.grasp_panel import GraspPanel
 from app.panels.hands_panel import HandsPanel
@@ -53,12 +54,15 @@ class Controls:
         left = gui.add_panel()
         with left.add_tab("Grasp map", viser.Icon.MAP_2):
             gui.add_html(f"<style>{_style()}</style>")
-            map_tab = [
+            map_tab: list[Panel] = [
                 MapPanel(gui, actions),
                 NotesPanel(gui, actions),
-                ViewPanel(gui, actions),
-                GraspPanel(gui, actions),
             ]
+            tabs = gui.add_tab_group()
+            with tabs.add_tab("Grasp", viser.Icon.HAND_GRAB):
+                map_tab += [GraspPanel(gui, actions), CandidatesPanel(gui, actions)]
+            with tabs.add_tab("View", viser.Icon.PALETTE):
+                map_tab.append(ViewPanel(gui, actions))
         with left.add_tab("Sequence", viser.Icon.ROUTE):
             sequence_tab = [
                 SequencePanel(gui, actions),

@@ -33,6 +33,7 @@ __all__ = [
     "legend_html",
     "map_html",
     "marks_of",
+    "picture_html",
     "prints_html",
     "sample_columns",
     "scale_html",
@@ -114,6 +115,30 @@ def map_html(
     return (
         f'<div class="sg-map" style="height:{height + 48}px">'
         f'<div class="sg-picture">{"".join(layers)}</div>{h_axis(grid, height)}{THETA_AXIS}</div>'
+    )
+
+
+Axis = tuple[Sequence[tuple[float, str]], str]
+"""Labels with how far along (0 to 1) they stand, and the name with its unit."""
+
+
+def picture_html(png: bytes, name: str, over: str, height: int, across: Axis, up: Axis) -> str:
+    """Draw a picture with two axes.
+
+    Args:
+        png: the picture.
+        name: its alternative text.
+        over: HTML to lie over it.
+        height: of the picture (px).
+        across, up: the axes.
+    """
+    below = "".join(f'<span style="left:{100 * at:.2f}%">{escape(text)}</span>' for at, text in across[0])
+    beside = "".join(f'<span style="bottom:{100 * at:.2f}%">{escape(text)}</span>' for at, text in up[0])
+    return (
+        f'<div class="sg-map" style="height:{height + 48}px">'
+        f'<div class="sg-picture">{_img(png, name)}{over}</div>'
+        f'<div class="sg-h">{beside}<b>{escape(up[1])}</b></div>'
+        f'<div class="sg-theta">{below}<b>{escape(across[1])}</b></div></div>'
     )
 
 

@@ -10,6 +10,7 @@ from app.motion import plan_postures
 from app.state import State
 from symgrasp.manifold import ROLLS
 from symgrasp.poses import Array
+from symgrasp.reason import Reason
 
 __all__ = [
     "check_html",
@@ -30,7 +31,7 @@ def postures(state: State) -> dict[str, Array]:
     """Return robot name → values (n,) of all its joints.
 
     Robots park at home, except the arms that hold the object in the plan's task that is shown,
-    or the chosen arm at the witness of the picked cell.
+    or the chosen arm at the chosen candidate of the picked cell, if that is feasible, or its witness.
     """
     if state.motion:
         return state.motion.postures
@@ -45,6 +46,10 @@ def postures(state: State) -> dict[str, Array]:
                 q = arm.robot_values(witness.q, witness.opening)
                 moved = q != arm.robot.home
                 values[arm.robot.name][moved] = q[moved]
+    elif state.verdict and state.explanation:
+        if state.verdict.reason == Reason.FEASIBLE:
+            arm = state.scene.arm(state.arm)
+            values[arm.robot.name] = arm.robot_values(state.verdict.q, state.explanation.opening)
     elif state.is_current and state.map and state.cell and (witness := state.map.witness(state.cell)):
         arm = state.scene.arm(state.arm)
         values[arm.robot.name] = arm.robot_values(witness.q, witness.opening)
@@ -82,6 +87,13 @@ def grasp_html(state: State) -> str:
     place += f", roll {np.rad2deg(ROLLS[state.cell.roll]):.0f}°"
     why = escape(state.map.why(state.cell))
     witness = state.map.witness(state.cell)
+    if witness is None and state.explanation and state.verdict:
+        best = "The best" if state.candidate == 0 else "One"
+        ways = counted(len(state.explanation.verdicts), "way")
+        return (
+            f'<div class="sg"><b>{place}</b><br>{escape(state.arm)} cannot hold it here: '
+            f"{escape(state.explanation.reason.label)}. {best} of {ways} to try is the ghost.</div>"
+        )
     if witness is None:
         return f'<div class="sg"><b>{place}</b><br>{escape(state.arm)} cannot hold it here: {why}</div>'
     margin = state.map.margin(state.cell)

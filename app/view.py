@@ -8,6 +8,7 @@ import numpy as np
 import viser
 
 from app.bodies import FlatMap, ObjectView, RobotView
+from app.ghost_view import GhostView
 from app.readout import postures
 from app.stage import FIELD_OF_VIEW, add_floor, add_lights, add_obstacle, viewpoint
 from app.state import State
@@ -58,6 +59,8 @@ class SceneView:
             if state.is_current or not state.busy:  # arms wait where they are for a new map
                 for name, values in postures(state).items():
                     self.robots[name].show(values)
+            if state.unmet is None or not state.busy:
+                self.ghost.show(state)
             self.object.show(state, move_gizmo=move_gizmo)
             self.board.show(state)
 
@@ -90,6 +93,7 @@ class SceneView:
         root = self._object_root = self._replace(self._object_root, f"{self._root}/thing")
         self.client.scene.add_frame(root, show_axes=False)
         self.object = ObjectView(self.client, root, state.scene, self.on_surface, self.on_drag)
+        self.ghost = GhostView(self.client, f"{root}/ghost", state.scene)
         self.board = FlatMap(self.client, f"{root}/board", state, self._viewpoint, self.on_board)
         self._scene = state.scene
 

@@ -18,16 +18,15 @@ class GraspPanel(Panel):
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
-        with gui.add_folder("Grasp"):
-            self.h = gui.add_number("h (cm)", 0.0, step=0.1)
-            self.theta = gui.add_number("θ (°)", 0.0, min=-180.0, max=180.0, step=0.1)
-            pick = lambda s, _: s.choose(self.h.value / 100, np.deg2rad(self.theta.value))  # noqa: E731
-            self.on(self.h, pick, "inputs")
-            self.on(self.theta, pick, "inputs")
-            self.roll = self.choice("Roll", [roll.value for roll in RollChoice])
-            self.on(self.roll, lambda s, v: s.choose_roll(RollChoice(v)))
-            self.grasp = self.html()
-            self.button("Let go", viser.Icon.HAND_OFF, lambda: actions.change(State.clear_pick), color="gray")
+        self.h = gui.add_number("h (cm)", 0.0, step=0.1)
+        self.theta = gui.add_number("θ (°)", 0.0, min=-180.0, max=180.0, step=0.1)
+        pick = lambda s, _: s.choose(self.h.value / 100, np.deg2rad(self.theta.value))  # noqa: E731
+        self.on(self.h, pick, "inputs")
+        self.on(self.theta, pick, "inputs")
+        self.roll = self.choice("Roll", [roll.value for roll in RollChoice])
+        self.on(self.roll, lambda s, v: s.choose_roll(RollChoice(v)))
+        self.button("Let go", viser.Icon.HAND_OFF, lambda: actions.change(State.clear_pick), color="gray")
+        self.grasp = self.html()
 
     def show(self, state: State) -> None:
         """Say what becomes of the grasp."""

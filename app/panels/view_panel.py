@@ -26,7 +26,7 @@ class ViewPanel(Panel):
         )
         self.on(self.handprint, lambda s, v: replace(s, looking=replace(s.looking, handprint=v)))
         self.compare = gui.add_checkbox(
-            "Recompute as well", False,
+            "Compare", False,
             hint="Also compute the map of the turned object from scratch, and count the cells that differ.",
         )  # fmt: skip
         self.on(self.compare, lambda s, v: replace(s, looking=s.looking.choose_compare(v)))

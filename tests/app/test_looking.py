@@ -14,21 +14,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from trimesh import transform_points
 
 from app.asking import Check, CheckRequest, Explained, ExplainRequest
+from app.candidates_view import candidates_html, fates, verdict_html, verdict_line
 from app.coloured import cell_colors, coloured
 from app.compute import Store, Workbench
+from app.ghost import body_mesh, ghost
 from app.map_picture import map_picture, picture_name
 from app.map_view import legend_html
 from app.prints import shown_prints
-from app.readout import check_html
+from app.readout import check_html, grasp_html, postures
 from app.state import State
 from app.values import RollChoice
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import Cell
+from symgrasp.poses import rotation_z
 from symgrasp.reason import Reason
 from symgrasp.views import View
+from symgrasp.world import Body, BulletWorld
 from tests.app.test_state import opened
+from tests.conftest import load_small
 
 
 @pytest.fixture(scope="module")
@@ -228,3 +234,98 @@ def test_an_answer_about_another_cell_does_not_count(bench):
     answer = Explained(ExplainRequest(state.request, Cell(0, 0, 0)), None)
     assert second.started(2, "", second.wanted).found(1, answer).looking.explained is None
     assert second.found(1, answer).explanation is None
+
+
+# -- the ghost arm --------------------------------------------------------------------------
+
+
+def test_a_failing_candidate_is_a_ghost_and_a_feasible_one_the_arm(bench):
+    state = opened()
+    picked = state.choose_cell(*cell_with(state, Reason.FEASIBLE))
+    assert ghost(picked) is None  # nothing is known yet
+    held = explained(bench, picked)
+    arm = state.scene.arm()
+    for k, verdict in enumerate(held.explanation.verdicts):
+        shown = held.choose_candidate(k)
+        at = arm.robot_values(verdict.ended, held.explanation.opening)
+        if verdict.reason == Reason.FEASIBLE:
+            assert ghost(shown) is None
+            assert np.array_equal(postures(shown)["panda"], at)
+        else:
+            assert np.array_equal(ghost(shown).values, at)
+            assert np.array_equal(postures(shown)["panda"], arm.robot.home)
+    reasons = {verdict.reason for verdict in held.explanation.verdicts}
+    assert Reason.FEASIBLE in reasons
+    assert len(reasons) > 1
+
+
+def test_the_ghost_shows_what_collides(bench):
+    state = opened()
+    hit = explained(bench, state.choose_cell(*cell_with(state, Reason.SCENE_COLLISION)))
+    found = ghost(hit)
+    pairs = {(c.a, c.b) for c in hit.explanation.best.collisions}
+    assert pairs
+    assert found.hits == {body for pair in pairs for body in pair}
+    assert found.links() == {body.link for body in found.hits if body.body == "panda"}
+    assert {body.body for body in found.others()} <= {o.name for o in state.scene.obstacles}
+    assert found.others()
+    far = explained(bench, state.choose_cell(*cell_with(state, Reason.UNREACHABLE)))
+    assert ghost(far) is None
+    assert "Out of reach" in candidates_html(far)
+
+
+def test_the_red_shapes_are_those_of_the_bodies():
+    """Robots' links as PyBullet has them, obstacles by their sizes, the object by its profile."""
+    scene = load_small("bottle_on_table")
+    pose = scene.task().T_world_object @ rotation_z(0.3)
+    with BulletWorld(scene) as world:
+        world.park("panda")
+        for link in ("panda_link4", "panda_hand"):
+            mesh, at = body_mesh(scene, Body("panda", link), pose)
+            corners = [shape.vertices for shape in world.shapes("panda")[link]]
+            seen = transform_points(np.vstack(corners), world.link_pose("panda", link))
+            assert np.abs(bounds(transform_points(mesh.vertices, at)) - bounds(seen)).max() < 0.004
+    for o in scene.obstacles:
+        mesh, at = body_mesh(scene, Body(o.name, ""), pose)
+        size = {"box": o.size, "cylinder": (2 * o.size[0], 2 * o.size[0], o.size[-1])}[o.kind]
+        assert np.abs(mesh.extents - size).max() < 0.004
+        assert np.array_equal(at, o.T_world_obstacle)
+    mesh, at = body_mesh(scene, Body(scene.file.object.name, ""), pose)
+    profile = scene.profile
+    expected = [[-profile.r_max] * 2 + [profile.h_min], [profile.r_max] * 2 + [profile.h_max]]
+    assert np.abs(bounds(mesh.vertices) - expected).max() < 0.004
+    assert np.array_equal(at, pose)
+
+
+def bounds(points: np.ndarray) -> np.ndarray:
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def test_the_candidates_are_drawn_by_redundancy_and_branch(bench):
+    state = opened()
+    hit = explained(bench, state.choose_cell(*cell_with(state, Reason.SCENE_COLLISION)))
+    cells = fates(hit.explanation)
+    assert cells.shape[1] == len(hit.explanation.phi)
+    best = {}
+    for v in hit.explanation.verdicts:
+        best[v.branch, v.sample] = max(best.get((v.branch, v.sample), 0), 1 + v.reason)
+    assert {k: int(v) for k, v in np.ndenumerate(cells) if v} == best
+    html = candidates_html(hit)
+    assert f"{len(hit.explanation.verdicts)} candidates" in html
+    assert html.count("sg-ring") == 1
+    assert verdict_line(hit.verdict) in verdict_html(hit)
+    assert "The best of" in grasp_html(hit)
+    assert "One of" in grasp_html(hit.choose_candidate(1))
+
+
+def test_names_in_verdicts_are_escaped(bench):
+    state = opened()
+    hit = explained(bench, state.choose_cell(*cell_with(state, Reason.SCENE_COLLISION)))
+    evil = Body("<img src=x>", "<b>")
+    verdict = hit.verdict
+    collisions = tuple(c._replace(a=evil) for c in verdict.collisions)
+    first = replace(verdict, collisions=collisions)
+    explanation = replace(hit.explanation, verdicts=(first, *hit.explanation.verdicts[1:]))
+    hostile = looking(hit, explained=replace(hit.looking.explained, explanation=explanation))
+    assert "<img src=x>" not in verdict_html(hostile)
+    assert "&lt;img src=x&gt;" in verdict_html(hostile)

@@ -13,6 +13,7 @@ import pytest
 from playwright.sync_api import expect
 
 from app.bodies import FLAT_SIZE, board_position
+from app.candidates_view import verdict_line
 from app.map_view import sample_columns
 from app.palette import REASONS
 from app.stage import viewpoint
@@ -21,7 +22,7 @@ from app.things import from_mesh
 from app.values import RollChoice
 from symgrasp.feasibility import FeasibilityMap
 from symgrasp.manifold import grasp_to_tool
-from symgrasp.maps import create_map
+from symgrasp.maps import MapMaker, create_map
 from symgrasp.objects import load_object
 from symgrasp.plan import Plan, plan_schema
 from symgrasp.poses import pose_error
@@ -124,9 +125,12 @@ def test_an_infeasible_cell_says_why(open_page, bottle_map):
     page.number("h (cm)", 100 * bottle_map.manifold.h[row])
     page.number("θ (°)", np.rad2deg(bottle_map.manifold.theta[column]))
     roll = RollChoice.EITHER.roll(bottle_map, row, column)
-    why = bottle_map.why((roll, row, column))
-    assert "table" in why or "parcel" in why or "lamp" in why
-    expect(page.text(f"panda cannot hold it here: {why}")).to_be_visible()
+    with BulletWorld(BOTTLE) as world:
+        best = MapMaker(world, BOTTLE).explain("panda", "pick", (roll, row, column)).best
+    assert best
+    assert best.collisions[0].b.body in ("table", "parcel", "lamp")
+    expect(page.text("panda cannot hold it here: hits an obstacle. The best of")).to_be_visible()
+    expect(page.text(verdict_line(best))).to_be_visible()
 
 
 def test_the_roll_can_be_chosen(open_page, bottle_map):
@@ -416,7 +420,7 @@ def test_names_from_a_file_are_shown_as_text(open_page, tmp_path, content):
     expect(page.text(f"the {hostile} turns")).to_be_visible()
     page.number("h (cm)", 4)
     page.number("θ (°)", 90)
-    why = page.text("cannot hold it here: hits an obstacle")
+    why = page.page.locator(".sg-verdict")
     expect(why).to_contain_text(f"{hostile}robot/")
     expect(why).to_contain_text(f"and {hostile}")
     page.tab("Sequence")
