@@ -8,11 +8,10 @@ import logging
 import socket
 import sys
 import threading
+import warnings
 
 from app.compute import Store
-from app.front_door import FrontDoor
-from app.reception import Reception
-from app.snapshot import quiet_server
+from app.reception import open_house
 from symgrasp.compiling import COMPILING, telling_of_compiling
 from symgrasp.errors import InputError, SymgraspError
 
@@ -32,25 +31,17 @@ def serve(scene: str, host: str, port: int) -> None:
     """
     _check_free(host, port)
     store = _warm_store(scene)
-    server = quiet_server()
-    reception = Reception(store, lambda client_id: client_id in server.get_clients())
-    server.on_client_connect(reception.arrived)
-    server.on_client_disconnect(reception.left)
+    # A browser may leave while something is drawn for it.
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     try:
-        door = FrontDoor(host, port, server.get_port(), reception.visited)
+        with open_house(store, host, port):
+            shown = f"[{host}]" if ":" in host else host
+            print(f"symgrasp: http://{shown}:{port}", flush=True)
+            threading.Event().wait()
     except OSError as error:  # taken meanwhile
-        server.stop()
         raise _busy(port, (error.strerror or str(error)).lower()) from error
-    shown = f"[{host}]" if ":" in host else host
-    print(f"symgrasp: http://{shown}:{port}", flush=True)
-    try:
-        threading.Event().wait()
     except KeyboardInterrupt:
         print("\nsymgrasp: stopped", flush=True)
-    finally:
-        door.close()
-        reception.close()
-        server.stop()
 
 
 def _warm_store(scene: str) -> Store:

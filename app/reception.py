@@ -5,19 +5,43 @@ from __future__ import annotations
 import logging
 import secrets
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import viser
 
 from app.compute import Store
-from app.front_door import HELLO, Visit
+from app.front_door import HELLO, FrontDoor, Visit
 from app.session import Session
+from app.snapshot import quiet_server, stop_quietly
 
-__all__ = ["Reception"]
+__all__ = ["Reception", "open_house"]
 
 log = logging.getLogger(__name__)
 
 STYLE = "font:13px/1.5 system-ui,sans-serif;margin:12px"
+
+
+@contextmanager
+def open_house(store: Store, host: str, port: int) -> Iterator[Reception]:
+    """Serve the page on a port while the ``with`` block runs.
+
+    Raises:
+        OSError: the port cannot be listened on.
+    """
+    server = quiet_server()
+    reception = Reception(store, lambda client_id: client_id in server.get_clients())
+    server.on_client_connect(reception.arrived)
+    server.on_client_disconnect(reception.left)
+    try:
+        door = FrontDoor(host, port, server.get_port(), reception.visited)
+        try:
+            yield reception
+        finally:
+            door.close()
+    finally:
+        reception.close()
+        stop_quietly(server)
 
 
 class Reception:

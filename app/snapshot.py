@@ -15,7 +15,7 @@ from app.links import Camera
 from app.state import State
 from app.view import SceneView
 
-__all__ = ["any_port", "quiet_server", "snapshot_html"]
+__all__ = ["any_port", "quiet_server", "snapshot_html", "stop_quietly"]
 
 
 def any_port() -> int:
@@ -31,6 +31,12 @@ def quiet_server() -> viser.ViserServer:
         server = viser.ViserServer(host="127.0.0.1", port=any_port(), verbose=False)
     server.scene.world_axes.visible = False
     return server
+
+
+def stop_quietly(server: viser.ViserServer) -> None:
+    """Stop a server without its farewell."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
 
 
 def snapshot_html(state: State, camera: Camera, fov: float) -> str:
@@ -59,7 +65,7 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
         start.up = (0.0, 0.0, 1.0)
         return server.get_scene_serializer().as_html(dark_mode=state.dark)
     finally:
-        server.stop()
+        stop_quietly(server)
 
 
 def _ignore(row: int, column: int) -> None:

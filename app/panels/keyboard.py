@@ -52,6 +52,9 @@ class Keyboard(Panel):
         self.command("Add a task with the object here", lambda: change(State.add_task), "I")
         self.command("Next task of the plan", lambda: change(lambda s: _step(s, 1)), "pagedown")
         self.command("Previous task of the plan", lambda: change(lambda s: _step(s, -1)), "pageup")
+        self.command("Make a link", actions.make_link)
+        self.command("Save the scene (YAML)", actions.save_scene, "S", "cmd/ctrl")
+        self.command("Save the 3D view (HTML)", actions.save_view)
         self.command("Next scene", self._next_scene, "N")
         for name in scenes:
             self.command(f"Open {name}", lambda name=name: actions.open_scene(name))

@@ -126,15 +126,21 @@ class Panel:
         meanwhile.
         """
 
+        # On the event loop, at once: in a thread of a pool the value might have been written over
+        # meanwhile, and callbacks overtake each other. A change of the state takes no time.
         @widget.on_update
-        def _(event: viser.GuiEvent[Any]) -> None:
+        async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 value = widget.value
                 self.actions.change(lambda state: change(state, value), origin)
 
     def on_choice(self, widget: Any, do: Callable[[str], None]) -> None:
         """Say what a choice of a person does."""
-        widget.on_update(lambda event: do(widget.value) if event.client is not None else None)
+
+        @widget.on_update
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                do(widget.value)
 
 
 def within(slider: viser.GuiSliderHandle[float], value: float) -> float:

@@ -1,0 +1,248 @@
+"""Many sessions on one server, without browsers: what they share and leave, what breaks and is mended."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import logging
+import random
+import re
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from app.compute import Store
+from app.reception import Reception, open_house
+from app.session import Session
+from app.snapshot import any_port
+from app.view import SceneView
+from symgrasp.maps import MapMaker
+from symgrasp.world import BulletWorld
+from tests.app.wire import Wire
+from tests.conftest import write_scene
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+
+@dataclass
+class House:
+    """A server, and the port of its door."""
+
+    reception: Reception
+    port: int
+
+    def visit(self, query: str = "") -> Wire:
+        return Wire(self.port, query)
+
+    def wait_until_empty(self) -> None:
+        """Wait until every session has been closed, with its threads."""
+        for thread in threading.enumerate():
+            if thread.name.startswith(("worker", "painter")):
+                thread.join(30)
+        deadline = time.monotonic() + 30
+        while self.reception.open and time.monotonic() < deadline:
+            threading.Event().wait(0.01)
+        assert self.reception.open == 0
+
+
+@pytest.fixture(scope="module")
+def house() -> Iterator[House]:
+    store = Store("bottle_on_table")
+    store.warm()
+    port = any_port()
+    with open_house(store, "127.0.0.1", port) as reception:
+        yield House(reception, port)
+
+
+def picture(html: str) -> str:
+    """The map that is shown, as it is sent."""
+    found = re.search(r'<img alt="map" src="([^"]+)"', html)
+    return found[1] if found else ""
+
+
+def ready(html: str) -> bool:
+    """Whether the newest map is shown and nothing is being done."""
+    return bool(picture(html)) and "Ready." in html and "earlier pose" not in html
+
+
+def alive(*kinds: type) -> list[int]:
+    gc.collect()
+    return [sum(isinstance(thing, kind) for thing in gc.get_objects()) for kind in kinds]
+
+
+def megabytes() -> float:
+    """Memory of this process, without what the C library keeps for later."""
+    if sys.platform != "linux":
+        return 0.0
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
+
+
+def test_a_hundred_sessions_come_and_go_and_leave_nothing(house):
+    def come_and_go(k: int) -> None:
+        with house.visit() as visitor:
+            first = picture(visitor.wait_for(ready))
+            if k % 5 == 0:  # needs a physics world
+                visitor.set("x (cm)", 40 + 0.1 * k)
+                visitor.wait_for(lambda html: picture(html) != first and ready(html))
+
+    def ten_at_once(round_: int) -> None:
+        threads = [threading.Thread(target=come_and_go, args=(10 * round_ + k,)) for k in range(10)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        house.wait_until_empty()
+
+    ten_at_once(0)
+    kinds = (Session, SceneView, BulletWorld)
+    before, threads, memory = alive(*kinds), threading.active_count(), megabytes()
+    for round_ in range(1, 11):
+        ten_at_once(round_)
+    assert alive(*kinds) == before == [0, 0, 0]
+    assert threading.active_count() <= threads + 32  # viser's pool grows up to this many
+    assert megabytes() - memory < 60  # maps that the store keeps; a world alone takes some 10
+
+
+def test_nobody_sees_the_drags_of_others(house):
+    with house.visit() as one, house.visit("scene=soda_can") as other:
+        first = picture(one.wait_for(ready))
+        can = other.wait_for(lambda html: ready(html) and "soda_can" in html)
+        for degrees in range(0, 90, 3):
+            one.set("Rotation (°)", float(degrees))
+        turned = one.wait_for(lambda html: picture(html) != first and ready(html))
+        other.set("Flat map", False)
+        other.trigger("Next roll")
+        seen = other.wait_for(lambda html: picture(html) != picture(can) and ready(html))
+        assert "soda_can" in seen
+        assert "soda_can" not in turned
+        rotations = [w["value"] for w in other.widgets.values() if w.get("label") == "Rotation (°)"]
+        assert rotations == [0.0]
+
+
+def test_whoever_has_not_come_through_the_door_gets_no_session(house):
+    class Stranger(Wire):
+        def _greet(self, path: str) -> None:
+            self.met = path
+
+    house.wait_until_empty()
+    with Stranger(house.port) as stranger:
+        assert "Loading" in stranger.wait_for("Loading")
+        assert house.reception.open == 0
+        assert [w for w in stranger.widgets.values() if w.get("label")] == []
+
+
+def test_a_crash_is_told_loses_nothing_and_can_be_restarted(house, monkeypatch):
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("Rotation (°)", 20.0)
+        with monkeypatch.context() as broken:
+            broken.setattr(MapMaker, "map", lambda *_, **__: 1 / 0)
+            visitor.set("x (cm)", 51.5)
+            visitor.wait_for("unexpected ZeroDivisionError: division by zero; what you set is kept")
+            visitor.wait_for(lambda _: any(w.get("label") == "Restart" for w in visitor.widgets.values()))
+        visitor.set("Restart", True)
+        with house.visit("at.pick=51.5,0,0,0,0,0&turn=20") as fresh:
+            right = picture(fresh.wait_for(ready))
+        html = visitor.wait_for(lambda html: picture(html) == right)
+        assert "ZeroDivisionError" not in html
+
+
+def test_cancelling_takes_effect_while_the_map_is_computed(house, monkeypatch):
+    stopped = threading.Event()
+
+    def endless(self, *args, progress, **kwargs):
+        try:
+            while True:
+                progress(0.5)
+                stopped.wait(0.001)
+        except BaseException:
+            stopped.set()
+            raise
+
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        with monkeypatch.context() as slow:
+            slow.setattr(MapMaker, "map", endless)
+            visitor.set("x (cm)", 52.5)
+            visitor.wait_for("Computing the map of pick … 50 %")
+            visitor.set("Rotation (°)", 10.0)  # the page lives meanwhile
+            visitor.set("Cancel", True)
+            visitor.wait_for("Stopped: no map for this pose yet.")
+            assert stopped.wait(30)
+        visitor.set("Compute the map", True)
+        visitor.wait_for(ready)
+
+
+CHOICES = {
+    "Rotation (°)": [-120.0, 0.0, 15.25, 90.0],
+    "x (cm)": [40.0, 50.0, 55.0],
+    "z (cm)": [0.0, 10.0],
+    "Lean (°)": [0.0, 20.0],
+    "h (cm)": [2.0, 10.0, 99.0],
+    "θ (°)": [-170.0, 0.0, 60.0],
+    "Roll": ["either", "0°", "180°"],
+    "Flat map": [True, False],
+    "Drag handles": [True, False],
+    "Colours show": ["reason", "feasible", "clearance"],
+    "Dark": [True, False],
+    "Object": ["the scene's own", "wine_bottle"],
+    "Task": ["pick", "pour", "place"],
+    "Undo": None,
+    "Redo": None,
+    "Put it back": [True],
+    "Let go": [True],
+    "Cancel": [True],
+    "One grasp for all tasks": [True],
+    "Scene": ["bottle_on_table", "pick_pour_place"],
+}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hundreds_of_random_actions_end_in_the_picture_that_a_fresh_page_shows(house, caplog, seed):
+    caplog.set_level(logging.ERROR)
+    chance = random.Random(seed)
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        for _ in range(150):
+            label = chance.choice(list(CHOICES))
+            if CHOICES[label] is None:
+                visitor.trigger(label)
+            elif any(w.get("label") == label for w in visitor.widgets.values()):
+                visitor.set(label, chance.choice(CHOICES[label]))
+            if chance.random() < 0.2:
+                visitor.wait_for(lambda html: bool(picture(html)))
+        visitor.wait_for_quiet()
+        visitor.set("x (cm)", 53.0)  # also ends whatever is being planned or was cancelled
+        visitor.wait_for_quiet()
+        visitor.set("h (cm)", 10.0)
+        html = visitor.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
+        visitor.trigger("Make a link")
+        made = visitor.wait_for('class="sg-link"')
+        query = re.findall(r'href="[^"?]*\?([^"]*)"', made)[-1].replace("&amp;", "&")
+        with house.visit(query) as fresh:
+            again = fresh.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
+        for part in (picture, title, legend):
+            assert part(again) == part(html)
+    assert caplog.records == []
+
+
+def title(html: str) -> str:
+    return re.findall(r'<div class="sg sg-title"[^>]*>(.*?)</div>', html)[0]
+
+
+def legend(html: str) -> str:
+    return re.findall(r'<div class="sg-legend">(.*?)</div></div>', html)[0]
+
+
+def test_a_scene_from_a_file_may_be_hostile_in_every_name(house, content, tmp_path):
+    content["name"] = "<script>"
+    port = any_port()
+    with open_house(Store(str(write_scene(tmp_path, content))), "127.0.0.1", port), Wire(port) as visitor:
+        assert "<script>" not in visitor.wait_for(ready)
