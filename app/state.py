@@ -1,33 +1,23 @@
-"""What one browser shows, as plain data, and every change to it: no widgets, no threads, no I/O.
-
-The object stands at ``T_world_object = base · Rz(delta)``: the base pose is what a map is
-computed for, and δ, the turn about the object's own axis, only shifts that map (equation 3).
-"""
+"""Every change to what one browser shows: no widgets, no threads, no I/O."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.asking import Busy, Check, Explained, ExplainRequest, Request
-from app.history import History
-from app.looking import Looking
-from app.motion import Motion
-from app.plan_book import Kind, OpenedPlan, PlanBook
+from app.asking import Busy, Check, Explained, Request
+from app.facts import Pick
+from app.leafing import Leafing
+from app.plan_book import OpenedPlan, PlanBook
 from app.scene_files import Loaded
 from app.task_list import TaskList
-from app.things import OWN, Thing
-from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
+from app.things import Thing
+from app.values import MapResult, ObjectPose, PlanResult, RollChoice
 from symgrasp.errors import InputError
-from symgrasp.explain import Explanation, Verdict
-from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.manifold import wrap
-from symgrasp.plan import PlanTask
-from symgrasp.planners.bimanual import ClimbStep
-from symgrasp.poses import Array, rotation_z
+from symgrasp.poses import Array
 from symgrasp.scene import Scene
 
 __all__ = ["Pick", "State"]
@@ -36,260 +26,15 @@ GIZMO_NOISE = 1e-6
 """Change of position (m) or axis below which the gizmo only turned: browsers send rounded numbers."""
 
 
-@dataclass(frozen=True)
-class Pick:
-    """A grasp that was picked, in the object's frame: h (m), θ (rad), and the roll unless open."""
-
-    h: float
-    theta: float
-    roll: int | None = None
-
-
 @dataclass(frozen=True, eq=False)
-class State:
-    """One browser's scene, pose, map, pick and plan; a change returns a new one.
-
-    Attributes:
-        scene: the scene as loaded, with the object that was put into it.
-        scene_name: what it was chosen by.
-        task, arm: the names chosen.
-        thing: the object that was put into the scene in place of its own.
-        uploaded: the object that was uploaded last.
-        roll: the rolls shown.
-        poses: task → base pose, of the tasks that were moved.
-        delta: turn (rad) of the object about its axis.
-        result: the newest map, maybe of an earlier request.
-        refused: what was cancelled or failed: not tried again unasked.
-        pick: the grasp picked.
-        looking: how the map is looked at, and what was found out about it for that.
-        book: the plans that were found, and how they are leafed through.
-        step: which task of the plan is shown; None once the person has moved on.
-        busy: what is being computed.
-        problem: one line about what went wrong last.
-        gizmo: whether the handles that drag the object are seen.
-        errors: whether the object's surface shows the symmetry error of its mesh and not the map.
-        board: whether the map is laid out in the scene as well.
-        dark: whether the page is dark.
-        loaded: the scene that was uploaded last.
-        link: the address that was made last, to open the page as it was then.
-        history: what can be undone and redone.
-    """
-
-    scene: Scene
-    scene_name: str
-    task: str
-    arm: str
-    thing: Thing | None = None
-    uploaded: Thing | None = None
-    roll: RollChoice = RollChoice.EITHER
-    poses: Mapping[str, ObjectPose] = field(default_factory=dict)
-    delta: float = 0.0
-    result: MapResult | None = None
-    refused: Request | None = None
-    pick: Pick | None = None
-    looking: Looking = field(default_factory=Looking)
-    book: PlanBook = field(default_factory=PlanBook)
-    step: int | None = None
-    busy: Busy | None = None
-    problem: str = ""
-    gizmo: bool = False
-    errors: bool = False
-    board: bool = True
-    dark: bool = False
-    loaded: Loaded | None = None
-    link: str = ""
-    history: History = field(default_factory=History)
+class State(Leafing):
+    """One browser's scene, pose, map, pick and plan; a change returns a new one."""
 
     @staticmethod
     def of(scene: Scene, name: str) -> State:
         """Return the first state of a scene."""
         task = scene.task()
         return State(scene, name, task.name, task.arms[0])
-
-    # -- what follows from it ---------------------------------------------------------------
-
-    @cached_property
-    def request(self) -> MapRequest:
-        """The map that belongs to the task, arm and base pose."""
-        return MapRequest(self.scene, self.arm, self.task, self.poses.get(self.task))
-
-    @cached_property
-    def base(self) -> ObjectPose:
-        """The object's base pose."""
-        return self.request.pose or ObjectPose.of(self.request.T_world_object)
-
-    @cached_property
-    def T_world_object(self) -> Array:
-        """Where the object stands (4, 4)."""
-        return self.request.T_world_object @ rotation_z(self.delta)
-
-    @property
-    def choice(self) -> str:
-        """What the object was chosen by."""
-        return self.thing.choice if self.thing else OWN
-
-    @property
-    def own_scene(self) -> Scene | None:
-        """The uploaded scene, if that is the one shown, whatever was put into it."""
-        return self.loaded.scene if self.loaded and self.loaded.choice == self.scene_name else None
-
-    @property
-    def is_current(self) -> bool:
-        """Whether the map shown is the one for the object's pose."""
-        return self.result is not None and self.result.request == self.request
-
-    @property
-    def unmet(self) -> Request | None:
-        """What is asked for first and not there."""
-        if not self.is_current:
-            return self.request
-        return self.looking.unmet(self.request, self.delta, self.base_cell)
-
-    @property
-    def lacking(self) -> Request | None:
-        """The same, unless it was cancelled or failed: then everything waits."""
-        return None if self.unmet == self.refused else self.unmet
-
-    @property
-    def wanted(self) -> Request | None:
-        """What to begin computing now; while a plan is made, its maps are."""
-        lacking = self.lacking
-        return None if lacking is None or (self.busy and self.busy.goes_first(lacking)) else lacking
-
-    @property
-    def is_obsolete(self) -> bool:
-        """Whether something is being computed that nobody waits for any more."""
-        return bool(self.busy and self.busy.request) and self.lacking is None
-
-    @property
-    def is_waiting(self) -> bool:
-        """Whether something is being computed that takes long enough to say so."""
-        return self.busy is not None and (self.busy.request is None or self.busy.late or self.result is None)
-
-    @property
-    def is_fresh(self) -> bool:
-        """Whether the map shown is the one for the object's pose, or will be in a moment."""
-        if self.is_current:
-            return True
-        follows = self.result is not None and self.result.request.differs_in_pose(self.request)
-        return follows and self.busy is not None and not self.is_waiting
-
-    @property
-    def inputs(self) -> tuple[object, ...]:
-        """Everything that a widget or the gizmo shows and can change."""
-        return (
-            self.scene, self.scene_name, self.task, self.arm, self.roll, self.base, self.delta, self.pick,
-            self.step, self.gizmo, self.errors, self.board, self.dark, self.thing, self.uploaded, self.loaded,
-            *self.looking.inputs,
-            *self.book.inputs,
-        )  # fmt: skip
-
-    @cached_property
-    def map(self) -> FeasibilityMap | None:
-        """The map over the object as it is turned; it may be of an earlier pose."""
-        return self.result.map.shift(self.delta) if self.result else None
-
-    @cached_property
-    def cell(self) -> Cell | None:
-        """The cell of `map` that holds the pick."""
-        if self.pick is None or self.map is None:
-            return None
-        row, column = self.map.manifold.cell(self.pick.h, self.pick.theta)
-        roll = self.roll.roll(self.map, row, column) if self.pick.roll is None else self.pick.roll
-        return Cell(roll, row, column)
-
-    @cached_property
-    def base_cell(self) -> Cell | None:
-        """The same cell of the map before it is shifted: it has the same tool pose."""
-        if self.cell is None or self.result is None:
-            return None
-        grid = self.result.map.manifold
-        return self.cell.turned(grid.shift(self.delta)[1], grid.angles)
-
-    @property
-    def explanation(self) -> Explanation | None:
-        """What becomes of the candidates of the picked cell, once that is known."""
-        found = self.looking.explained
-        if found is None or not self.is_current or self.base_cell is None:
-            return None
-        return found.explanation if found.request == ExplainRequest(self.request, self.base_cell) else None
-
-    @property
-    def candidate(self) -> int | None:
-        """Index of the candidate shown: the one chosen, else the map's witness or what came closest."""
-        if self.explanation is None or not self.explanation.verdicts:
-            return None
-        if self.looking.candidate is not None:
-            return min(self.looking.candidate, len(self.explanation.verdicts) - 1)
-        witness = self.map.witness(self.cell) if self.map and self.cell else None
-        picks = [(verdict.sample, verdict.branch) for verdict in self.explanation.verdicts]
-        pick = witness and (witness.sample, witness.branch)
-        return picks.index(pick) if pick in picks else 0
-
-    @property
-    def verdict(self) -> Verdict | None:
-        """The candidate shown."""
-        if self.explanation is None or self.candidate is None:
-            return None
-        return self.explanation.verdicts[self.candidate]
-
-    @property
-    def contacts(self) -> tuple[str, ...]:
-        """What the object is inside of."""
-        return self.result.contacts if self.result and self.is_current else ()
-
-    @property
-    def plan(self) -> PlanResult | None:
-        """The plan that is shown, or was until the person moved on."""
-        return self.book.plan
-
-    @cached_property
-    def shown(self) -> PlanTask | None:
-        """The task of the plan that is shown."""
-        return self.plan.plan.tasks[self.step] if self.plan and self.step is not None else None
-
-    @cached_property
-    def motion(self) -> Motion | None:
-        """Where the play is, while it is between two tasks."""
-        if self.plan is None or self.step is None or not self.book.is_between:
-            return None
-        start, share = self.book.leg
-        before, after = self.plan.plan.tasks[start : start + 2]
-        return Motion(self.scene, before, after, share)
-
-    @cached_property
-    def T_world_seen(self) -> Array:
-        """Where the object is drawn (4, 4): in the hand, while the arms are played."""
-        return self.motion.T_world_object if self.motion else self.T_world_object
-
-    @cached_property
-    def climbed(self) -> ClimbStep | None:
-        """The step of the hill climbing that is shown, if nothing else is."""
-        climb, frame = self.book.climb, self.book.frame
-        if climb is None or frame is None or self.task != climb.task or self.delta or self.pick:
-            return None
-        return climb.steps[frame]
-
-    def can_plan(self, kind: Kind) -> bool:
-        """Whether the scene has tasks for a planner."""
-        tasks = self.scene.tasks.values()
-        if kind == "sequential":
-            return any(task.arms == (self.arm,) for task in tasks)
-        if kind == "bimanual":
-            return any(len(task.arms) > 1 for task in tasks)
-        return len(tasks) > 1 and len({arm for task in tasks for arm in task.arms}) > 1
-
-    @property
-    def together(self) -> str:
-        """The task for several arms that is planned: the chosen one, or the first."""
-        names = [task.name for task in self.scene.tasks.values() if len(task.arms) > 1]
-        return self.task if self.task in names or not names else names[0]
-
-    def moved_scene(self) -> Scene:
-        """Return the scene with all tasks where they were moved to."""
-        return moved(self.scene, self.poses)
-
-    # -- changes ----------------------------------------------------------------------------
 
     def open_scene(self, scene: Scene, name: str) -> State:
         """Show another scene; what belongs to none stays."""
@@ -465,19 +210,6 @@ class State:
         pose = self.request.T_world_object
         return self.change_tasks(lambda tasks: tasks.added(pose))
 
-    def booked(self, ticket: int, book: PlanBook) -> State:
-        """Take what a planner found and show its first task, unless nobody waits for it any more."""
-        if self.busy is None or self.busy.ticket != ticket:
-            return self
-        return replace(self, book=book, busy=None, problem="", step=None, pick=None).show_step(0)
-
-    def listed(self, ticket: int, plans: tuple[PlanResult, ...], more: bool) -> State:
-        """Take further plans of the list and show the first of them."""
-        if self.busy is None or self.busy.ticket != ticket:
-            return self
-        state = replace(self, book=self.book.extended(plans, more=more), busy=None, problem="")
-        return state.choose_plan(len(self.book.plans)) if plans else state
-
     def opened(self, opened: OpenedPlan, scene: Loaded | None, plan: PlanResult | None) -> State:
         """Take a plan from a file, with its scene; one that does not hold is only reported."""
         if scene is None or plan is None:
@@ -485,83 +217,6 @@ class State:
         book = PlanBook(self.book.sequence_method, self.book.hands_method, self.book.seed)
         book = replace(book.found(plan.plan.kind, (plan,), more=False), opened=opened)
         return replace(self.load_scene(scene), book=book).show_step(0)
-
-    def turn_book(self, change: Callable[[PlanBook], PlanBook]) -> State:
-        """Change what is shown of the plans, if that is all that changes."""
-        book = change(self.book)
-        return self if book is self.book else replace(self, book=book)
-
-    def choose_plan(self, page: int) -> State:
-        """Show another plan of the list, at the same task."""
-        step = self.step or 0
-        return replace(self, book=self.book.turned_to(page)).show_step(step)
-
-    def show_step(self, step: int) -> State:
-        """Show a task of the plan: the object turned by δᵢ and the grasp on its map."""
-        return self.show_position(step)
-
-    def show_position(self, position: float) -> State:
-        """Show the plan at a position of the play: the task nearest to it, the arms maybe between two."""
-        if self.plan is None:
-            return self
-        book = self.book.at(position)
-        step = book.nearest
-        task = self.plan.plan.tasks[step]
-        hold = next((h for h in task.holds if h.arm == self.arm), task.holds[0])
-        pick = Pick(hold.grasp.h, hold.grasp.theta, 0 if np.cos(hold.grasp.roll) > 0 else 1)
-        return replace(
-            self,
-            book=book,
-            step=step,
-            task=task.name,
-            arm=hold.arm,
-            delta=task.delta,
-            pick=pick,
-            looking=self.looking.another_cell(),
-            result=self.plan.maps[task.name, hold.arm],
-            problem="",
-        )
-
-    def show_frame(self, frame: int) -> State:
-        """Show a step of the hill climbing: the hands on the maps as they were computed."""
-        climb = self.book.climb
-        if climb is None:
-            return self
-        arm = self.arm if self.arm in climb.arms else climb.arms[0]
-        return replace(
-            self,
-            book=self.book.at_frame(frame),
-            step=None,
-            task=climb.task,
-            arm=arm,
-            delta=0.0,
-            pick=None,
-            result=self.book.maps[climb.task, arm],
-            problem="",
-        )
-
-    def play_arms(self) -> State:
-        """Start or stop the play of the plan."""
-        return replace(self, book=self.book.play_arms())._followed()
-
-    def play_climb(self) -> State:
-        """Start or stop the replay of the hill climbing."""
-        return replace(self, book=self.book.play_climb())._followed()
-
-    def played(self, seconds: float) -> State:
-        """Let what is played go on; it stops where the person has moved on to something else."""
-        moving = self.book.moving
-        if not moving:
-            return self
-        if (self.step if moving == "arms" else self.climbed) is None:
-            return self.turn_book(PlanBook.still)
-        return replace(self, book=self.book.advanced(seconds))._followed()
-
-    def _followed(self) -> State:
-        """Show what the book is open at."""
-        if self.book.moving == "climb" or self.book.frame is not None:
-            return self.show_frame(self.book.frame or 0)
-        return self.show_position(self.book.position)
 
 
 def _finite(name: str, value: float) -> float:
