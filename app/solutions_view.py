@@ -12,15 +12,15 @@ from app.values import PlanResult
 
 __all__ = ["solutions_html", "worst_measures"]
 
-HEADINGS = ("", "grasp", "gap", "room along", "around", "clear")
-
 
 def solutions_html(state: State) -> str:
     """List the plans, best first, the one that is shown marked; nothing if there is no choice."""
     plans = state.book.plans
     if len(plans) < 2:
         return ""
-    rows = [_row(HEADINGS, "sg-faint")]
+    several = any(gap is not None for plan in plans for gap in plan.gaps)
+    headings = ("", "grasp", "gap" if several else "", "room along", "around", "clear")
+    rows = [_row(headings, "sg-faint")]
     for k, plan in enumerate(plans):
         look = "sg-now" if k == state.book.page else ""
         gaps = [gap for gap in plan.gaps if gap is not None]

@@ -1,0 +1,172 @@
+"""Sequences, several hands and plan files on the page, as somebody walks through them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import yaml
+from playwright.sync_api import Locator, expect
+
+from symgrasp.plan import Plan
+from symgrasp.verify import verify
+from tests.e2e.page import GraspPage
+
+SCREENSHOTS = Path(__file__).parent / "screenshots"
+
+
+def shoot(page: GraspPage, name: str) -> None:
+    SCREENSHOTS.mkdir(exist_ok=True)
+    page.page.screenshot(path=SCREENSHOTS / f"{name}.png")
+
+
+def shown(page: GraspPage, selector: str) -> Locator:
+    return page.page.locator(selector).filter(visible=True)
+
+
+def chosen(page: GraspPage, label: str) -> Locator:
+    return page.page.get_by_label(label, exact=True).filter(visible=True)
+
+
+def download(page: GraspPage, form: str, to: Path) -> Path:
+    page.choose("Format", form)
+    with page.page.expect_download() as found:
+        page.button("Download plan").click()
+    path = to / found.value.suggested_filename
+    found.value.save_as(path)
+    return path
+
+
+def open_plan(page: GraspPage, path: Path) -> None:
+    with page.page.expect_file_chooser() as chooser:
+        page.button("Open a plan").click()
+    chooser.value.set_files(path)
+
+
+def test_a_sequence_is_planned_played_changed_and_explained(open_page):
+    page = open_page(scene="pick_pour_place")
+    page.tab("Sequence")
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 3 tasks: h = ")).to_be_visible()
+    first = page.text("One grasp for 3 tasks: h = ").inner_text()
+    turned = shown(page, ".sg-sliding").nth(1).get_attribute("style")
+    page.slide("Slide by δ (%)", 0)
+    expect(shown(page, ".sg-sliding").nth(1)).to_have_attribute("style", "transform:translateX(-0.0000%)")
+    page.slide("Slide by δ (%)", 100)
+    expect(shown(page, ".sg-sliding").nth(1)).to_have_attribute("style", turned or "")
+    page.slide("Solution", 2)
+    expect(page.text(first)).to_have_count(0)
+    page.slide("Solution", 1)
+    expect(page.text(first)).to_be_visible()
+    page.button("List more solutions").click()
+    page.slide("Solution", 11)
+    expect(shown(page, ".sg-solutions .sg-now")).to_contain_text("11")
+
+    before = page.settled_view()
+    page.button("Play").click()
+    page.wait_for_change(before)
+    expect(page.button("Play")).to_be_visible()  # again, at the end
+    expect(page.slider_box("Plan step")).to_have_value("3")
+    expect(chosen(page, "Task")).to_have_value("place")
+    shoot(page, "sequence")
+
+    page.choose("Task", "pick")
+    page.button("Add a task with the object here").click()
+    expect(page.text("panda: pick → task 4 → pour → place")).to_be_visible()
+    expect(page.button("Download plan")).to_be_hidden()
+    page.slider_box("Task name").fill("table")
+    page.button("Rename").click()
+    expect(page.text("panda: pick → table → pour → place")).to_be_visible()
+    page.button("Later").click()
+    expect(page.text("panda: pick → pour → table → place")).to_be_visible()
+    page.button("Earlier").click()
+    page.choose("Task", "pick")
+    page.slide("z (cm)", -11)
+    page.choose("Task", "place")
+    page.slide("Lean (°)", 180)
+    page.slide("z (cm)", 16)
+    page.button("One grasp for all tasks").click()
+    expect(page.alerts).to_contain_text("pick and place exclude each other: they are")
+    expect(shown(page, ".sg-guilty")).to_have_text(["pick", "place"])
+    shoot(page, "conflict")
+    page.button("Plan with 1 regrasp").click()
+    expect(page.text("2 grasps, the object set down in between.")).to_be_visible()
+    expect(page.alerts.filter(has_text="exclude")).to_have_count(0)
+    expect(shown(page, ".sg-part")).to_have_count(2)
+    shoot(page, "regrasp")
+    assert page.complaints == []
+
+
+def test_hands_climb_are_compared_and_hand_over(open_page):
+    page = open_page(scene="log_two_robots")
+    page.tab("Hands")
+    page.button("All arms together").click()
+    expect(shown(page, ".sg-task")).to_contain_text("gap")
+    gap = int(shown(page, ".sg-task").inner_text().split("gap ")[1].split(" mm")[0])
+    page.choose("Method", "hill climbing (Algorithm 3)")
+    page.number("Seed", 39)
+    page.button("All arms together").click()
+    rows = shown(page, ".sg-table tr")
+    expect(rows).to_have_count(3)
+    expect(rows.nth(1)).to_contain_text("Hill climbing, seed 39")
+    expect(rows.nth(2)).to_contain_text(f"{gap} mm")
+    climbed = int(rows.nth(1).locator("td").nth(1).inner_text().removesuffix(" mm"))
+    assert climbed <= gap
+    page.slide("Climb", 1)
+    expect(page.text("start 1, position 1 of 5: prints share 22 cells")).to_be_visible()
+    overlap = page.picture("climb map left")
+    assert overlap.size
+    shoot(page, "climb")
+    page.button("Replay the climb").click()
+    expect(page.text("position 5 of 5: prints are apart")).to_be_visible()
+    expect(page.button("Replay the climb")).to_be_visible()
+
+    page.choose("Scene", "handover_between_robots")
+    expect(page.text("hand over: left and right")).to_be_visible()
+    page.button("Hand over: all tasks in order").click()
+    expect(page.text("Handed over in 3 tasks with 2 grasps.")).to_be_visible()
+    expect(shown(page, "img[alt^='plan map']")).to_have_count(4)
+    page.slide("Plan step", 2)
+    expect(chosen(page, "Task")).to_have_value("hand over")
+    shoot(page, "handover")
+    assert page.complaints == []
+
+
+def test_a_plan_goes_out_in_every_format_and_comes_back_verified(open_page, tmp_path):
+    page = open_page(scene="pick_pour_place")
+    page.tab("Sequence")
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 3 tasks: h = ")).to_be_visible()
+    path = download(page, "JSON", tmp_path)
+    plan = Plan.load(path)
+    assert verify(plan).holds
+    rows = list(csv.DictReader(download(page, "CSV", tmp_path).open()))
+    assert {row["task"] for row in rows} == {"pick", "pour", "place"}
+    trajectory = json.loads(download(page, "Trajectory", tmp_path).read_text())
+    goals = [list(task.holds[0].joints.values()) for task in plan.tasks]
+    assert np.allclose([point["positions"] for point in trajectory["panda"]["points"]], goals)
+    (region,) = yaml.safe_load_all(download(page, "TSR", tmp_path).read_text())
+    assert len(region["Bw"]) == 6
+
+    other = open_page(scene="soda_can")
+    other.tab("Sequence")
+    wrong = tmp_path / "<img src=x onerror=window.hacked=1>.json"
+    content = json.loads(path.read_text())
+    content["tasks"][1]["holds"][0]["clearance"] += 0.01
+    wrong.write_text(json.dumps(content))
+    open_plan(other, wrong)
+    expect(other.alerts).to_contain_text("does not hold, so it is not shown: 1 of")
+    expect(other.alerts).to_contain_text("tasks[1] (pour)")
+    expect(chosen(other, "Scene")).to_have_value("soda_can")
+    shoot(other, "refused_plan")
+    open_plan(other, path)
+    expect(other.text(f"{path.name} holds: ")).to_be_visible()
+    expect(other.text("One grasp for 3 tasks: h = ")).to_be_visible()
+    expect(chosen(other, "Scene")).to_have_value(f"{path.name} (upload)")
+    other.slide("Plan step", 3)
+    expect(chosen(other, "Task")).to_have_value("place")
+    assert Plan.load(download(other, "JSON", tmp_path)) == plan
+    assert other.page.evaluate("window.hacked") is None
+    assert page.complaints == other.complaints == []
