@@ -529,15 +529,28 @@ class BulletWorld:
         """Return the smallest distance (m) of all pairs that are checked for an arm, at most ``limit``."""
         return min((limit - c.depth for c in self.near(arm, limit)), default=limit)
 
-    def near(self, arm: Arm, distance: float) -> list[Collision]:
-        """Return the pairs checked for an arm that are closer than a distance (m), as if it were a margin."""
-        return [c for query in self._queries[arm.name] for c in self._ask(query, distance)]
+    def near(self, arm: Arm, distance: float, among: Near | None = None) -> list[Collision]:
+        """Return the pairs checked for an arm that are closer than a distance (m), as if it were a margin.
+
+        Args:
+            arm: the arm.
+            distance: how close.
+            among: what is asked about; everything if None.
+        """
+        queries = (q for q in self._queries[arm.name] if among is None or q.key in among)
+        return [c for query in queries for c in self._ask(query, distance)]
+
+    def margin_for(self, reason: Reason) -> float:
+        """Return the distance (m) that bodies must keep, by the kind of collision.
+
+        A margin is kept from what the arm must not touch; the hand is close to the object by design,
+        and some links are always close to each other.
+        """
+        return self.margin if reason in _KEPT_AT_A_DISTANCE else 0.0
 
     def _ask(self, query: _Query, margin: float | None = None) -> list[Collision]:
         if margin is None:
-            # A margin is kept from what the arm must not touch; the hand is close to the object by
-            # design, and some links are always close to each other.
-            margin = self.margin if query.reason in _KEPT_AT_A_DISTANCE else 0.0
+            margin = self.margin_for(query.reason)
         links = () if query.link_a is None else (query.link_a, query.link_b)
         points = pybullet.getClosestPoints(query.a, query.b, margin, *links, physicsClientId=self._client)
         return [

@@ -252,10 +252,11 @@ def _in_place(scratch):
 
 
 @njit(**FAST)
-def mark_near(body, tree, scratch, reach, near, near_pairs):
+def mark_near(body, size, tree, scratch, reach, near, near_pairs):
     """Mark what has a box within ``reach`` (m) of that of a piece that moves, where the two may not touch.
 
     Args:
+        size: of all pieces, see `Solids`.
         near: (P,) bool receives marks for the pieces of the object and those that stand still.
         near_pairs: (.,) bool receives marks for the pairs of the robot's own pieces: ``hand_pairs``,
             then ``base_pairs``, then ``arm_pairs``.
@@ -267,8 +268,9 @@ def mark_near(body, tree, scratch, reach, near, near_pairs):
             if _far(box, k, node, tree.box, reach):
                 node = tree.skip[node]
                 continue
-            if tree.piece[node] >= 0:
-                near[tree.piece[node]] = True
+            piece = tree.piece[node]
+            if piece >= 0 and not near[piece]:
+                near[piece] = not _boxes_apart(size, scratch.pose, k, piece, reach)
             node += 1
         if k >= hands or not body.touch[k]:
             for i in body.objects:

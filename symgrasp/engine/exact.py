@@ -85,6 +85,10 @@ class ExactEngine:
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._rig: Rig = rig(world, arm, self._opening)
         self._scratch = new_scratch(self._rig.pose, self._rig.solids, arm.dof)
+        # How far off pairs are of which the arm moves neither; those with the object are asked for every map.
+        self._reach = max(CLEARANCE_LIMIT, scene.settings.margin)
+        pairs = world.near(arm, self._reach)
+        self._resting = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._rests(c)]
 
     @staticmethod
     def knows(arm: Arm) -> bool:
@@ -143,18 +147,22 @@ class ExactEngine:
         return draft.finish(task)
 
     def _still(self) -> _Still:
-        """Ask how far apart the bodies are that the arm does not move: it is the same for all candidates."""
-        name, moving, limit = self.arm.robot.name, self._rig.moving, CLEARANCE_LIMIT
-        gap, blocked = limit, None
-        for near in self.world.near(self.arm, limit):
-            own = [body.link for body in (near.a, near.b) if body.body == name]
-            if own and not moving.intersection(own):
-                gap = min(gap, limit - near.depth - HIT_BAND)
-        for c in self.world.collisions([self.arm]):
-            own = [body.link for body in (c.a, c.b) if body.body == name]
-            if own and not moving.intersection(own):
-                blocked = blocked or c
+        """Say how far apart the bodies are that the arm does not move: it is the same for all candidates."""
+        found = self.world.near(self.arm, self._reach, (self.scene.file.object.name,))
+        gap, blocked = CLEARANCE_LIMIT, None
+        for c in [*self._resting, *filter(self._rests, found)]:
+            distance = self._reach - c.depth
+            gap = min(gap, distance - HIT_BAND)
+            depth = self.world.margin_for(c.reason) - distance
+            if depth > 0 and (blocked is None or depth > blocked.depth):
+                blocked = c._replace(depth=depth)
         return _Still(max(gap, 0.0), blocked)
+
+    def _rests(self, c: Collision) -> bool:
+        """Whether a pair is one of the robot's own bodies of which the arm moves none."""
+        name = self.arm.robot.name
+        own = [body.link for body in (c.a, c.b) if body.body == name]
+        return bool(own) and not self._rig.moving.intersection(own)
 
     def _search(
         self,
@@ -228,7 +236,7 @@ class ExactEngine:
         place_hand(rig.body, rig.solids, scratch, self._T_world_base, T_base_tool, row)
         place_arm(rig.body, rig.solids, scratch, q)
         near, pairs = np.zeros(len(rig.names), dtype=bool), np.zeros(len(rig.pairs), dtype=bool)
-        mark_near(rig.body, rig.tree, scratch, self.world.margin + FREE_BAND, near, pairs)
+        mark_near(rig.body, rig.solids.size, rig.tree, scratch, self.world.margin + FREE_BAND, near, pairs)
         bodies = {rig.names[k].body for k in np.flatnonzero(near)}
         return bodies | {rig.pairs[k] for k in np.flatnonzero(pairs)}
 
