@@ -76,6 +76,7 @@ class Busy:
         request: what it answers, None for what a person asked for.
         share: how much of it is done.
         late: whether it takes so long that the page says so and newer requests interrupt it.
+        compiling: whether it waits for code that is compiled for the first time.
     """
 
     ticket: int
@@ -83,6 +84,7 @@ class Busy:
     request: Request | None = None
     share: float = 0.0
     late: bool = False
+    compiling: bool = False
 
     def goes_first(self, request: Request) -> bool:
         """Whether a request waits for this computation instead of taking its place.

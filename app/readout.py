@@ -113,6 +113,8 @@ def status_html(state: State) -> str:
     doing = "Ready."
     if state.busy and state.is_waiting:
         doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %"
+        if state.busy.compiling:
+            doing = "Compiling, once on this machine: a minute …"
     elif not state.busy and not state.is_current:
         doing = "Stopped: no map for this pose yet."
     return (

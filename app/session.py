@@ -28,6 +28,7 @@ from app.things import OWN, Thing, check_size, from_library, from_mesh
 from app.values import MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
+from symgrasp.compiling import telling_of_compiling
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import Progress
 from symgrasp.scene import Scene
@@ -62,6 +63,7 @@ class Session:
         self._changed = threading.Condition()
         self._drawn: State | None = None
         self._write_inputs = self._move_gizmo = True
+        self._writing = False
         self._closed = False
         self.bench = Workbench(store)
         self.plans = PlanDesk(self, self.bench)
@@ -272,7 +274,8 @@ class Session:
         if self.state is not None:
             state = remember(self.state, state, origin, time.monotonic())
         if self.state is None or state.inputs != self.state.inputs:
-            self._write_inputs |= origin != "inputs"
+            # What is being written now may just have been written over what a person entered.
+            self._write_inputs |= origin != "inputs" or self._writing
             self._move_gizmo |= origin != "gizmo"
         self.state = state
         self._changed.notify()
@@ -316,10 +319,15 @@ class Session:
     ) -> None:
         """Give the worker something to do, in place of what it does now."""
         ticket, begun = next(self._tickets), time.monotonic()
+
+        def telling(progress: Progress) -> Any:
+            with telling_of_compiling(lambda: self.change(lambda s: s.compiles(ticket))):
+                return run(progress)
+
         self.change(lambda s: s.started(ticket, label, request))
         self.worker.submit(
             Job(
-                run=run,
+                run=telling,
                 progress=lambda share: self.change(
                     lambda s: s.progressed(ticket, share, late=time.monotonic() - begun > LATE)
                 ),
@@ -343,6 +351,7 @@ class Session:
                     return
                 state, write_inputs, move_gizmo = self.state, self._write_inputs, self._move_gizmo
                 self._drawn, self._write_inputs, self._move_gizmo = state, False, False
+                self._writing = write_inputs
             assert state is not None
             try:
                 self.controls.show(state, write_inputs=write_inputs)
@@ -352,3 +361,5 @@ class Session:
                 text = f"the picture could not be drawn: {type(error).__name__}: {error}"
                 if state.problem != text:
                     self.change(lambda s, text=text: s.failed(text))
+            with self._changed:
+                self._writing = False

@@ -153,7 +153,15 @@ class State(Leafing):
         """The computation is this far, and so late by now that the page says so."""
         if self.busy is None or self.busy.ticket != ticket:
             return self
-        return replace(self, busy=replace(self.busy, share=share, late=late or self.busy.late))
+        return replace(
+            self, busy=replace(self.busy, share=share, late=late or self.busy.late, compiling=False)
+        )
+
+    def compiles(self, ticket: int) -> State:
+        """The computation waits for code that is compiled, and goes on with its next progress."""
+        if self.busy is None or self.busy.ticket != ticket:
+            return self
+        return replace(self, busy=replace(self.busy, late=True, compiling=True))
 
     def map_arrived(self, ticket: int, result: MapResult) -> State:
         """Take a map: that of the object's pose, or on the way there that of an earlier one."""

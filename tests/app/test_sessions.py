@@ -14,9 +14,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numba
 import pytest
 
 from app.compute import Store
+from app.panels.status_panel import StatusPanel
 from app.reception import Reception, open_house
 from app.session import Session
 from app.snapshot import any_port
@@ -178,6 +180,49 @@ def test_cancelling_takes_effect_while_the_map_is_computed(house, monkeypatch):
             assert stopped.wait(30)
         visitor.set("Compute the map", True)
         visitor.wait_for(ready)
+
+
+def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(house, monkeypatch):
+    begun, pause = threading.Event(), threading.Event()
+    show = StatusPanel.show
+
+    def slow(panel, state):
+        """Draw the object that was put back only when it has been moved once more."""
+        if state.base.x == 0.55:
+            begun.set()
+            while panel.actions.state.base.x == 0.55:
+                pause.wait(0.001)
+        show(panel, state)
+
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("x (cm)", 51.0)
+        visitor.wait_for_quiet()
+        monkeypatch.setattr(StatusPanel, "show", slow)
+        visitor.trigger("Put the object back")
+        assert begun.wait(30)
+        visitor.set("x (cm)", 53.0)
+        visitor.wait_for_quiet()
+        visitor.wait_for(ready)
+        assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [53.0]
+
+
+def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
+    told = threading.Event()
+    compute = MapMaker.map
+
+    def compiles_first(self, *args, progress, **kwargs):
+        assert numba.njit(lambda x: x + 1)(1) == 2
+        told.wait(30)
+        return compute(self, *args, progress=progress, **kwargs)
+
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        monkeypatch.setattr(MapMaker, "map", compiles_first)
+        visitor.set("x (cm)", 54.5)
+        visitor.wait_for("Compiling, once on this machine: a minute …")
+        told.set()
+        assert "Compiling" not in visitor.wait_for(ready)
 
 
 CHOICES = {
