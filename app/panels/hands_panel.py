@@ -9,6 +9,7 @@ import viser
 
 from app.hands_view import comparison_html, hands_html
 from app.panels.panel import Actions, Panel
+from app.plan_book import FIRST_SEED
 from app.readout import hands_line
 from app.state import State
 from app.why_view import why_html
@@ -34,7 +35,7 @@ class HandsPanel(Panel):
             self.method,
             lambda s, v: s.turn_book(lambda book: replace(book, hands_method=HANDS_METHODS[v])),
         )
-        self.seed = gui.add_number("Seed", 0, min=0, max=2**31 - 1, step=1, visible=False)
+        self.seed = gui.add_number("Seed", FIRST_SEED, min=0, max=2**31 - 1, step=1, visible=False)
         self.on(self.seed, lambda s, v: s.turn_book(lambda book: replace(book, seed=int(v))), "inputs")
         self.run = self.button("All arms together", viser.Icon.USERS, lambda: plans.run("bimanual"))
         self.handover = self.button(
