@@ -133,13 +133,19 @@ class GraspPage:
         chooser.value.set_files(path)
 
     def number(self, label: str, value: float) -> None:
-        box = self.page.get_by_label(label, exact=True)
-        box.fill(f"{value:g}")
-        box.press("Enter")
+        self._enter(self.page.get_by_label(label, exact=True), value)
 
     def slide(self, label: str, value: float) -> None:
         """Set a slider through its number box; arrow keys would turn the camera as well."""
-        box = self.slider_box(label)
+        self._enter(self.slider_box(label), value)
+
+    def _enter(self, box: Locator, value: float) -> None:
+        """Type a number over the one in a box.
+
+        The box looks where the caret was when a key went down, to tell what is new in it. It is in the
+        wrong place for a text that comes without a key: then the box may lose it.
+        """
+        box.press("ControlOrMeta+a")
         box.fill(f"{value:g}")
         box.press("Enter")
 
