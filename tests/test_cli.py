@@ -45,7 +45,7 @@ def test_map_writes_every_format(small, tmp_path, capsys, ending):
         assert len(content["reason"][1]) == len(content["h"]) == 6
         assert "FEASIBLE" in content["reasons"]
     else:
-        assert out.read_bytes().startswith(b"\x89PNG")
+        assert out.read_bytes().startswith({"png": b"\x89PNG", "svg": b"<?xml"}[ending])
 
 
 def test_plan_sequential_and_bimanual(tmp_path, capsys):

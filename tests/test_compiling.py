@@ -99,7 +99,7 @@ def test_changed_sources_are_compiled_anew(tmp_path):
             "from symgrasp.engine.outer import outer\n"
             "with telling_of_compiling(lambda: print('compiling')):\n    print(outer(7))\n"
         )
-        command = [sys.executable, "-c", program]
+        command = [sys.executable, "-B", "-c", program]  # Python's own cache tells files by the second
         done = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": ""}, capture_output=True, check=True)
         outputs.append(done.stdout.decode())
     assert outputs == ["compiling\n14\n", "14\n", "compiling\n21\n"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -42,6 +41,18 @@ CALIBRATION = 60
 
 CUTS = 10
 """Along two sides each, to make a hundred boxes of one."""
+
+SCALES = """
+import resource, subprocess, sys, time
+start = time.perf_counter()
+subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
+peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+print(time.perf_counter() - start, peak / (1e6 if sys.platform == "darwin" else 1e3))
+"""
+"""Runs a command and prints its time (s) and the most memory (MB) it took.
+
+A small process of its own: what a child weighs counts from before it has let go of its parent's memory.
+"""
 
 WITHOUT_COAL = "maps against Pinocchio and Coal: not measured, needs pip install 'symgrasp[bench]'"
 
@@ -204,16 +215,15 @@ def process(runs: int) -> Iterator[Figure]:
     """Run the command line as a process: what a first look takes on a machine that has compiled before."""
     command = [sys.executable, "-m", "symgrasp", "map", "bottle_on_table"]
     subprocess.run(command, check=True, capture_output=True)
-    times, peaks = [], []
-    for _ in range(runs):
-        start = perf_counter()
-        child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-        _, status, usage = os.wait4(child.pid, 0)
-        child.returncode = os.waitstatus_to_exitcode(status)
-        times.append(perf_counter() - start)
-        peaks.append(usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3))
-    yield Figure("symgrasp map bottle_on_table, whole process", "s", tuple(times))
-    yield Figure("  memory at most", "MB", tuple(peaks))
+    weighed = [
+        subprocess.run(
+            [sys.executable, "-c", SCALES, *command], check=True, capture_output=True, text=True
+        ).stdout
+        for _ in range(runs)
+    ]
+    times, peaks = zip(*(map(float, line.split()) for line in weighed), strict=True)
+    yield Figure("symgrasp map bottle_on_table, whole process", "s", times)
+    yield Figure("  memory at most", "MB", peaks)
 
 
 class _Quick:
