@@ -1,77 +1,31 @@
-"""Collisions in PyBullet: the only module that knows it.
-
-Every question is put as "which links are closer than a distance", which Bullet answers from the
-poses alone; its contact cache, which remembers earlier configurations, is not used. Collision
-margins are set to zero, so distances are those of the shapes themselves.
-"""
+"""All bodies of a scene in PyBullet, and the questions about them."""
 
 from __future__ import annotations
 
-import ctypes
-import os
-import sys
-import tempfile
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import lru_cache
-from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from symgrasp.errors import MeshError, SceneError, SymgraspError, UrdfError
+from symgrasp.errors import MeshError, SceneError, SymgraspError
 from symgrasp.meshes import depth_inside, read_mesh
-from symgrasp.poses import Array, axis_frame, from_position_quat, quat_wxyz, wxyz_to_xyzw, xyzw_to_wxyz
+from symgrasp.poses import Array, axis_frame
 from symgrasp.reason import Reason
 from symgrasp.robot import Arm, Robot
 from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Obstacle
+from symgrasp.world.client import link_names, load_urdf, pybullet, xyzw
+from symgrasp.world.self_pairs import checked_self_pairs
+from symgrasp.world.shapes import Shape, link_shapes
 
-
-@contextmanager
-def _silenced() -> Iterator[None]:
-    """Send what C code prints, on either stream, to nowhere."""
-    flush = ctypes.CDLL(None).fflush
-    sys.stdout.flush()
-    flush(None)
-    saved = [(stream, os.dup(stream)) for stream in (1, 2)]
-    try:
-        with Path(os.devnull).open("w") as null:
-            for stream, _ in saved:
-                os.dup2(null.fileno(), stream)
-        yield
-    finally:
-        flush(None)
-        for stream, copy in saved:
-            os.dup2(copy, stream)
-            os.close(copy)
-
-
-with _silenced():  # it prints its build time
-    import pybullet
-
-__all__ = ["Body", "BulletWorld", "Collision", "Near", "Shape", "check_tasks", "checked_self_pairs"]
-
-RESTING_DEPTH = 1e-3
-"""How deep (m) an object may sink into what it stands on and still count as resting."""
+__all__ = ["Body", "BulletWorld", "Collision", "Near"]
 
 MOST_TRIANGLES = 60_000
 """More than this PyBullet does not take in one mesh."""
-
-SELF_SAMPLES = 2000
-"""Random configurations that tell which links of a robot always or never collide."""
-
-NEVER_GAP = 0.02
-"""Links that come closer than this (m) in some sample are always checked, collided or not."""
-
-WALL_GAP = 0.5
-"""Distance (m) from which the rounding of a link is measured."""
-
-LINK_MARGIN = 1e-3
-"""Bullet rounds the shapes of links by this (m); what is set for a compound does not reach its parts."""
 
 
 class Body(NamedTuple):
@@ -98,21 +52,6 @@ class Collision(NamedTuple):
     a: Body
     b: Body
     depth: float
-
-
-class Shape(NamedTuple):
-    """A convex collision shape as PyBullet has it: a hull, blown up by a ball.
-
-    Attributes:
-        vertices: (n, 3) corners of the hull in the link frame.
-        rounding: radius (m) of the ball.
-        slack: by how much (m) the true shape may fall short of this one; inf where the parts of a
-            link cannot be told apart and this is the hull of them all.
-    """
-
-    vertices: Array
-    rounding: float
-    slack: float
 
 
 Near = Collection[str | frozenset[str]]
@@ -196,11 +135,8 @@ class BulletWorld:
         return body
 
     def _load_urdf(self, model: RobotModel, name: str, pose: Array) -> int:
-        body = _load_urdf(self._client, model, pose)
-        joints = range(pybullet.getNumJoints(body, self._client))
-        infos = [pybullet.getJointInfo(body, j, self._client) for j in joints]
-        links = [pybullet.getBodyInfo(body, self._client)[0].decode(), *(i[12].decode() for i in infos)]
-        return self._register(body, name, links)
+        body = load_urdf(self._client, model, pose)
+        return self._register(body, name, link_names(self._client, body))
 
     def _load_robot(self, robot: Robot) -> int:
         return self._load_urdf(robot.model, robot.name, robot.T_world_base)
@@ -257,7 +193,7 @@ class BulletWorld:
             0.0,
             shape,
             basePosition=pose[:3, 3].tolist(),
-            baseOrientation=_xyzw(pose),
+            baseOrientation=xyzw(pose),
             physicsClientId=self._client,
         )
         return self._register(body, name, [""])
@@ -315,7 +251,7 @@ class BulletWorld:
         pose = self._object_pose = axis_frame(T_world_object)
         for body in self._object:
             pybullet.resetBasePositionAndOrientation(
-                body, pose[:3, 3].tolist(), _xyzw(pose), physicsClientId=self._client
+                body, pose[:3, 3].tolist(), xyzw(pose), physicsClientId=self._client
             )
 
     def set_arm(self, arm: Arm, q: ArrayLike, opening: float) -> None:
@@ -383,53 +319,7 @@ class BulletWorld:
         """Return the convex shapes of each link of a robot, or of an obstacle that is a URDF."""
         body = next(body for body, own in self._names.items() if own == name)
         links = enumerate(self._links[body], start=-1)
-        return {link: shapes for index, link in links if (shapes := self._link_shapes(body, index))}
-
-    def _link_shapes(self, body: int, link: int) -> list[Shape]:
-        data = pybullet.getCollisionShapeData(body, link, physicsClientId=self._client)
-        if not data:
-            return []
-        info = pybullet.getDynamicsInfo(body, link, physicsClientId=self._client)
-        centre = _pose(info[3], info[4])  # Bullet's link frames sit at the centres of mass
-        shapes = [_primitive(kind, size, centre @ _pose(at, turn)) for _, _, kind, size, _, at, turn in data]
-        if any(shapes):
-            hulls = [self._mesh(body, link, k) for k, shape in enumerate(shapes) if shape is None]
-            rounding, slack = LINK_MARGIN, LINK_MARGIN
-        else:
-            hulls, every = [self._mesh(body, link, k) for k in range(len(data))], self._mesh(body, link, -1)
-            apart = len(every) == sum(map(len, hulls))
-            hulls = hulls if apart else [every]
-            rounding, slack = self._rounding(body, link, every), 0.0 if apart else np.inf
-        hulled = [Shape(v @ centre[:3, :3].T + centre[:3, 3], rounding, slack) for v in hulls if len(v)]
-        return [shape for shape in shapes if shape] + hulled
-
-    def _mesh(self, body: int, link: int, index: int) -> Array:
-        _, vertices = pybullet.getMeshData(
-            body, link, collisionShapeIndex=index, physicsClientId=self._client
-        )
-        return np.reshape(np.array(vertices, dtype=float), (-1, 3))
-
-    def _rounding(self, body: int, link: int, vertices: Array) -> float:
-        """Measure by how much Bullet blows up the hull of vertices: against a wall above the link."""
-        client = self._client
-        if link < 0:
-            position, orientation = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
-        else:
-            position, orientation = pybullet.getLinkState(
-                body, link, computeForwardKinematics=True, physicsClientId=client
-            )[:2]
-        pose = _pose(position, orientation)
-        top = (vertices @ pose[2, :3]).max() + pose[2, 3]
-        half = 2.0
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=[half] * 3, physicsClientId=client
-        )
-        above = [pose[0, 3], pose[1, 3], top + WALL_GAP + half]
-        wall = pybullet.createMultiBody(0.0, shape, basePosition=above, physicsClientId=client)
-        pybullet.changeDynamics(wall, -1, collisionMargin=0.0, physicsClientId=client)
-        found = pybullet.getClosestPoints(body, wall, 1.0, link, -1, physicsClientId=client)
-        pybullet.removeBody(wall, physicsClientId=client)
-        return max(0.0, float(WALL_GAP - min(p[8] for p in found)))
+        return {link: shapes for index, link in links if (shapes := link_shapes(self._client, body, index))}
 
     # -- questions --------------------------------------------------------------------------
 
@@ -565,125 +455,9 @@ class BulletWorld:
         return Body(self._names[body], self._links[body][link + 1])
 
 
-def check_tasks(scene: Scene) -> None:
-    """Check that the object is clear of all obstacles in every task; resting contact is fine.
-
-    Raises:
-        SceneError: it is not; names both bodies and the depth.
-    """
-    with BulletWorld(scene) as world:
-        for i, task in enumerate(scene.tasks.values()):
-            world.set_object(task.T_world_object)
-            holders = [scene.arm(name).robot.name for name in task.arms]
-            contacts = [*world.object_contacts(), *world.object_in_robots(holders)]
-            for c in sorted(contacts, key=lambda c: -c.depth)[:1]:
-                if c.depth > RESTING_DEPTH:
-                    raise SceneError(
-                        scene.source,
-                        f"tasks[{i}].pose",
-                        task.name,
-                        f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
-                    )
-
-
 def _deepest(found: Iterable[Collision]) -> list[Collision]:
     """Return the deepest collision of each pair of bodies, deepest first."""
     deepest: dict[object, Collision] = {}
     for c in sorted(found, key=lambda c: -c.depth):
         deepest.setdefault((frozenset((c.a, c.b)), c.reason), c)
     return list(deepest.values())
-
-
-def _pose(position: Sequence[float], xyzw: Sequence[float]) -> Array:
-    return from_position_quat(position, xyzw_to_wxyz(xyzw))
-
-
-def _primitive(kind: int, size: Sequence[float], pose: Array) -> Shape | None:
-    """Return the shape of a box, ball or capsule, and None for a hull."""
-    if kind == pybullet.GEOM_BOX:
-        # Rounded inwards: edges and corners fall short of the box by less than their diagonal.
-        corners, rounding, slack = np.array(list(np.ndindex(2, 2, 2))) - 0.5, 0.0, LINK_MARGIN
-        corners = corners * size
-    elif kind == pybullet.GEOM_SPHERE:
-        corners, rounding, slack = np.zeros((1, 3)), float(size[0]), 0.0
-    elif kind == pybullet.GEOM_CAPSULE:
-        corners, rounding, slack = np.array([[0, 0, -0.5 * size[0]], [0, 0, 0.5 * size[0]]]), size[1], 0.0
-    else:
-        return None
-    return Shape(corners @ pose[:3, :3].T + pose[:3, 3], rounding, slack)
-
-
-def _xyzw(pose: Array) -> list[float]:
-    return wxyz_to_xyzw(quat_wxyz(pose)).tolist()
-
-
-def _load_urdf(client: int, model: RobotModel, pose: Array) -> int:
-    """Load the collision shapes of a URDF, and see that every one of them arrived."""
-    with tempfile.NamedTemporaryFile(suffix=".urdf") as file:
-        file.write(model.collision_urdf())
-        file.flush()
-        try:
-            body = pybullet.loadURDF(
-                file.name,
-                basePosition=pose[:3, 3].tolist(),
-                baseOrientation=_xyzw(pose),
-                useFixedBase=True,
-                physicsClientId=client,
-            )
-        except pybullet.error as error:
-            raise UrdfError(model.path, "urdf", str(error), "a URDF that PyBullet can load") from error
-    for i, link in enumerate(_link_names(client, body)):
-        shapes = pybullet.getCollisionShapeData(body, i - 1, physicsClientId=client)
-        if model.has_shape(link) and not shapes:
-            raise UrdfError(model.path, f"link {link}: collision", None, "a shape that PyBullet can load")
-    return body
-
-
-def _link_names(client: int, body: int) -> list[str]:
-    joints = range(pybullet.getNumJoints(body, client))
-    base = pybullet.getBodyInfo(body, client)[0].decode()
-    return [base, *(pybullet.getJointInfo(body, j, client)[12].decode() for j in joints)]
-
-
-@lru_cache(maxsize=32)
-def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of a robot's links that can collide, but need not.
-
-    Left out are neighbours, pairs that overlap in every one of many random configurations (a
-    flange and the hand on it), and pairs that stay well apart in all of them.
-    """
-    client = pybullet.connect(pybullet.DIRECT)
-    try:
-        body = _load_urdf(client, model, np.eye(4))
-        index = {link: i - 1 for i, link in enumerate(_link_names(client, body))}
-        for link in index.values():
-            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=client)
-        solid = model.colliding_links()
-        neighbours = model.neighbours()
-        pairs = [
-            (a, b) for i, a in enumerate(solid) for b in solid[i + 1 :] if frozenset((a, b)) not in neighbours
-        ]
-        moving = [(index[model.link_names[j.child]], j) for j in model.joints if j.source >= 0]
-        lower = np.where(np.isfinite(model.lower), model.lower, -np.pi)
-        upper = np.where(np.isfinite(model.upper), model.upper, np.pi)
-        samples = np.random.default_rng(0).uniform(lower, upper, (SELF_SAMPLES, len(lower)))
-        always = dict.fromkeys(pairs, True)
-        near = dict.fromkeys(pairs, False)
-        for q in samples:
-            pybullet.resetJointStatesMultiDof(
-                body,
-                [j for j, _ in moving],
-                [[j.ratio * q[j.source] + j.offset] for _, j in moving],
-                physicsClientId=client,
-            )
-            for a, b in pairs:
-                if near[a, b] and not always[a, b]:
-                    continue
-                points = pybullet.getClosestPoints(
-                    body, body, NEVER_GAP, index[a], index[b], physicsClientId=client
-                )
-                near[a, b] |= bool(points)
-                always[a, b] &= any(p[8] < 0 for p in points)
-        return tuple(pair for pair in pairs if near[pair] and not always[pair])
-    finally:
-        pybullet.disconnect(client)

@@ -1,0 +1,15 @@
+"""Collisions in PyBullet: the only part that knows it.
+
+Every question is put as "which links are closer than a distance", which Bullet answers from the
+poses alone; its contact cache, which remembers earlier configurations, is not used. Collision
+margins are set to zero, so distances are those of the shapes themselves.
+"""
+
+from symgrasp.world.bullet import Body, BulletWorld, Collision, Near
+from symgrasp.world.self_pairs import checked_self_pairs
+from symgrasp.world.shapes import Shape
+from symgrasp.world.tasks import RESTING_DEPTH, check_tasks
+
+__all__ = [
+    "RESTING_DEPTH", "Body", "BulletWorld", "Collision", "Near", "Shape", "check_tasks", "checked_self_pairs",
+]  # fmt: skip

@@ -1,0 +1,62 @@
+"""Which links of a robot can collide with each other."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from symgrasp.robot_model import RobotModel
+from symgrasp.world.client import link_names, load_urdf, pybullet
+
+__all__ = ["checked_self_pairs"]
+
+SELF_SAMPLES = 2000
+"""Random configurations that tell which links of a robot always or never collide."""
+
+NEVER_GAP = 0.02
+"""Links that come closer than this (m) in some sample are always checked, collided or not."""
+
+
+@lru_cache(maxsize=32)
+def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of a robot's links that can collide, but need not.
+
+    Left out are neighbours, pairs that overlap in every one of many random configurations (a
+    flange and the hand on it), and pairs that stay well apart in all of them.
+    """
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        body = load_urdf(client, model, np.eye(4))
+        index = {link: i - 1 for i, link in enumerate(link_names(client, body))}
+        for link in index.values():
+            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=client)
+        solid = model.colliding_links()
+        neighbours = model.neighbours()
+        pairs = [
+            (a, b) for i, a in enumerate(solid) for b in solid[i + 1 :] if frozenset((a, b)) not in neighbours
+        ]
+        moving = [(index[model.link_names[j.child]], j) for j in model.joints if j.source >= 0]
+        lower = np.where(np.isfinite(model.lower), model.lower, -np.pi)
+        upper = np.where(np.isfinite(model.upper), model.upper, np.pi)
+        samples = np.random.default_rng(0).uniform(lower, upper, (SELF_SAMPLES, len(lower)))
+        always = dict.fromkeys(pairs, True)
+        near = dict.fromkeys(pairs, False)
+        for q in samples:
+            pybullet.resetJointStatesMultiDof(
+                body,
+                [j for j, _ in moving],
+                [[j.ratio * q[j.source] + j.offset] for _, j in moving],
+                physicsClientId=client,
+            )
+            for a, b in pairs:
+                if near[a, b] and not always[a, b]:
+                    continue
+                points = pybullet.getClosestPoints(
+                    body, body, NEVER_GAP, index[a], index[b], physicsClientId=client
+                )
+                near[a, b] |= bool(points)
+                always[a, b] &= any(p[8] < 0 for p in points)
+        return tuple(pair for pair in pairs if near[pair] and not always[pair])
+    finally:
+        pybullet.disconnect(client)

@@ -1,0 +1,33 @@
+"""Whether a scene's tasks make sense: the object is inside of nothing."""
+
+from __future__ import annotations
+
+from symgrasp.errors import SceneError
+from symgrasp.scene import Scene
+from symgrasp.world.bullet import BulletWorld
+
+__all__ = ["RESTING_DEPTH", "check_tasks"]
+
+RESTING_DEPTH = 1e-3
+"""How deep (m) an object may sink into what it stands on and still count as resting."""
+
+
+def check_tasks(scene: Scene) -> None:
+    """Check that the object is clear of all obstacles in every task; resting contact is fine.
+
+    Raises:
+        SceneError: it is not; names both bodies and the depth.
+    """
+    with BulletWorld(scene) as world:
+        for i, task in enumerate(scene.tasks.values()):
+            world.set_object(task.T_world_object)
+            holders = [scene.arm(name).robot.name for name in task.arms]
+            contacts = [*world.object_contacts(), *world.object_in_robots(holders)]
+            for c in sorted(contacts, key=lambda c: -c.depth)[:1]:
+                if c.depth > RESTING_DEPTH:
+                    raise SceneError(
+                        scene.source,
+                        f"tasks[{i}].pose",
+                        task.name,
+                        f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
+                    )
