@@ -189,12 +189,13 @@ def circle(mark: Mark, grid: Manifold) -> str:
     """Draw a mark on a picture of a map."""
     profile = grid.profile
     left = 100 * (float(wrap(mark.theta)) + np.pi) / (2 * np.pi)
-    bottom = f"bottom:{100 * (mark.h - profile.h_min) / (profile.h_max - profile.h_min):.3f}%"
-    circle = f'<span class="sg-mark" style="left:{left:.3f}%;{bottom}"></span>'
+    bottom = f"{100 * (mark.h - profile.h_min) / (profile.h_max - profile.h_min):.3f}%"
+    circle = f'<span class="sg-mark" style="left:{left:.3f}%;bottom:{bottom}"></span>'
     if not mark.label:
         return circle
     side = f"right:{100 - left:.3f}%" if left > 75 else f"left:{left:.3f}%"
-    return circle + f'<span class="sg-label" style="{side};{bottom}">{escape(mark.label)}</span>'
+    inside = f"bottom:clamp(7px,{bottom},calc(100% - 9px))"  # all of the name is read, also at an end
+    return circle + f'<span class="sg-label" style="{side};{inside}">{escape(mark.label)}</span>'
 
 
 def h_axis(grid: Manifold, height: int) -> str:

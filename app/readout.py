@@ -136,7 +136,10 @@ def sequence_html(state: State) -> str:
     if not names:
         text = f"{state.arm} does no task alone: the tab Hands plans for several arms."
         return f'<div class="sg sg-faint">{escape(text)}</div>'
-    return f'<div class="sg sg-what">{escape(state.arm)}: {escape(" → ".join(names))}</div>'
+    what = f'<div class="sg sg-what">{escape(state.arm)}: {escape(" → ".join(names))}</div>'
+    return what + _until_planned(
+        state, "Slides the tasks' maps over each other until one grasp is feasible in all of them."
+    )
 
 
 def hands_line(state: State) -> str:
@@ -144,7 +147,15 @@ def hands_line(state: State) -> str:
     if not state.can_plan("bimanual"):
         return '<div class="sg sg-faint">Every task of this scene is for one arm.</div>'
     task = state.scene.task(state.together)
-    return f'<div class="sg sg-what">{escape(task.name)}: {escape(" and ".join(task.arms))}</div>'
+    what = f'<div class="sg sg-what">{escape(task.name)}: {escape(" and ".join(task.arms))}</div>'
+    return what + _until_planned(
+        state, "Every hand leaves a print on the map: places the hands so that they do not meet."
+    )
+
+
+def _until_planned(state: State, text: str) -> str:
+    """Say what a planner does, until it has been tried."""
+    return "" if state.book.kind else f'<div class="sg sg-faint">{escape(text)}</div>'
 
 
 def tasks_html(state: State) -> str:
