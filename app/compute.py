@@ -6,10 +6,10 @@ import logging
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene, shipped_scenes
 from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
 
-__all__ = ["Store", "Workbench", "check_visuals"]
+__all__ = ["Maps", "Shelf", "Store", "Workbench", "check_visuals"]
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +38,9 @@ MAPS_KEPT = 64
 POSES_KEPT = 6
 """Of them, those of one task and arm that differ in pose: a drag leaves dozens that nobody comes back to."""
 
+
+Maps = Mapping[tuple[str, str], MapResult]
+"""(task, arm) → its map."""
 
 WARMING = 5.0
 """How long (s) people wait for the first map before the page opens without it."""
@@ -155,10 +158,29 @@ class Store:
             bench.close()
 
 
-class Workbench:
-    """Computes for one browser, in a physics world of its own; used by one thread at a time."""
+class Shelf(Protocol):
+    """What a workbench needs of the store."""
 
-    def __init__(self, store: Store) -> None:
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """Where the files of an uploaded scene may lie."""
+        ...
+
+    def map(self, request: MapRequest, /) -> MapResult | None:
+        """Return a map that was computed before."""
+
+    def keep(self, result: MapResult) -> None:
+        """Remember a map."""
+
+
+class Workbench:
+    """Computes for one browser, in a physics world of its own; used by one thread at a time.
+
+    Args:
+        store: knows the maps that were computed before, and keeps new ones.
+    """
+
+    def __init__(self, store: Shelf) -> None:
         self.store = store
         self._maker: MapMaker | None = None
 
@@ -167,13 +189,6 @@ class Workbench:
         if self._maker:
             self._maker.world.close()
             self._maker = None
-
-    def restart(self) -> None:
-        """Leave the physics world alone, whatever state it is in; the next computation makes another."""
-        broken, self._maker = self._maker, None
-        if broken:
-            with suppress(Exception):  # nothing is known about what is broken
-                broken.world.close()
 
     def maker(self, scene: Scene) -> MapMaker:
         """Return a map maker for the scene's robots, obstacles and object; its tasks do not matter."""

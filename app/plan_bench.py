@@ -8,10 +8,10 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from app.compute import Workbench, check_visuals
+from app.compute import Maps, Workbench, check_visuals
 from app.plan_book import Climbing, Kind, OpenedPlan, PlanBook, Refusal
 from app.scene_files import Loaded, refuse_foreign_files
-from app.values import MapRequest, MapResult, ObjectPose, PlanResult, moved
+from app.values import MapRequest, ObjectPose, PlanResult, moved
 from symgrasp.errors import NoPlanError, PlanError
 from symgrasp.feasibility import FeasibilityMap, Progress
 from symgrasp.manifold import ROLLS
@@ -38,8 +38,6 @@ PLAN_LIMIT = 5_000_000
 
 LISTED = 10
 """How many plans are listed at a time."""
-
-Maps = Mapping[tuple[str, str], MapResult]
 
 
 @dataclass(frozen=True, eq=False)

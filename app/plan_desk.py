@@ -6,13 +6,12 @@ import re
 import threading
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from typing import Any, Protocol
 
-from app.compute import Workbench
-from app.plan_bench import Opened, PlanBench, PlanOrder
+from app.plan_bench import Opened, PlanOrder
 from app.plan_book import Kind
 from app.state import State
+from app.workshop import Workshop
 from symgrasp.exports import EXPORTS
 from symgrasp.feasibility import Progress
 from symgrasp.plan import Plan
@@ -51,27 +50,17 @@ class PlanDesk:
 
     Args:
         office: the browser's session.
-        bench: the workbench of its worker.
+        workshop: of its worker.
     """
 
-    def __init__(self, office: Office, bench: Workbench) -> None:
-        self.office = office
-        self._bench = PlanBench(bench)
+    def __init__(self, office: Office, workshop: Workshop) -> None:
+        self.office, self._workshop = office, workshop
         self._ended = threading.Event()
         self._player: threading.Thread | None = None
 
     def close(self) -> None:
         """Play nothing any more; may be called from anywhere."""
         self._ended.set()
-
-    def finish(self) -> None:
-        """Free what the planners hold; on the worker's thread."""
-        self._bench.close()
-
-    def restart(self) -> None:
-        """Use nothing of the planners again after something broke; on the worker's thread."""
-        with suppress(Exception):  # nothing is known about what is broken
-            self._bench.close()
 
     def run(self, kind: Kind, method: str = "") -> None:
         """Run a planner, with the method chosen for it unless another is asked for."""
@@ -86,7 +75,7 @@ class PlanDesk:
         order = PlanOrder(state.scene, kind, method, name, state.poses, book.seed)
         self.office.submit(
             "Planning",
-            lambda progress: self._bench.run(order, book, progress),
+            lambda progress: self._workshop.run(order, book, progress),
             lambda ticket, found: self.office.change(lambda s: s.booked(ticket, found)),
         )
 
@@ -98,7 +87,7 @@ class PlanDesk:
         maps = state.book.maps
         self.office.submit(
             "Listing more solutions",
-            lambda progress: self._bench.more(maps, progress),
+            lambda progress: self._workshop.more(maps, progress),
             lambda ticket, found: self.office.change(lambda s: s.listed(ticket, *found)),
         )
 
@@ -115,7 +104,7 @@ class PlanDesk:
             )
 
         label = f"Verifying {name}"
-        self.office.submit(label, lambda progress: self._bench.open(content, name, progress), done)
+        self.office.submit(label, lambda progress: self._workshop.open(content, name, progress), done)
 
     def download(self, form: str) -> None:
         """Send the plan to the browser in one of `FORMATS`."""

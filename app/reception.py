@@ -14,6 +14,7 @@ from app.compute import Store
 from app.front_door import HELLO, FrontDoor, Visit
 from app.session import Session
 from app.snapshot import quiet_server, stop_quietly
+from app.workshop import Staff
 
 __all__ = ["Reception", "open_house"]
 
@@ -54,6 +55,7 @@ class Reception:
 
     def __init__(self, store: Store, is_here: Callable[[int], bool]) -> None:
         self._store, self._is_here = store, is_here
+        self._staff = Staff(store.folders)
         self._lock = threading.Lock()
         self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
         self._sessions: dict[int, Session] = {}
@@ -97,11 +99,13 @@ class Reception:
             self._waiting.clear()
         for session in sessions:
             session.close()
+        self._staff.close()
 
     def _open(self, client: viser.ClientHandle, greeting: viser.GuiHtmlHandle, visit: Visit) -> None:
         try:
             greeting.remove()
-            session = Session(client, self._store, visit)
+            self._staff.prepare()
+            session = Session(client, self._store, self._staff, visit)
         except Exception:
             log.exception("a session could not be opened")
             return

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import viser
 
 from app.asking import CheckRequest, Request
-from app.compute import Store, Workbench, check_visuals
+from app.compute import Store, check_visuals
 from app.controls import Controls
 from app.front_door import Visit
 from app.history import remember
@@ -28,11 +28,11 @@ from app.things import OWN, Thing, check_size, from_library, from_mesh
 from app.values import MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
+from app.workshop import Staff, Workshop
 from symgrasp.compiling import telling_of_compiling
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import Progress
 from symgrasp.scene import Scene
-from symgrasp.world import check_tasks
 
 __all__ = ["Session"]
 
@@ -53,10 +53,11 @@ class Session:
     Args:
         client: the browser.
         store: what all browsers share.
+        staff: starts the process that computes.
         visit: the address it opened, which may say what to show first.
     """
 
-    def __init__(self, client: viser.ClientHandle, store: Store, visit: Visit) -> None:
+    def __init__(self, client: viser.ClientHandle, store: Store, staff: Staff, visit: Visit) -> None:
         self.client, self.store, self.visit = client, store, visit
         self.state: State | None = None
         self._tickets = itertools.count(1)
@@ -65,9 +66,9 @@ class Session:
         self._write_inputs = self._move_gizmo = True
         self._writing = False
         self._closed = False
-        self.bench = Workbench(store)
-        self.plans = PlanDesk(self, self.bench)
-        self.worker = Worker(f"worker {client.client_id}", self._finish, self._restart)
+        self.workshop = Workshop(store, staff, lambda: self.change(State.compiles_now))
+        self.plans = PlanDesk(self, self.workshop)
+        self.worker = Worker(f"worker {client.client_id}", self.workshop.close)
         self.controls = Controls(client, self, store.names)
         self.view = SceneView(
             client,
@@ -81,20 +82,12 @@ class Session:
         self._open_first()
 
     def close(self) -> None:
-        """End both threads and free the physics world; a second call does nothing."""
+        """End both threads and the process; a second call does nothing."""
         with self._changed:
             self._closed = True
             self._changed.notify()
         self.plans.close()
         self.worker.close()
-
-    def _finish(self) -> None:
-        self.plans.finish()
-        self.bench.close()
-
-    def _restart(self) -> None:
-        self.plans.restart()
-        self.bench.restart()
 
     # -- what widgets ask for ---------------------------------------------------------------
 
@@ -116,16 +109,16 @@ class Session:
         known = own.scene if own and own.choice == name else None
         self._change_scene(
             f"Loading {name}",
-            lambda: known or self.store.scene(name),
+            lambda _: known or self.store.scene(name),
             lambda s, scene: s.open_scene(scene, name),
         )
 
     def load_scene(self, name: str, content: bytes) -> None:
         """Read an uploaded scene on the worker and show it."""
 
-        def run() -> Loaded:
+        def run(progress: Progress) -> Loaded:
             loaded = read_scene(name, content, self.store.folders)
-            check_tasks(loaded.scene)
+            self.workshop.check_tasks(loaded.scene, progress)
             check_visuals(loaded.scene)
             return loaded
 
@@ -202,11 +195,13 @@ class Session:
         """Return the scene with an object in place of its own."""
         return state.scene.with_object(thing.name, thing.profile), thing
 
-    def _change_scene(self, label: str, run: Callable[[], T], show: Callable[[State, T], State]) -> None:
+    def _change_scene(
+        self, label: str, run: Callable[[Progress], T], show: Callable[[State, T], State]
+    ) -> None:
         def done(ticket: int, found: T) -> None:
             self.change(lambda s: show(s, found) if s.busy and s.busy.ticket == ticket else s)
 
-        self.submit(label, lambda _: run(), done)
+        self.submit(label, run, done)
 
     def _change_object(self, label: str, run: Callable[[], tuple[Scene, Thing | None]]) -> None:
         def done(ticket: int, found: tuple[Scene, Thing | None]) -> None:
@@ -296,7 +291,7 @@ class Session:
         if isinstance(request, MapRequest):
             self.submit(
                 f"Computing the map of {request.task}",
-                lambda progress: self.bench.map(request, progress),
+                lambda progress: self.workshop.map(request, progress),
                 lambda ticket, result: self.change(lambda s: s.map_arrived(ticket, result)),
                 request,
             )
@@ -304,10 +299,10 @@ class Session:
         if isinstance(request, CheckRequest):
             assert state.result  # the check is of the map that is shown
             label, known = f"Recomputing the map of {request.map.task}", state.result.map
-            run = lambda progress: self.bench.check(request, known, progress)  # noqa: E731
+            run = lambda progress: self.workshop.check(request, known, progress)  # noqa: E731
         else:
             label = "Trying every way to hold it here"
-            run = lambda progress: self.bench.explain(request, progress)  # noqa: E731
+            run = lambda progress: self.workshop.explain(request, progress)  # noqa: E731
         self.submit(label, run, lambda t, found: self.change(lambda s: s.found(t, found)), request)
 
     def submit(

@@ -151,17 +151,21 @@ class State(Leafing):
 
     def progressed(self, ticket: int, share: float, late: bool = False) -> State:
         """The computation is this far, and so late by now that the page says so."""
-        if self.busy is None or self.busy.ticket != ticket:
+        busy = self.busy
+        if busy is None or busy.ticket != ticket:
             return self
-        return replace(
-            self, busy=replace(self.busy, share=share, late=late or self.busy.late, compiling=False)
-        )
+        late = late or busy.late
+        if (share, late) == (busy.share, busy.late):
+            return self
+        return replace(self, busy=replace(busy, share=share, late=late, compiling=False))
 
     def compiles(self, ticket: int) -> State:
         """The computation waits for code that is compiled, and goes on with its next progress."""
-        if self.busy is None or self.busy.ticket != ticket:
-            return self
-        return replace(self, busy=replace(self.busy, late=True, compiling=True))
+        return self.compiles_now() if self.busy and self.busy.ticket == ticket else self
+
+    def compiles_now(self) -> State:
+        """What is under way waits for code that is compiled."""
+        return replace(self, busy=replace(self.busy, late=True, compiling=True)) if self.busy else self
 
     def map_arrived(self, ticket: int, result: MapResult) -> State:
         """Take a map: that of the object's pose, or on the way there that of an earlier one."""

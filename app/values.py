@@ -124,6 +124,10 @@ class MapRequest:
         """Return a number that equal requests share."""
         return hash((self.task, self.place))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Leave out what was derived: it means nothing in another process."""
+        return MapRequest, (self.scene, self.arm, self.task, self.pose)
+
     def differs_in_pose(self, other: object) -> bool:
         """Whether the other one is for the same map, but for the object's pose."""
         return isinstance(other, MapRequest) and (self.task, self._stage) == (other.task, other._stage)

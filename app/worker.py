@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from app.workshop import Died
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.feasibility import Progress
 
@@ -41,14 +42,12 @@ class Worker:
 
     Args:
         name: of the thread.
-        finish: called on the thread at the very end, to free what the jobs used.
-        restart: called on the thread after a job broke in an unexpected way, to use nothing of it again.
+        finish: called on the thread at the very end, and after a job broke in an unexpected way, to free
+            what the jobs used.
     """
 
-    def __init__(
-        self, name: str, finish: Callable[[], None], restart: Callable[[], None] = lambda: None
-    ) -> None:
-        self._finish, self._restart = finish, restart
+    def __init__(self, name: str, finish: Callable[[], object]) -> None:
+        self._finish = finish
         self._changed = threading.Condition()
         self._waiting: Job | None = None
         self._running: Job | None = None
@@ -106,9 +105,11 @@ class Worker:
         except SymgraspError as error:
             self._tell(job, job.failed, str(error))
         except Exception as error:  # whatever a library raises must not end the thread
-            log.exception("a computation failed")
-            self._restart()
-            text = f"unexpected {type(error).__name__}: {' '.join(str(error).split())}"
+            died = isinstance(error, Died)
+            log.error("a computation failed", exc_info=None if died else error)
+            self._finish()
+            text = " ".join(str(error).split())
+            text = text if died else f"unexpected {type(error).__name__}: {text}"
             self._tell(job, job.failed, f"{text}; what you set is kept, and the physics begins anew")
         else:
             self._tell(job, job.done, result)

@@ -56,6 +56,10 @@ class InputError(SymgraspError, ValueError):
         line = f"{self.source}: {field}: {shown}: expected {expected}"
         super().__init__(" ".join(line.split()))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle what it was made of, not its text."""
+        return type(self), (self.source, self.field, self.value, self.expected)
+
 
 class ProfileError(InputError):
     """A radius profile, or a height asked of it, is unusable."""

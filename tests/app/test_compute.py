@@ -154,15 +154,3 @@ def test_the_first_map_is_there_before_anybody_asks(monkeypatch, tmp_path, conte
     monkeypatch.undo()
     store.warm()
     assert store.map(request)
-
-
-def test_a_broken_world_is_replaced(bench):
-    scene = load_small("bottle_on_table")
-    broken = bench.maker(scene)
-    broken.world.close()  # as if PyBullet had lost it
-    request = State.of(scene, "").move(x=0.47).request
-    with pytest.raises(Exception, match=r"."):
-        bench.map(request, quiet)
-    bench.restart()
-    assert np.array_equal(bench.map(request, quiet).map.reason, create_map(request.moved_scene()).reason)
-    assert bench.maker(scene) is not broken

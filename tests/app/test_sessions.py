@@ -5,8 +5,11 @@ from __future__ import annotations
 import ctypes
 import gc
 import logging
+import multiprocessing
+import os
 import random
 import re
+import signal
 import sys
 import threading
 import time
@@ -14,17 +17,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numba
 import pytest
 
+from app import workshop
 from app.compute import Store
 from app.panels.status_panel import StatusPanel
 from app.reception import Reception, open_house
 from app.session import Session
 from app.snapshot import any_port
 from app.view import SceneView
-from symgrasp.maps import MapMaker
 from symgrasp.world import BulletWorld
+from tests.app import troubles
 from tests.app.wire import Wire
 from tests.conftest import write_scene
 
@@ -33,8 +36,9 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 @dataclass
 class House:
-    """A server, and the port of its door."""
+    """A server, the port of its door, and what it keeps."""
 
+    store: Store
     reception: Reception
     port: int
 
@@ -58,7 +62,7 @@ def house() -> Iterator[House]:
     store.warm()
     port = any_port()
     with open_house(store, "127.0.0.1", port) as reception:
-        yield House(reception, port)
+        yield House(store, reception, port)
 
 
 def picture(html: str) -> str:
@@ -109,6 +113,7 @@ def test_a_hundred_sessions_come_and_go_and_leave_nothing(house):
         ten_at_once(round_)
     assert alive(*kinds) == before == [0, 0, 0]
     assert threading.active_count() <= threads + 32  # viser's pool grows up to this many
+    assert len(workshops()) == 1  # the one that is kept for the next
     assert megabytes() - memory < 60  # maps that the store keeps; a world alone takes some 10
 
 
@@ -140,44 +145,56 @@ def test_whoever_has_not_come_through_the_door_gets_no_session(house):
         assert [w for w in stranger.widgets.values() if w.get("label")] == []
 
 
-def test_a_crash_is_told_loses_nothing_and_can_be_restarted(house, monkeypatch):
+def workshops() -> list[int]:
+    """The processes that compute for somebody, or are kept for it, oldest first."""
+    return sorted(process.pid or 0 for process in multiprocessing.active_children())
+
+
+def signal_workshops(number: int) -> None:
+    for pid in workshops():
+        os.kill(pid, number)
+
+
+@pytest.mark.parametrize("restart", ["Restart", "the next change"])
+def test_a_killed_process_is_told_loses_nothing_and_can_be_restarted(house, restart):
     with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("y (cm)", 1.0 if restart == "Restart" else 2.0)
+        visitor.wait_for("Computing the map of pick")
         visitor.wait_for(ready)
         visitor.set("Rotation (°)", 20.0)
-        with monkeypatch.context() as broken:
-            broken.setattr(MapMaker, "map", lambda *_, **__: 1 / 0)
-            visitor.set("x (cm)", 51.5)
-            visitor.wait_for("unexpected ZeroDivisionError: division by zero; what you set is kept")
-            visitor.wait_for(lambda _: any(w.get("label") == "Restart" for w in visitor.widgets.values()))
-        visitor.set("Restart", True)
-        with house.visit("at.pick=51.5,0,0,0,0,0&turn=20") as fresh:
+        signal_workshops(signal.SIGSTOP)  # so that it cannot be done before it is killed
+        visitor.set("x (cm)", 51.5 if restart == "Restart" else 51.0)
+        visitor.wait_for("Computing the map of pick")
+        signal_workshops(signal.SIGKILL)
+        visitor.wait_for("the process that computes ended unexpectedly (SIGKILL); what you set is kept")
+        visitor.wait_for(lambda _: any(w.get("label") == "Restart" for w in visitor.widgets.values()))
+        if restart == "Restart":
+            visitor.set("Restart", True)
+            query = "at.pick=51.5,1,0,0,0,0&turn=20"
+        else:
+            visitor.set("x (cm)", 53.0)
+            query = "at.pick=53,2,0,0,0,0&turn=20"
+        with house.visit(query) as fresh:
             right = picture(fresh.wait_for(ready))
         html = visitor.wait_for(lambda html: picture(html) == right)
-        assert "ZeroDivisionError" not in html
+        assert "SIGKILL" not in html
 
 
-def test_cancelling_takes_effect_while_the_map_is_computed(house, monkeypatch):
-    stopped = threading.Event()
-
-    def endless(self, *args, progress, **kwargs):
-        try:
-            while True:
-                progress(0.5)
-                stopped.wait(0.001)
-        except BaseException:
-            stopped.set()
-            raise
-
+def test_cancelling_takes_effect_though_the_process_hears_nothing(house, monkeypatch):
     with house.visit() as visitor:
         visitor.wait_for(ready)
-        with monkeypatch.context() as slow:
-            slow.setattr(MapMaker, "map", endless)
-            visitor.set("x (cm)", 52.5)
-            visitor.wait_for("Computing the map of pick … 50 %")
-            visitor.set("Rotation (°)", 10.0)  # the page lives meanwhile
-            visitor.set("Cancel", True)
-            visitor.wait_for("Stopped: no map for this pose yet.")
-            assert stopped.wait(30)
+        visitor.set("y (cm)", 3.0)
+        visitor.wait_for("Computing the map of pick")
+        visitor.wait_for(ready)
+        signal_workshops(signal.SIGSTOP)
+        visitor.set("x (cm)", 52.5)
+        visitor.wait_for("Computing the map of pick … 0 %")
+        visitor.set("Rotation (°)", 10.0)  # the page lives meanwhile
+        visitor.set("Cancel", True)
+        visitor.wait_for("Stopped: no map for this pose yet.")
+        monkeypatch.setattr(workshop, "PATIENCE", 0.0)
+        os.kill(workshops()[-1], signal.SIGCONT)  # the one that is kept; the other one never answers
         visitor.set("Compute the map", True)
         visitor.wait_for(ready)
 
@@ -208,21 +225,14 @@ def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(house, m
 
 
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
-    told = threading.Event()
-    compute = MapMaker.map
-
-    def compiles_first(self, *args, progress, **kwargs):
-        assert numba.njit(lambda x: x + 1)(1) == 2
-        told.wait(30)
-        return compute(self, *args, progress=progress, **kwargs)
-
-    with house.visit() as visitor:
+    monkeypatch.setattr(workshop, "serve", troubles.serve_compiling)
+    port = any_port()
+    with open_house(house.store, "127.0.0.1", port), Wire(port) as visitor:
         visitor.wait_for(ready)
-        monkeypatch.setattr(MapMaker, "map", compiles_first)
         visitor.set("x (cm)", 54.5)
         visitor.wait_for("Compiling, once on this machine: a minute …")
-        told.set()
-        assert "Compiling" not in visitor.wait_for(ready)
+        visitor.set("Cancel", True)
+        assert "Compiling" not in visitor.wait_for("Stopped: no map for this pose yet.")
 
 
 CHOICES = {

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from app.worker import Job, Worker
+from app.workshop import Died
 from symgrasp.errors import NoPlanError
 
 WAIT = 30.0
@@ -118,6 +119,7 @@ def test_cancel_stops_and_says_nothing(worker):
             RuntimeError("two\nlines"),
             "unexpected RuntimeError: two lines; what you set is kept, and the physics begins anew",
         ),
+        (Died("it ended"), "it ended; what you set is kept, and the physics begins anew"),
     ],
 )
 def test_an_error_is_one_line_and_the_worker_goes_on(worker, error, text):
@@ -132,9 +134,9 @@ def test_an_error_is_one_line_and_the_worker_goes_on(worker, error, text):
     assert log.next() == ("done", 1)
 
 
-def test_only_what_nobody_expected_restarts_what_jobs_use():
+def test_only_what_nobody_expected_frees_what_jobs_use():
     restarts: list[str] = []
-    worker, log = Worker("test", lambda: None, lambda: restarts.append("anew")), Log()
+    worker, log = Worker("test", lambda: restarts.append("anew")), Log()
 
     def breaks(error: Exception) -> Callable[[Callable[[float], None]], Any]:
         def run(progress: Callable[[float], None]) -> None:

@@ -1,0 +1,256 @@
+"""Where one browser's maps and plans are computed: a process of its own, which may die without harm."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.context import SpawnProcess
+from pathlib import Path
+from typing import Any
+
+from app.asking import Check, CheckRequest, Explained, ExplainRequest
+from app.compute import Maps, Store
+from app.plan_bench import Opened, PlanOrder
+from app.plan_book import PlanBook
+from app.shipping import Line
+from app.values import MapRequest, MapResult, PlanResult
+from app.workshop_child import serve
+from symgrasp.errors import Cancelled, NoPlanError
+from symgrasp.feasibility import FeasibilityMap, Progress
+from symgrasp.scene import Scene
+
+__all__ = ["Died", "Staff", "Workshop"]
+
+TICK = 0.05
+"""Time (s) after which a cancel is heard although the process says nothing."""
+
+PATIENCE = 10.0
+"""How long (s) a process may take to hear a cancel. Compiled code and new physics worlds take their time."""
+
+MOST_THINGS = 500
+"""Scenes and parts of scenes that a process keeps; then another takes its place."""
+
+SPAWN = multiprocessing.get_context("spawn")
+
+
+class Died(Exception):
+    """The process ended in the middle of a computation."""
+
+
+class Staff:
+    """Starts processes; keeps one at hand that has imported everything, as that takes a second or two.
+
+    May be used from any thread.
+
+    Args:
+        folders: where the files of an uploaded scene may lie.
+    """
+
+    def __init__(self, folders: tuple[Path, ...]) -> None:
+        self._folders = folders
+        self._lock = threading.Lock()
+        self._spare: _Process | None = None
+        self._closed = False
+
+    def prepare(self) -> None:
+        """Start a process for later, unless there is one."""
+        with self._lock:
+            if self._spare is None and not self._closed:
+                self._spare = _Process(self._folders)
+
+    def take(self) -> _Process:
+        """Return a process; it belongs to the caller, who ends it."""
+        with self._lock:
+            process, self._spare = self._spare, None
+            if process and not process.is_alive:
+                process.end()
+                process = None
+            process = process or _Process(self._folders)
+        self.prepare()
+        return process
+
+    def close(self) -> None:
+        """End the process that was kept at hand."""
+        with self._lock:
+            self._closed = True
+            if self._spare:
+                self._spare.end()
+                self._spare = None
+
+
+class _Process:
+    """A process and the line to it.
+
+    Attributes:
+        line: to it.
+        errand: number of the last errand.
+        unheard: when (s, monotonic) that was cancelled, if it has not answered since.
+    """
+
+    def __init__(self, folders: tuple[Path, ...]) -> None:
+        here, there = SPAWN.Pipe()
+        self.line = Line(here, "server")
+        self.errand = 0
+        self.unheard: float | None = None
+        self._process: SpawnProcess = SPAWN.Process(
+            target=serve, args=(there, folders), name="symgrasp workshop", daemon=True
+        )
+        self._process.start()
+        there.close()
+
+    @property
+    def pid(self) -> int:
+        assert self._process.pid
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        return self._process.is_alive()
+
+    def end(self, grace: float = 0.0) -> str:
+        """End it, whatever it does, after it had some time (s); return how it ended by itself, if it did."""
+        self._process.join(grace)
+        code = self._process.exitcode
+        self._process.kill()
+        self._process.join()
+        self.line.connection.close()
+        return "" if code is None else signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+
+class Workshop:
+    """Computes for one browser; used by one thread at a time.
+
+    What is computed and how is said by `app.compute.Workbench` and `app.plan_bench.PlanBench`,
+    which work in the process. It is started when it is needed first.
+
+    Args:
+        store: knows the maps that were computed before, and keeps new ones.
+        staff: starts the process.
+        compiling: called when the process compiles something for the first time on this machine.
+    """
+
+    def __init__(self, store: Store, staff: Staff, compiling: Callable[[], None] = lambda: None) -> None:
+        self._store, self._staff, self._compiling = store, staff, compiling
+        self._process: _Process | None = None
+        self._lister: _Process | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process, None when there is none."""
+        return self._process.pid if self._process else None
+
+    def close(self) -> None:
+        """End the process; the next computation starts another."""
+        process, self._process = self._process, None
+        if process:
+            process.end()
+
+    def map(self, request: MapRequest, progress: Progress) -> MapResult:
+        """Return the map of a request, computed unless it is known."""
+        return self._store.map(request) or self._do("map", progress, request)
+
+    def check(self, request: CheckRequest, known: FeasibilityMap, progress: Progress) -> Check:
+        """Compute the map of the turned object from scratch, and compare it with the shifted one."""
+        return self._do("check", progress, request, known)
+
+    def explain(self, request: ExplainRequest, progress: Progress) -> Explained:
+        """Judge every candidate of a cell."""
+        return self._do("explain", progress, request)
+
+    def check_tasks(self, scene: Scene, progress: Progress) -> None:
+        """Check the tasks of a scene that came from outside."""
+        self._do("check_tasks", progress, scene)
+
+    def run(self, order: PlanOrder, book: PlanBook, progress: Progress) -> PlanBook:
+        """Run a planner; return the book with what it found, or with why it found nothing."""
+        found = self._do("run", progress, order, book.cleared())
+        self._lister = self._process
+        return found
+
+    def more(self, maps: Maps, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
+        """Return further plans of the last run, and whether there may be still more.
+
+        Raises:
+            NoPlanError: the process of the last run is gone, and its list with it.
+        """
+        if self._process is None or self._process is not self._lister:
+            raise NoPlanError("the list of solutions ended with the process that made it: plan again")
+        return self._do("more", progress, maps)
+
+    def open(self, content: bytes, name: str, progress: Progress) -> Opened:
+        """Read a plan file and verify it; if it holds, return all that is needed to show it."""
+        return self._do("open", progress, content, name)
+
+    def _do(self, name: str, progress: Progress, *args: object) -> Any:
+        process = self._ready(name, progress)
+        line = process.line
+        process.errand += 1
+        try:
+            line.forget_maps()
+            line.send(("do", process.errand, (name, args)))
+            return self._follow(process, progress)
+        except Cancelled:
+            process.unheard = time.monotonic()
+            with suppress(OSError):  # dead already: found out when it is needed next
+                line.send(("cancel", process.errand, None))
+            raise
+        except (EOFError, OSError) as error:
+            self._process = None
+            how = process.end(grace=1.0)  # a pipe may end a little before its process does
+            raise Died(f"the process that computes ended unexpectedly ({how or 'it hung up'})") from error
+
+    def _ready(self, name: str, progress: Progress) -> _Process:
+        """Return a process that waits for an errand."""
+        process = self._process
+        if process and process.unheard is not None:
+            try:
+                self._drain(process, process.unheard, progress)
+            except (EOFError, OSError):
+                self.close()
+        elif process and (not process.is_alive or (process.line.known > MOST_THINGS and name != "more")):
+            self.close()
+        if self._process is None:
+            self._process = self._staff.take()
+        return self._process
+
+    def _drain(self, process: _Process, since: float, progress: Progress) -> None:
+        """Wait until the process has heard the cancel, but not for ever."""
+        while process.unheard is not None:
+            if process.line.connection.poll(TICK):
+                word, _, content = process.line.receive()
+                if word == "keep":
+                    self._store.keep(content)
+                elif word in ("done", "failed"):
+                    process.unheard = None
+            elif time.monotonic() - since > PATIENCE:
+                self.close()
+                return
+            progress(0.0)
+
+    def _follow(self, process: _Process, progress: Progress) -> Any:
+        """Return what comes out of an errand."""
+        line, share = process.line, 0.0
+        while True:
+            if not line.connection.poll(TICK):
+                progress(share)
+                continue
+            word, _, content = line.receive()
+            if word == "progress":
+                share = content
+                progress(share)
+            elif word == "known?":
+                line.send(("known", process.errand, self._store.map(content)))
+            elif word == "keep":
+                self._store.keep(content)
+            elif word == "compiling":
+                self._compiling()
+            elif word == "failed":
+                if isinstance(content, (EOFError, OSError)):
+                    raise RuntimeError(f"{type(content).__name__}: {content}")
+                raise content
+            else:
+                return content
