@@ -76,7 +76,7 @@ class Busy:
         request: what it answers, None for what a person asked for.
         share: how much of it is done.
         late: whether it takes so long that the page says so and newer requests interrupt it.
-        compiling: whether it waits for code that is compiled for the first time.
+        compiling: whether code that it needs had to be compiled, which may happen in several pieces.
     """
 
     ticket: int

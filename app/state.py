@@ -157,10 +157,10 @@ class State(Leafing):
         late = late or busy.late
         if (share, late) == (busy.share, busy.late):
             return self
-        return replace(self, busy=replace(busy, share=share, late=late, compiling=False))
+        return replace(self, busy=replace(busy, share=share, late=late))
 
     def compiles(self, ticket: int) -> State:
-        """The computation waits for code that is compiled, and goes on with its next progress."""
+        """The computation waits for code that is compiled, now and perhaps once more before it ends."""
         return self.compiles_now() if self.busy and self.busy.ticket == ticket else self
 
     def compiles_now(self) -> State:

@@ -230,7 +230,8 @@ def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch)
     with open_house(house.store, "127.0.0.1", port), Wire(port) as visitor:
         visitor.wait_for(ready)
         visitor.set("x (cm)", 54.5)
-        visitor.wait_for("Compiling, once on this machine: a minute …")
+        visitor.wait_for(lambda _: any(w.get("value") == 50.0 for w in visitor.widgets.values()))
+        assert "Compiling, once on this machine: a minute …" in visitor.wait_for_quiet()
         visitor.set("Cancel", True)
         assert "Compiling" not in visitor.wait_for("Stopped: no map for this pose yet.")
 
