@@ -226,7 +226,7 @@ class Workshop:
                     self._store.keep(content)
                 elif word in ("done", "failed"):
                     process.unheard = None
-            elif time.monotonic() - since > PATIENCE:
+            if process.unheard is not None and time.monotonic() - since > PATIENCE:
                 self.close()
                 return
             progress(0.0)
