@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 import yourdfpy
 from trimesh.exchange.gltf import export_glb
+from trimesh.graph import smooth_shade
 from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
@@ -24,6 +25,12 @@ PLAIN: Color = (200, 202, 206, 255)
 
 WHITEST = 235
 """Brightest channel shown: pure white has no shading left to tell its shape."""
+
+FINEST = 2000
+"""Triangles of a visual; those with more are simplified, so that small machines draw them smoothly, too."""
+
+CREASE = np.deg2rad(30)
+"""Edges of simplified meshes that are sharper look sharp."""
 
 
 @lru_cache(maxsize=16)
@@ -60,7 +67,9 @@ def _add_visual(
     # colour (often an exporter's grey) does not.
     painted = len({color for color in own if color}) > 1
     origin = np.eye(4) if visual.origin is None else visual.origin
+    share = FINEST / sum(len(mesh.faces) for mesh in meshes)
     for mesh, color in zip(meshes, own, strict=True):
+        mesh = _simplified(mesh, share)
         if given is not None and not painted:
             color = tuple(round(255 * c) for c in given)
         paint = np.minimum(color or PLAIN, [WHITEST, WHITEST, WHITEST, 255]).astype(np.uint8)
@@ -99,3 +108,11 @@ def _shapes(visual: yourdfpy.Visual, link: str) -> list[trimesh.Trimesh]:
     for mesh in meshes:
         mesh.apply_scale(np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3))
     return meshes
+
+
+def _simplified(mesh: trimesh.Trimesh, share: float) -> trimesh.Trimesh:
+    """Return the shape of a mesh with this share of its triangles, or itself if that is all of them."""
+    if share >= 1.0:
+        return mesh
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)  # where vertices are double, gaps would open
+    return smooth_shade(mesh.simplify_quadric_decimation(percent=1.0 - share), angle=CREASE)

@@ -21,6 +21,10 @@ SOURCES = ("candidates.py", "manifold.py", "margins.py", "engine/*.py", "ik/*.py
 COMPILING = "compiling what this needs, once on this machine; it takes up to a minute"
 """What to tell people meanwhile."""
 
+# OpenMP's threads would spin while they wait for each other. Where something else, such as a browser,
+# has one of the cores, that makes a map take three times as long; else it gains next to nothing.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
 _config: Any = config  # numba fills it in as it is imported, where type checkers do not see it
 
 

@@ -42,8 +42,10 @@ def test_everything_has_a_key(open_page):
     press("PageUp")
     page.expect_title("· pick ·")
     press("Control+k")
-    page.page.get_by_placeholder("Search commands").fill("soda")
+    search = page.page.get_by_placeholder("Search commands")
+    search.fill("soda")
     press("Enter")
+    expect(search).to_be_hidden()  # until then, keys are its own
     page.expect_title("soda_can")
     press("Control+z")  # the scene as well, with its plan
     page.expect_title("pick_pour_place")
