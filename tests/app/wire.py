@@ -76,6 +76,7 @@ class Wire:
     def set(self, label: str, value: Any) -> None:
         """Change a widget as a person does."""
         uuid = next(uuid for uuid, w in self.widgets.items() if w.get("label") == label)
+        self.widgets[uuid]["value"] = value  # what the page sends for an instant before, it sends no more
         self._send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
 
     def trigger(self, command: str) -> None:
