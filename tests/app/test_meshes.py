@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.meshes import link_visuals
+from app.meshes import FINEST, link_visuals
 from symgrasp.errors import SymgraspError
 from symgrasp.robot_model import RobotModel
 from symgrasp.scene import Scene
@@ -85,3 +85,14 @@ def test_a_mesh_that_cannot_be_read_is_an_error(tmp_path):
     (tmp_path / "m.obj").write_text("this is no mesh")
     with pytest.raises(SymgraspError, match=r"m\.obj.*link base"):
         link_visuals(urdf(tmp_path, '<mesh filename="m.obj"/>'))
+
+
+def test_a_fine_mesh_is_shown_with_fewer_triangles_in_the_same_place(tmp_path):
+    fine = trimesh.creation.torus(0.1, 0.03, major_sections=200, minor_sections=100)
+    fine.export(tmp_path / "m.stl")  # every triangle with vertices of its own
+    (seen,) = loaded(link_visuals(urdf(tmp_path, '<mesh filename="m.stl"/>'))["base"]).dump()
+    assert len(fine.faces) > 10 * FINEST
+    assert 0.9 * FINEST < len(seen.faces) <= FINEST
+    points, _ = trimesh.sample.sample_surface(fine, 2000, seed=1)
+    _, distance, _ = trimesh.proximity.closest_point(seen, points + np.array([0.0, 0.0, 0.5]))
+    assert distance.max() < 0.001

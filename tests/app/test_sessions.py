@@ -148,7 +148,6 @@ def test_a_hundred_sessions_come_and_go_and_leave_nothing():
     assert after.things == before.things == [0, 0, 0]
     assert after.threads <= before.threads + 32  # viser's pool grows up to this many
     assert after.processes == 1  # the one that is kept for the next
-    print(before, after)
     assert after.memory - before.memory < 60  # maps that the store keeps; a world alone takes some 10
 
 
