@@ -20,9 +20,8 @@ class GraspPanel(Panel):
         super().__init__(gui, actions)
         self.h = gui.add_number("h (cm)", 0.0, step=0.1)
         self.theta = gui.add_number("θ (°)", 0.0, min=-180.0, max=180.0, step=0.1)
-        pick = lambda s, _: s.choose(self.h.value / 100, np.deg2rad(self.theta.value))  # noqa: E731
-        self.on(self.h, pick, "inputs")
-        self.on(self.theta, pick, "inputs")
+        self.on(self.h, lambda s, v: s.choose(v / 100, _shown(s).theta), "inputs")
+        self.on(self.theta, lambda s, v: s.choose(_shown(s).h, np.deg2rad(v)), "inputs")
         self.roll = self.choice("Roll", [roll.value for roll in RollChoice])
         self.on(self.roll, lambda s, v: s.choose_roll(RollChoice(v)))
         self.button("Let go", viser.Icon.HAND_OFF, lambda: actions.change(State.clear_pick), color="gray")
@@ -36,7 +35,12 @@ class GraspPanel(Panel):
 
     def write_inputs(self, state: State) -> None:
         """Show where the grasp is."""
-        pick = state.pick or Pick(state.scene.profile.h_min, 0.0)
+        pick = _shown(state)
         self.h.value = round(100 * pick.h, 2)
         self.theta.value = round(float(np.rad2deg(pick.theta)), 2)
         self.roll.value = state.roll.value
+
+
+def _shown(state: State) -> Pick:
+    """Return what the numbers show, which may not be in the widgets yet."""
+    return state.pick or Pick(state.scene.profile.h_min, 0.0)

@@ -22,6 +22,9 @@ from symgrasp.scene import Scene
 WAIT = 30_000
 """Longest wait (ms) for anything: the machine may be busy."""
 
+PACE = 80
+"""Time (ms) a key is held, and between two keys."""
+
 expect.set_options(timeout=WAIT)
 
 HARMLESS = ("THREE.Clock", "ReadPixels", "KHR_parallel_shader_compile", "GPU stall")
@@ -142,12 +145,13 @@ class GraspPage:
     def _enter(self, box: Locator, value: float) -> None:
         """Type a number over the one in a box.
 
-        The box looks where the caret was when a key went down, to tell what is new in it. It is in the
-        wrong place for a text that comes without a key: then the box may lose it.
+        By keys: the box looks where the caret was when one went down, to tell what is new in it, and may
+        lose a text that comes without any. At a person's pace: it sends one change in 50 ms, and a change
+        of the next box would take the place of one that waits.
         """
         box.press("ControlOrMeta+a")
-        box.fill(f"{value:g}")
-        box.press("Enter")
+        box.press_sequentially(f"{value:g}", delay=PACE)
+        box.press("Enter", delay=PACE)
 
     def slider_box(self, label: str) -> Locator:
         row = self.page.locator(f"xpath=//*[normalize-space(text())='{label}']/ancestor::*[.//input][1]")

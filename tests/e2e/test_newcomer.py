@@ -85,7 +85,7 @@ class Newcomer:
         if not box.count() or not box.is_visible():
             return False
         box.press("ControlOrMeta+a", timeout=BRIEFLY)
-        box.fill(value, timeout=BRIEFLY)
+        box.press_sequentially(value, timeout=BRIEFLY)
         box.press("Enter", timeout=BRIEFLY)
         return True
 
