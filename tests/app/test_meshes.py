@@ -90,9 +90,9 @@ def test_a_mesh_that_cannot_be_read_is_an_error(tmp_path):
 def test_a_fine_mesh_is_shown_with_fewer_triangles_in_the_same_place(tmp_path):
     fine = trimesh.creation.torus(0.1, 0.03, major_sections=200, minor_sections=100)
     fine.export(tmp_path / "m.stl")  # every triangle with vertices of its own
-    (seen,) = loaded(link_visuals(urdf(tmp_path, '<mesh filename="m.stl"/>'))["base"]).dump()
+    seen = loaded(link_visuals(urdf(tmp_path, '<mesh filename="m.stl"/>'))["base"]).to_mesh()
     assert len(fine.faces) > 10 * FINEST
     assert 0.9 * FINEST < len(seen.faces) <= FINEST
-    points, _ = trimesh.sample.sample_surface(fine, 2000, seed=1)
+    points = trimesh.sample.sample_surface(fine, 2000, seed=1)[0]
     _, distance, _ = trimesh.proximity.closest_point(seen, points + np.array([0.0, 0.0, 0.5]))
     assert distance.max() < 0.001
