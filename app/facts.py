@@ -17,7 +17,7 @@ from app.motion import Motion
 from app.plan_book import Kind, PlanBook
 from app.scene_files import Loaded
 from app.things import OWN, Thing
-from app.values import MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
+from app.values import MadeLink, MapRequest, MapResult, ObjectPose, PlanResult, RollChoice, moved
 from symgrasp.explain import Explanation, Verdict
 from symgrasp.feasibility import Cell, FeasibilityMap
 from symgrasp.plan import PlanTask
@@ -63,7 +63,7 @@ class Facts:
         board: whether the map is laid out in the scene as well.
         dark: whether the page is dark.
         loaded: the scene that was uploaded last.
-        link: the address that was made last, to open the page as it was then.
+        link: the one that was made last, to open the page as it was then.
         history: what can be undone and redone.
     """
 
@@ -89,7 +89,7 @@ class Facts:
     board: bool = True
     dark: bool = False
     loaded: Loaded | None = None
-    link: str = ""
+    link: MadeLink | None = None
     history: History = field(default_factory=History)
 
     @cached_property
@@ -166,6 +166,14 @@ class Facts:
             self.step, self.gizmo, self.errors, self.board, self.dark, self.thing, self.uploaded, self.loaded,
             *self.looking.inputs,
             *self.book.inputs,
+        )  # fmt: skip
+
+    @property
+    def told(self) -> tuple[object, ...]:
+        """Everything that a link tells, but for the camera."""
+        return (
+            self.scene, self.scene_name, self.thing, self.task, self.arm, self.poses, self.delta, self.roll,
+            self.pick, self.looking.view, self.gizmo, self.board, self.dark,
         )  # fmt: skip
 
     @cached_property

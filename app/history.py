@@ -113,5 +113,5 @@ def _restored(now: State, then: State, history: History) -> State:
     result = now.result if now.scene is then.scene else None
     if then.plan and then.shown:
         result = then.plan.maps.get((then.task, then.arm), result)
-    kept = {"uploaded": now.uploaded, "loaded": now.loaded}
+    kept = {"uploaded": now.uploaded, "loaded": now.loaded, "link": now.link}
     return replace(then, history=history, result=result, book=then.book.still(), **kept)

@@ -1,10 +1,11 @@
-"""Links that open the page as it is now: scene, object, hands, poses, grasp and camera in the address.
+"""Links that open the page as it is now: scene, object, hands, tasks, grasp and camera in the address.
 
 A link is readable, so that people may write one by hand; lengths are in cm, angles in degrees.
 
     ?scene=pick_pour_place&task=pour&arm=panda&turn=30&at.pour=50,10,30,110,90,0&h=12&theta=-40
 
-It names what the server has. What was uploaded is not in it: a saved scene file carries that.
+It names what the server has, and how the tasks differ from there (see `app.link_tasks`). What was
+uploaded is not in it: a saved scene file carries that.
 """
 
 from __future__ import annotations
@@ -15,28 +16,25 @@ from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
 
+from app.link_tasks import is_about_tasks, read_tasks, tasks_text
+from app.link_values import number, number_text, numbers, one
 from app.state import Pick, State
-from app.values import ObjectPose, RollChoice
+from app.values import Camera, RollChoice
 from symgrasp.errors import InputError, one_of
 from symgrasp.manifold import ROLLS
+from symgrasp.scene import Scene
 from symgrasp.views import View
 
 __all__ = ["Link", "link_of", "parse_link"]
 
 LONGEST = 4000
-"""Characters of a link that are looked at."""
+"""Characters of a link that are looked at: browsers tell the server of no address above 4096."""
 
 VISER = ("websocket", "darkMode", "showStats", "hideViserLogo", "fixedDpr")
 """What viser's own page understands in an address."""
 
-REACH = 1000.0
-"""No coordinate in a link is larger (m)."""
-
 ROUNDING = 1e-9
 """What the end of the object may have moved by being written down (m)."""
-
-Camera = tuple[float, ...]
-"""Where the camera stands and the point it looks at (m): six numbers."""
 
 
 @dataclass(frozen=True)
@@ -64,31 +62,30 @@ class Link:
             SymgraspError: a setting is none, or its value is unusable.
         """
         turn = 0.0
+        state = read_tasks(state, self.settings)
         for key, text in self.settings.items():
             if key == "task":
                 state = state.choose_task(text)
             elif key == "arm":
                 arms = state.scene.task(state.task).arms
-                state = state.choose_arm(_one(key, text, arms))
+                state = state.choose_arm(one(key, text, arms))
             elif key == "turn":
-                turn = np.deg2rad(_number(key, text))
+                turn = np.deg2rad(number(key, text))
             elif key == "roll":
-                state = state.choose_roll(RollChoice(_one(key, text, [r.value for r in RollChoice])))
+                state = state.choose_roll(RollChoice(one(key, text, [r.value for r in RollChoice])))
             elif key == "view":
-                view = View(_one(key, text, [v.value for v in View]))
+                view = View(one(key, text, [v.value for v in View]))
                 state = replace(state, looking=replace(state.looking, view=view))
             elif key in SWITCHES:
-                state = replace(state, **{key: _one(key, text, ("0", "1")) == "1"})
-            elif key.startswith("at."):
-                state = _move(state, key, text)
-            elif key not in ("h", "theta", "side"):
-                raise InputError("link", key, text, one_of((*KEYS, "at.<task>", "hand.<arm>"), key))
+                state = replace(state, **{key: one(key, text, ("0", "1")) == "1"})
+            elif key not in ("h", "theta", "side") and not is_about_tasks(key):
+                raise InputError("link", key, text, one_of(KEYS, key))
         return self._pick(state.turn(turn))
 
     def _pick(self, state: State) -> State:
         if "h" not in self.settings:
             return state
-        h, theta = (_number(key, self.settings.get(key, "0")) for key in ("h", "theta"))
+        h, theta = (number(key, self.settings.get(key, "0")) for key in ("h", "theta"))
         profile = state.scene.profile
         inside = float(np.clip(h / 100, profile.h_min, profile.h_max))
         h = inside if abs(inside - h / 100) < ROUNDING else h / 100
@@ -96,19 +93,27 @@ class Link:
         if "side" not in self.settings or state.pick is None:
             return state
         sides = [f"{np.rad2deg(roll):.0f}" for roll in ROLLS]
-        side = _one("side", self.settings["side"], sides)
+        side = one("side", self.settings["side"], sides)
         return replace(state, pick=Pick(state.pick.h, state.pick.theta, sides.index(side)))
 
 
 SWITCHES = ("board", "gizmo", "dark")
-KEYS = ("scene", "object", "camera", "task", "arm", "turn", "roll", "view", *SWITCHES, "h", "theta", "side")
+KEYS = (
+    "scene", "object", "hand.<arm>", "tasks", "arms.<task>", "at.<task>", "task", "arm", "turn", "roll",
+    "view", *SWITCHES, "h", "theta", "side", "camera",
+)  # fmt: skip
 
 
-def link_of(state: State, camera: Camera | None = None) -> str:
+def link_of(state: State, served: Scene, camera: Camera | None = None) -> str:
     """Return what stands behind the ``?`` of the address that opens a state again.
 
+    Args:
+        state: what is shown.
+        served: its scene as the server has it.
+        camera: where it is looked at from.
+
     Raises:
-        SymgraspError: something that was uploaded is shown.
+        SymgraspError: something that was uploaded is shown, or the link would be too long to be read.
     """
     for what, uploaded in (("scene", state.own_scene), ("object", state.thing and state.thing.measurement)):
         if uploaded:
@@ -118,12 +123,9 @@ def link_of(state: State, camera: Camera | None = None) -> str:
         parts["object"] = state.thing.choice
     parts |= {f"hand.{arm}": hand for arm, hand in state.scene.mounted.items()}
     parts |= {"task": state.task, "arm": state.arm}
-    for task, pose in state.poses.items():
-        lengths = (100 * v for v in (pose.x, pose.y, pose.z))
-        angles = np.rad2deg((pose.lean, pose.towards, pose.spin))
-        parts[f"at.{task}"] = ",".join(_short(v) for v in (*lengths, *angles))
+    parts |= tasks_text(state, served.tasks)
     optional: list[tuple[str, bool, Callable[[], str]]] = [
-        ("turn", state.delta != 0, lambda: _short(np.rad2deg(state.delta))),
+        ("turn", state.delta != 0, lambda: number_text(np.rad2deg(state.delta))),
         ("roll", state.roll is not RollChoice.EITHER, lambda: state.roll.value),
         ("view", state.looking.view is not View.REASON, lambda: state.looking.view.value),
         ("board", not state.board, lambda: "0"),
@@ -133,10 +135,14 @@ def link_of(state: State, camera: Camera | None = None) -> str:
     ]
     parts |= {key: text() for key, present, text in optional if present}
     if state.pick:
-        parts |= {"h": _short(100 * state.pick.h), "theta": _short(np.rad2deg(state.pick.theta))}
+        parts |= {"h": number_text(100 * state.pick.h), "theta": number_text(np.rad2deg(state.pick.theta))}
         if state.pick.roll is not None:
             parts["side"] = f"{np.rad2deg(ROLLS[state.pick.roll]):.0f}"
-    return urlencode(parts, safe=",°")
+    query = urlencode(parts, safe=",°")
+    if len(query) > LONGEST:
+        expected = f"at most {LONGEST} characters; save the scene instead"
+        raise InputError("link", "length", len(query), expected)
+    return query
 
 
 def parse_link(query: str) -> Link:
@@ -160,40 +166,6 @@ def parse_link(query: str) -> Link:
         settings.pop("scene", None),
         settings.pop("object", None),
         hands,
-        None if camera is None else tuple(_numbers("camera", camera)),
+        None if camera is None else tuple(numbers("camera", camera)),
         settings,
     )
-
-
-def _move(state: State, key: str, text: str) -> State:
-    task = state.scene.task(key.removeprefix("at.")).name
-    x, y, z, *angles = _numbers(key, text)
-    pose = ObjectPose(x / 100, y / 100, z / 100, *np.deg2rad(angles).tolist())
-    return replace(state, poses={**state.poses, task: pose})
-
-
-def _numbers(key: str, text: str) -> list[float]:
-    values = text.split(",")
-    if len(values) != 6:
-        raise InputError("link", key, text, "six numbers with commas between them")
-    return [_number(key, value) for value in values]
-
-
-def _number(key: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not abs(value) <= 100 * REACH:
-        raise InputError("link", key, text, "a number")
-    return value
-
-
-def _one(key: str, text: str, choices: tuple[str, ...] | list[str]) -> str:
-    if text not in choices:
-        raise InputError("link", key, text, one_of(choices, text))
-    return text
-
-
-def _short(value: float) -> str:
-    return f"{value + 0.0:.12g}"

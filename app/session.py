@@ -18,14 +18,14 @@ from app.compute import Store, check_visuals
 from app.controls import Controls
 from app.front_door import Visit
 from app.history import remember
-from app.links import Camera, link_of, parse_link
+from app.links import link_of, parse_link
 from app.map_picture import map_picture, picture_name
 from app.plan_desk import PlanDesk
 from app.scene_files import Loaded, read_scene, scene_yaml
 from app.snapshot import snapshot_html
 from app.state import State
 from app.things import OWN, Thing, check_size, from_library, from_mesh
-from app.values import MapRequest
+from app.values import Camera, MapRequest
 from app.view import SceneView
 from app.worker import Job, Worker
 from app.workshop import Staff, Workshop
@@ -77,6 +77,11 @@ class Session:
             on_board=lambda i, j: self.change(lambda s: s.choose_cell(i, j)),
             on_drag=lambda pose: self.change(lambda s: s.drag(pose), "gizmo"),
         )
+
+        @client.camera.on_update
+        async def _(_: viser.CameraHandle) -> None:
+            self.change(lambda s: s.seen_from(self._camera()))
+
         self._painter = threading.Thread(target=self._paint, name=f"painter {client.client_id}", daemon=True)
         self._painter.start()
         self._open_first()
@@ -182,14 +187,11 @@ class Session:
 
     def _load(self, state: State, choice: str) -> tuple[Scene, Thing | None]:
         """Return the scene with its own object or one of the library, sharing what others computed."""
-        if own := state.own_scene:
-            return (
-                (own, None) if choice == OWN else self._put(replace(state, scene=own), from_library(choice))
-            )
-        scene, thing = self.store.scene_with(state.scene_name, choice)
-        if scene.robots is state.scene.robots:
-            return scene, thing
-        return state.scene.with_object(scene.file.object.name, scene.profile), thing  # other hands
+        if choice == OWN:
+            opened = self._opened(state)
+            return state.scene.with_object(opened.file.object.name, opened.profile), None
+        shared = None if state.own_scene else self.store.scene_with(state.scene_name, choice)[1]
+        return self._put(state, shared or from_library(choice))
 
     def _put(self, state: State, thing: Thing) -> tuple[Scene, Thing]:
         """Return the scene with an object in place of its own."""
@@ -235,7 +237,8 @@ class Session:
         """Put what is shown into an address."""
 
         def make(state: State) -> State:
-            return replace(state, link=f"{self.visit.address}?{link_of(state, self._camera())}", problem="")
+            camera = self._camera()
+            return state.linked(f"{self.visit.address}?{link_of(state, self._opened(state), camera)}", camera)
 
         self.change(make)
 
@@ -251,6 +254,10 @@ class Session:
             self.change(lambda s: s.stopped(ticket))
 
         self.submit("Drawing the 3D view", lambda _: snapshot_html(state, camera, fov), done)
+
+    def _opened(self, state: State) -> Scene:
+        """Return the scene as it was opened, without what became of its object, hands and tasks since."""
+        return state.own_scene or self.store.scene(state.scene_name)
 
     def _camera(self) -> Camera:
         camera = self.client.camera

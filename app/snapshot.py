@@ -11,8 +11,8 @@ from typing import cast
 import numpy as np
 import viser
 
-from app.links import Camera
 from app.state import State
+from app.values import Camera
 from app.view import SceneView
 
 __all__ = ["any_port", "quiet_server", "snapshot_html", "stop_quietly"]

@@ -14,7 +14,7 @@ from app.plan_book import OpenedPlan, PlanBook
 from app.scene_files import Loaded
 from app.task_list import TaskList
 from app.things import Thing
-from app.values import MapResult, ObjectPose, PlanResult, RollChoice
+from app.values import Camera, MadeLink, MapResult, ObjectPose, PlanResult, RollChoice
 from symgrasp.errors import InputError
 from symgrasp.manifold import wrap
 from symgrasp.poses import Array
@@ -24,6 +24,9 @@ __all__ = ["Pick", "State"]
 
 GIZMO_NOISE = 1e-6
 """Change of position (m) or axis below which the gizmo only turned: browsers send rounded numbers."""
+
+CAMERA_NOISE = 1e-3
+"""How much (m) the camera may move before a link made of it is an earlier one: what links are rounded to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +224,18 @@ class State(Leafing):
         """Add a task with the object where it stands."""
         pose = self.request.T_world_object
         return self.change_tasks(lambda tasks: tasks.added(pose))
+
+    def linked(self, address: str, camera: Camera) -> State:
+        """Take the link that was made of it."""
+        return replace(self, link=MadeLink(address, self.told, camera), problem="")
+
+    def seen_from(self, camera: Camera) -> State:
+        """Look from somewhere: a link made elsewhere is no longer that of what is shown."""
+        if self.link is None or not self.link.told:
+            return self
+        if np.allclose(camera, self.link.camera, rtol=0, atol=CAMERA_NOISE):
+            return self
+        return replace(self, link=replace(self.link, told=()))
 
     def opened(self, opened: OpenedPlan, scene: Loaded | None, plan: PlanResult | None) -> State:
         """Take a plan from a file, with its scene; one that does not hold is only reported."""

@@ -16,7 +16,25 @@ from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
 from symgrasp.views import View
 
-__all__ = ["MapRequest", "MapResult", "ObjectPose", "PlanResult", "RollChoice", "moved"]
+__all__ = ["Camera", "MadeLink", "MapRequest", "MapResult", "ObjectPose", "PlanResult", "RollChoice", "moved"]
+
+Camera = tuple[float, ...]
+"""Where the camera stands and the point it looks at (m): six numbers."""
+
+
+@dataclass(frozen=True)
+class MadeLink:
+    """A link that was made.
+
+    Attributes:
+        address: the whole address.
+        told: what was shown then, see `app.facts.Facts.told`; nothing once it was looked at from elsewhere.
+        camera: where it was looked at from.
+    """
+
+    address: str
+    told: tuple[object, ...]
+    camera: Camera
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from app.panels.panel import Actions, Panel
 from app.scene_files import SCENE_LIMIT
 from app.state import State
 
-__all__ = ["FilesPanel"]
+__all__ = ["FilesPanel", "link_html"]
 
 
 class FilesPanel(Panel):
@@ -45,10 +45,19 @@ class FilesPanel(Panel):
         self.on(self.dark, lambda s, v: replace(s, dark=v))
 
     def show(self, state: State) -> None:
-        """Show the link that was made."""
-        link = escape(state.link, quote=True)
-        self.link.show(f'<div class="sg"><a class="sg-link" href="{link}">{link}</a></div>' if link else "")
+        """Show the link that was made, and whether it still opens what is shown."""
+        self.link.show(link_html(state))
 
     def write_inputs(self, state: State) -> None:
         """Show whether it is dark."""
         self.dark.value = state.dark
+
+
+def link_html(state: State) -> str:
+    """Show the link that was made last."""
+    if state.link is None:
+        return ""
+    address = escape(state.link.address, quote=True)
+    earlier = '<div class="sg-note sg-warning">The page has changed since: this opens it as it was.</div>'
+    note = "" if state.link.told == state.told else earlier
+    return f'<div class="sg"><a class="sg-link" href="{address}">{address}</a>{note}</div>'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.compute import Store
-from app.links import link_of, parse_link
+from app.history import remember, undo
+from app.links import LONGEST, link_of, parse_link
+from app.panels.files_panel import link_html
 from app.scene_files import Loaded
 from app.state import Pick, State
+from app.task_list import TaskList
 from app.things import from_library
 from app.values import RollChoice
 from symgrasp.errors import SymgraspError
@@ -25,11 +29,21 @@ POSES = st.fixed_dictionaries(
     {"x": LENGTHS, "y": LENGTHS, "z": LENGTHS, "lean": st.floats(0, 3), "towards": ANGLES}
 )
 
+EARLIER = "The page has changed since"
+
+
+def opened(name: str) -> State:
+    return State.of(load_small(name), name)
+
+
+def query_of(state: State, camera: tuple[float, ...] | None = None) -> str:
+    return link_of(state, load_small(state.scene_name), camera)
+
 
 def reopened(query: str, name: str) -> State:
     link = parse_link(query)
     assert link.scene == name
-    return link.apply(State.of(load_small(name), name))
+    return link.apply(opened(name))
 
 
 @settings(deadline=None)
@@ -44,7 +58,7 @@ def reopened(query: str, name: str) -> State:
 )
 def test_everything_chosen_comes_back(poses, delta, pick, roll, switches, task, view):
     name = "pick_pour_place"
-    state = State.of(load_small(name), name).choose_roll(roll)
+    state = opened(name).choose_roll(roll)
     for moved, pose in poses.items():
         state = state.choose_task(moved).move(**pose)
     board, gizmo, dark = switches
@@ -52,7 +66,7 @@ def test_everything_chosen_comes_back(poses, delta, pick, roll, switches, task, 
     state = replace(state, looking=replace(state.looking, view=view))
     if pick:
         state = replace(state, pick=Pick(*pick))
-    again = reopened(link_of(state), name)
+    again = reopened(query_of(state), name)
     assert (again.task, again.arm, again.roll) == (state.task, state.arm, state.roll)
     assert (again.board, again.gizmo, again.dark) == (board, gizmo, dark)
     assert again.looking == state.looking
@@ -68,10 +82,10 @@ def test_everything_chosen_comes_back(poses, delta, pick, roll, switches, task, 
 
 
 def test_a_link_is_short_and_readable():
-    state = State.of(load_small("soda_can"), "soda_can").move(x=0.5).turn(np.deg2rad(30))
-    assert "&turn=30" in link_of(state)
-    assert "&at.pick=50," in link_of(state)
-    query = link_of(State.of(load_small("soda_can"), "soda_can"), (1.0, 0.5, 0.7, 0.1, 0.0, 0.25))
+    state = opened("soda_can").move(x=0.5).turn(np.deg2rad(30))
+    assert "&turn=30" in query_of(state)
+    assert "&at.pick=50," in query_of(state)
+    query = query_of(opened("soda_can"), (1.0, 0.5, 0.7, 0.1, 0.0, 0.25))
     assert query == "scene=soda_can&task=pick&arm=panda&camera=1.000,0.500,0.700,0.100,0.000,0.250"
     assert parse_link(query).camera == (1.0, 0.5, 0.7, 0.1, 0.0, 0.25)
 
@@ -83,18 +97,130 @@ def test_objects_of_the_library_and_hands_come_back():
     assert thing
     assert thing.choice == "log_70mm"
     state = replace(State.of(scene, "log_iiwa_and_panda"), thing=thing)
-    again, _ = store.linked(parse_link(link_of(state)))
+    link = link_of(state, store.scene(state.scene_name))
+    again, _ = store.linked(parse_link(link))
     assert again.sha256 == scene.sha256
+    assert "tasks" not in link
 
 
 def test_what_was_uploaded_is_in_no_link():
     scene = load_small("soda_can")
     state = State.of(scene, "soda_can").load_scene(Loaded("mine.yaml (upload)", scene))
     with pytest.raises(SymgraspError, match=r"link: scene: 'an upload': .*save the scene instead"):
-        link_of(state)
+        link_of(state, scene)
     mesh = replace(from_library("log_70mm"), measurement=object())  # pyright: ignore[reportArgumentType]
     with pytest.raises(SymgraspError, match="link: object: 'an upload'"):
-        link_of(State.of(scene, "soda_can").choose_object(scene, mesh))
+        link_of(State.of(scene, "soda_can").choose_object(scene, mesh), scene)
+
+
+# -- the list of tasks ----------------------------------------------------------------------
+
+NAMES = st.sampled_from(
+    ["pick", "pour", "a, b", '"', "<script>alert(1)</script>", "&at.pick=1", "mäh ✓"]
+) | st.text(min_size=1, max_size=12)
+EDITS = st.one_of(
+    st.just(State.add_task),
+    st.just(lambda s: s.change_tasks(TaskList.removed)),
+    st.builds(lambda by: lambda s: s.change_tasks(lambda t: t.shifted(by)), st.integers(-3, 3)),
+    st.builds(lambda name: lambda s: s.change_tasks(lambda t: t.renamed(name)), NAMES),
+    st.builds(
+        lambda k: lambda s: s.choose_task(list(s.scene.tasks)[k % len(s.scene.tasks)]), st.integers(0, 9)
+    ),
+    st.builds(lambda pose: lambda s: s.move(**pose), POSES),
+    st.builds(lambda delta: lambda s: s.turn(delta), ANGLES),
+    st.just(State.reset_pose),
+)
+
+
+def assert_same_tasks(again: State, state: State) -> None:
+    tasks, right = again.moved_scene().tasks, state.moved_scene().tasks
+    assert list(tasks) == list(right)
+    for name, task in right.items():
+        assert tasks[name].arms == task.arms
+        assert np.allclose(tasks[name].T_world_object, task.T_world_object, rtol=0, atol=1e-9)
+    assert (again.task, again.arm) == (state.task, state.arm)
+    assert np.allclose(again.T_world_object, state.T_world_object, rtol=0, atol=1e-9)
+
+
+@given(
+    st.sampled_from(["pick_pour_place", "log_two_robots", "handover_between_robots"]),
+    st.lists(EDITS, max_size=12),
+)
+def test_tasks_changed_in_any_way_come_back(name, edits):
+    state = opened(name)
+    for edit in edits:
+        with suppress(SymgraspError):  # a name that is taken, the last task
+            state = edit(state)
+    query = query_of(state)
+    again = reopened(query, name)
+    assert_same_tasks(again, state)
+    assert query.isascii()
+
+
+def test_only_what_differs_from_the_servers_tasks_is_in_a_link():
+    state = opened("pick_pour_place")
+    assert "tasks" not in query_of(state)
+    swapped = state.change_tasks(lambda tasks: tasks.shifted(1))
+    assert query_of(swapped) == "scene=pick_pour_place&task=pick&arm=panda&tasks=pour,pick,place"
+    renamed = state.change_tasks(lambda tasks: tasks.renamed("a, b"))
+    assert "&tasks=%22a,+b%22,pour,place&at.a,+b=" in query_of(renamed)
+    assert "at.pour" not in query_of(renamed)
+    back = renamed.change_tasks(lambda tasks: tasks.renamed("pick"))
+    assert query_of(back) == query_of(state)
+    name = "handover_between_robots"
+    taken = opened(name).change_tasks(TaskList.removed).change_tasks(lambda tasks: tasks.renamed("pick"))
+    query = query_of(taken)
+    assert "&tasks=pick,place&arms.pick=left,right&at.pick=" in query
+    assert_same_tasks(reopened(query, name), taken)
+    assert_same_tasks(reopened(query.replace("&tasks=pick,place", "") + "&tasks=pick,place", name), taken)
+
+
+def test_a_known_task_can_be_put_back_and_a_new_one_stands_where_it_was_made():
+    state = opened("pick_pour_place").move(x=0.6).add_task().move(x=0.7)
+    again = reopened(query_of(state), "pick_pour_place")
+    assert list(again.poses) == ["pick"]
+    assert again.reset_pose().base.x == pytest.approx(0.7)
+    put_back = again.choose_task("pick").reset_pose()
+    assert put_back.base == opened("pick_pour_place").base
+
+
+def test_a_link_that_would_be_too_long_to_be_read_is_not_made():
+    state = opened("bottle_on_table")
+    with pytest.raises(
+        SymgraspError, match=r"link: length: \d+: expected at most 4000 .* save the scene instead"
+    ):
+        for _ in range(200):
+            assert len(query_of(state)) <= LONGEST
+            parse_link(query_of(state))
+            state = state.add_task()
+
+
+def test_a_link_that_is_shown_is_marked_once_something_else_is_shown():
+    state = opened("pick_pour_place")
+    camera = (1.0, 0.5, 0.7, 0.1, 0.0, 0.25)
+    assert link_html(state) == ""
+    state = state.linked("http://here/?scene=<script>", camera)
+    assert "<script>" not in link_html(state)
+    assert EARLIER not in link_html(state)
+    assert EARLIER not in link_html(state.seen_from(camera).retry().failed("something"))
+    for change in (
+        lambda s: s.seen_from((1.1, *camera[1:])),
+        lambda s: s.turn(0.1),
+        lambda s: s.choose_task("pour").move(x=0.5).choose_task("pick"),
+        lambda s: s.choose(0.1, 0.0),
+        lambda s: s.choose_roll(RollChoice.ZERO),
+        lambda s: replace(s, dark=True),
+        lambda s: s.change_tasks(lambda tasks: tasks.shifted(1)),
+        lambda s: s.move(x=0.51),
+    ):
+        assert EARLIER in link_html(change(state))
+    assert EARLIER not in link_html(state.turn(0.1).turn(0.0))
+    turned = remember(state, state.turn(0.1), "", 0.0)
+    assert EARLIER in link_html(turned)
+    assert EARLIER not in link_html(undo(turned))
+    elsewhere = turned.seen_from((1.1, *camera[1:]))
+    assert EARLIER in link_html(undo(elsewhere))
+    assert elsewhere.seen_from((1.2, *camera[1:])) is elsewhere
 
 
 @pytest.mark.parametrize(
@@ -116,6 +242,20 @@ def test_what_was_uploaded_is_in_no_link():
         ("h=5&side=90", "link: side: '90': expected one of"),
         ("roll=30", "link: roll: '30': expected one of"),
         ("camera=1,2,3", "link: camera: '1,2,3': expected six numbers"),
+        ("tasks=", "link: tasks: '': expected names with commas"),
+        ('tasks="pick', "link: tasks: '\"pick': expected names with commas"),
+        ("tasks=pick,pick", "link: tasks: 'pick': expected every name once"),
+        ("tasks=pik", "link: tasks: 'pik': expected one of 'pick' .*did you mean 'pick'.*at.<task>"),
+        ("tasks=pick,new", "link: tasks: 'new': expected one of 'pick'; a new task needs at.<task>"),
+        ("tasks=new&at.new=1,2", "link: at.new: '1,2': expected six numbers"),
+        ("tasks=new&at.new=1,2,3,4,5,6&task=pick", "task: 'pick': expected one of 'new'"),
+        ("tasks=new&at.new=1,2,3,4,5,6&at.pick=1,2,3,4,5,6", "task: 'pick': expected one of 'new'"),
+        ("tasks=pick,&at.=1,2,3,4,5,6", r"tasks\[1\]"),
+        ("tasks=" + "x" * 101 + "&at." + "x" * 101 + "=1,2,3,4,5,6", r"tasks\[0\]"),
+        ("arms.pick=none", "link: arms.pick: 'none': expected one of 'panda'"),
+        ("arms.pick=panda,panda", "link: arms.pick: 'panda': expected every name once"),
+        ("arms.pik=panda", "link: arms.pik: 'panda': expected arms of a task: one of 'pick'"),
+        ("tasks=pick&arms.pick=", "link: arms.pick: '': expected names with commas"),
         ("tsk=pick", "link: tsk: 'pick': expected .*did you mean 'task'"),
         ("scene=" + "x" * 5000, "link: length: 5006: expected at most 4000 characters"),
     ],

@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from html import escape, unescape
 from pathlib import Path
 
 import pytest
@@ -315,14 +316,49 @@ def test_hundreds_of_random_actions_end_in_the_picture_that_a_fresh_page_shows(h
         visitor.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
         visitor.trigger("Make a link")
         made = visitor.wait_for('class="sg-link"')
-        query = re.findall(r'href="[^"?]*\?([^"]*)"', made)[-1].replace("&amp;", "&")
-        with house.visit(query) as fresh:
+        with house.visit(link_in(made)) as fresh:
             again = fresh.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
         # The page may show the last map for a moment yet; it must end up with the fresh page's.
         html = visitor.wait_for(lambda html: picture(html) == picture(again))
         for part in (title, legend):
             assert part(again) == part(html)
     assert caplog.records == []
+
+
+def test_a_link_opens_the_tasks_that_a_person_made(house):
+    name = "<b>tilt</b>, pour & ✓"
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("Rotation (°)", 20.0)
+        visitor.trigger("Add a task with the object here")
+        visitor.wait_for(lambda _: any(w.get("value") == "task 2" for w in visitor.widgets.values()))
+        visitor.set("Task name", name)
+        visitor.set("Chosen task", "Rename")
+        visitor.wait_for(escape(name))
+        visitor.set("Chosen task", "Earlier")
+        visitor.wait_for(f"1 · {escape(name)}")
+        visitor.set("x (cm)", 52.0)
+        visitor.set("Object", "wine_bottle")  # the tasks stay
+        visitor.wait_for(lambda html: ready(html) and "the wine" in html)
+        visitor.trigger("Make a link")
+        made = visitor.wait_for('class="sg-link"')
+        assert "has changed since" not in made
+        with house.visit(link_in(made)) as fresh:
+            again = fresh.wait_for(ready)
+            for part in (tasks, title, picture):
+                assert part(again) == part(made)
+        assert escape(name) in tasks(made)
+        visitor.look_from(2.0, 1.5, 1.0)
+        visitor.wait_for("The page has changed since")
+
+
+def link_in(html: str) -> str:
+    """What stands behind the ? of the link that was made."""
+    return unescape(re.findall(r'class="sg-link" href="[^"?]*\?([^"]*)"', html)[-1])
+
+
+def tasks(html: str) -> str:
+    return re.findall(r'<div class="sg sg-tasks">(.*?)</div></div>', html)[0]
 
 
 def title(html: str) -> str:

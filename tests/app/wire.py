@@ -75,9 +75,14 @@ class Wire:
 
     def set(self, label: str, value: Any) -> None:
         """Change a widget as a person does."""
-        uuid = next(uuid for uuid, w in self.widgets.items() if w.get("label") == label)
+        labelled = (uuid for uuid, w in self.widgets.items() if w.get("label") == label)
+        uuid = next(uuid for uuid in labelled if self.widgets[uuid]["value"] is not None)  # no folder
         self.widgets[uuid]["value"] = value  # what the page sends for an instant before, it sends no more
         self._send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
+
+    def look_from(self, x: float, y: float, z: float) -> None:
+        """Move the camera."""
+        self._send({**CAMERA, "position": (x, y, z)})
 
     def trigger(self, command: str) -> None:
         """Choose a command in the palette."""
