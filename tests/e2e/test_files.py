@@ -82,6 +82,7 @@ def test_a_link_opens_the_page_as_it_was(open_page, browser: Browser):
     page.number("h (cm)", 12)
     page.number("θ (°)", 60)
     page.expect_title("· pour ·")
+    expect(page.text("h = 12 cm, θ = 60°")).to_be_visible()  # each number is answered in its turn
     seen, held = page.picture(), page.page.locator(".sg", has_text="h = 12 cm").inner_text()
     files(page)
     page.button("Make a link").click()
