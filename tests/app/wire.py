@@ -85,7 +85,9 @@ class Wire:
         self._send({**CAMERA, "position": (x, y, z)})
 
     def trigger(self, command: str) -> None:
-        """Choose a command in the palette."""
+        """Choose a command in the palette, once it is there."""
+        while command not in self.commands:
+            self._read()
         self._send({"type": "CommandTriggerMessage", "uuid": self.commands[command]})
 
     def _send(self, message: dict[str, Any]) -> None:
