@@ -13,7 +13,7 @@ import viser
 from app.compute import Store
 from app.front_door import HELLO, FrontDoor, Visit
 from app.session import Session
-from app.snapshot import quiet_server, stop_quietly
+from app.viser_server import quiet_server, stop_quietly
 from app.workshop import Staff
 
 __all__ = ["Reception", "open_house"]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import socket
-from contextlib import redirect_stdout
 from types import SimpleNamespace
 from typing import cast
 
@@ -14,29 +11,9 @@ import viser
 from app.state import State
 from app.values import Camera
 from app.view import SceneView
+from app.viser_server import quiet_server, stop_quietly
 
-__all__ = ["any_port", "quiet_server", "snapshot_html", "stop_quietly"]
-
-
-def any_port() -> int:
-    """Return a port of this machine that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def quiet_server() -> viser.ViserServer:
-    """Start a viser server that only this machine reaches, without its banner."""
-    with redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host="127.0.0.1", port=any_port(), verbose=False)
-    server.scene.world_axes.visible = False
-    return server
-
-
-def stop_quietly(server: viser.ViserServer) -> None:
-    """Stop a server without its farewell."""
-    with redirect_stdout(io.StringIO()):
-        server.stop()
+__all__ = ["snapshot_html"]
 
 
 def snapshot_html(state: State, camera: Camera, fov: float) -> str:

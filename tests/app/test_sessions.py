@@ -27,8 +27,8 @@ from app.compute import Store
 from app.panels.status_panel import StatusPanel
 from app.reception import Reception, open_house
 from app.session import Session
-from app.snapshot import any_port
 from app.view import SceneView
+from app.viser_server import any_port
 from symgrasp.world import BulletWorld
 from tests.app import troubles
 from tests.app.wire import Wire
