@@ -201,8 +201,9 @@ def circle(mark: Mark, grid: Manifold) -> str:
 def h_axis(grid: Manifold, height: int) -> str:
     """Draw the axis of heights beside a picture of that height (px)."""
     low, high = 100 * grid.profile.h_min, 100 * grid.profile.h_max
-    most = max(2, height / 28)
-    step = next(s for s in (0.5, 1, 2, 5, 10, 20, 50, 100, np.inf) if (high - low) / s <= most)
+    most = max(3, height / 28)
+    decade = 10 ** np.floor(np.log10((high - low) / most))
+    step = next(s * decade for s in (1, 2, 5, 10) if (high - low) / (s * decade) <= most * (1 + 1e-9))
     ticks = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step
     labels = (f'<span style="bottom:{100 * (h - low) / (high - low):.2f}%">{h + 0.0:g}</span>' for h in ticks)
     return f'<div class="sg-h">{"".join(labels)}<b>h (cm)</b></div>'

@@ -17,11 +17,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from app.map_view import COLUMNS, Mark, legend_html, map_html, prints_html, sample_columns
+from app.map_view import COLUMNS, Mark, h_axis, legend_html, map_html, prints_html, sample_columns
 from app.palette import OVERLAP, PRINTS, REASONS, faded, rgb, to_linear
 from app.prints import on_surface, shown_prints
 from app.values import RollChoice
 from symgrasp.manifold import Manifold
+from symgrasp.profile import Profile
 from symgrasp.reason import Reason
 from tests.app.test_state import opened, with_plan
 
@@ -90,6 +91,21 @@ def test_marks_stand_where_their_grasp_is():
     assert 'class="sg-mark" style="left:75.000%;bottom:50.000%"' in html
     assert "&lt;b&gt;" in html
     assert "<b>" not in html.replace("<b>h (cm)</b>", "").replace("<b>θ (°)</b>", "")
+
+
+@given(
+    base=st.floats(-1, 1),
+    tall=st.floats(-3, 3).map(lambda power: 10**power),
+    height=st.integers(50, 400),
+)
+def test_the_axis_has_round_heights_inside_whatever_the_object_measures(base, tall, height):
+    grid = Manifold(Profile([[base, 0.01], [base + tall, 0.01]]), 4, 8)
+    ticks = re.findall(r'bottom:([^%]+)%">([^<]+)<', h_axis(grid, height))
+    shares, heights = np.array([[float(share), float(h)] for share, h in ticks]).T
+    assert 1 <= len(ticks) <= max(4, height / 28 + 1)
+    assert (shares > -0.01).all() and (shares < 100.01).all()
+    rise = 100 * (base + tall * shares / 100) - heights  # cm
+    assert np.abs(rise).max() < 1e-3 * 100 * (tall + abs(base))
 
 
 def test_each_hand_has_its_colour_their_overlap_a_third_and_the_rest_is_clear():
