@@ -161,6 +161,11 @@ def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     points = (axis @ T_world_object.T)[:, :3]
     ahead = (points[2] - bases.mean(axis=0)) * [1.0, 1.0, 0.0]
     look_at = 0.8 * points[2] + 0.2 * (bases.mean(axis=0) + np.array([0.0, 0.0, 0.5]))
+    room = 0.2
+    if len(bases) > 1:  # all of them are looked at, also one that is far from the object
+        room = 0.4
+        everything = np.concatenate([bases, points])[:, :2]
+        look_at[:2] = (everything.min(axis=0) + everything.max(axis=0)) / 2
     if stand_around(scene, T_world_object):
         ahead = (bases[-1] - bases[0]) * [1.0, 1.0, 0.0]
     start = np.arctan2(ahead[1], ahead[0]) if np.linalg.norm(ahead) > 1e-6 else 0.0
@@ -168,7 +173,7 @@ def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     def view(azimuth: float) -> Viewpoint:
         direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         right = np.cross([0.0, 0.0, 1.0], direction)
-        reach = np.abs((np.concatenate([bases, points]) - look_at) @ right).max() + 0.2
+        reach = np.abs((np.concatenate([bases, points]) - look_at) @ right).max() + room
         return Viewpoint(look_at, direction, float(max(VIEW_WIDTH, 2 * reach)))
 
     def badness(view: Viewpoint) -> float:
