@@ -326,17 +326,19 @@ class Session:
             with telling_of_compiling(lambda: self.change(lambda s: s.compiles(ticket))):
                 return run(progress)
 
-        self.change(lambda s: s.started(ticket, label, request))
-        self.worker.submit(
-            Job(
-                run=telling,
-                progress=lambda share: self.change(
-                    lambda s: s.progressed(ticket, share, late=time.monotonic() - begun > LATE)
-                ),
-                done=lambda result: done(ticket, result),
-                failed=lambda problem: self._failed(ticket, problem),
-            )
+        job = Job(
+            run=telling,
+            progress=lambda share: self.change(
+                lambda s: s.progressed(ticket, share, late=time.monotonic() - begun > LATE)
+            ),
+            done=lambda result: done(ticket, result),
+            failed=lambda problem: self._failed(ticket, problem),
         )
+        # Both under one lock: a job that another thread began in between would be replaced by this one,
+        # and the state would wait for it for ever.
+        with self._changed:
+            self.change(lambda s: s.started(ticket, label, request))
+            self.worker.submit(job)
 
     def _failed(self, ticket: int, problem: str) -> None:
         with self._changed:

@@ -29,6 +29,7 @@ from app.reception import Reception, open_house
 from app.session import Session
 from app.view import SceneView
 from app.viser_server import any_port
+from app.worker import Worker
 from symgrasp.world import BulletWorld
 from tests.app import troubles
 from tests.app.wire import Wire
@@ -257,6 +258,29 @@ def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(house, m
         visitor.wait_for_quiet()
         visitor.wait_for(ready)
         assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [53.0]
+
+
+def test_what_a_person_asks_for_in_two_ways_at_once_leaves_nothing_half_begun(house, monkeypatch):
+    """A button is heard in a thread of viser's pool, a slider on its loop."""
+    submit, told, overtaken = Worker.submit, threading.Event(), threading.Event()
+
+    def slow(worker, job):
+        """Give the plan to the worker only when the map has overtaken it, if it can."""
+        in_pool = threading.current_thread().name.startswith("ThreadPool")
+        if in_pool and not told.is_set():
+            told.set()
+            overtaken.wait(1)
+        submit(worker, job)
+        if not in_pool:
+            overtaken.set()
+
+    with house.visit() as visitor:
+        first = picture(visitor.wait_for(ready))
+        monkeypatch.setattr(Worker, "submit", slow)
+        visitor.trigger("Plan one grasp for all tasks")
+        assert told.wait(30)
+        visitor.set("x (cm)", 47.5)
+        visitor.wait_for(lambda html: picture(html) != first and ready(html))
 
 
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
