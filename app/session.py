@@ -130,23 +130,20 @@ class Session:
         self._change_scene(f"Opening {name}", run, State.load_scene)
 
     def _open_first(self) -> None:
-        """Show what the address says, or the first scene and why not."""
+        """Show what the address says; if that cannot be done, `_failed` shows the first scene and why not."""
 
         def run(_: Progress) -> tuple[State, Camera | None]:
-            first = self.store.first
-            try:
-                link = parse_link(self.visit.query)
-                scene, thing = self.store.linked(link)
-                return link.apply(replace(State.of(scene, link.scene or first), thing=thing)), link.camera
-            except SymgraspError as error:
-                return State.of(self.store.scene(first), first).failed(str(error)), None
+            link = parse_link(self.visit.query)
+            scene, thing = self.store.linked(link)
+            name = link.scene or self.store.first
+            return link.apply(replace(State.of(scene, name), thing=thing)), link.camera
 
         def done(_: int, found: tuple[State, Camera | None]) -> None:
             state, self.view.camera = found
             with self._changed:
                 self._take(state, "")
 
-        self.submit("Loading", run, done)
+        self._begin("Loading", run, done)
 
     def choose_object(self, choice: str) -> None:
         """Put another object into the scene, on the worker."""
@@ -319,7 +316,21 @@ class Session:
         done: Callable[[int, Any], None],
         request: Request | None = None,
     ) -> None:
-        """Give the worker something to do, in place of what it does now."""
+        """Give the worker something to do, in place of what it does now.
+
+        Before the first scene stands nothing takes its place: the page would stay empty.
+        """
+        with self._changed:
+            if self.state is not None:
+                self._begin(label, run, done, request)
+
+    def _begin(
+        self,
+        label: str,
+        run: Callable[[Progress], Any],
+        done: Callable[[int, Any], None],
+        request: Request | None = None,
+    ) -> None:
         ticket, begun = next(self._tickets), time.monotonic()
 
         def telling(progress: Progress) -> Any:
@@ -343,7 +354,11 @@ class Session:
     def _failed(self, ticket: int, problem: str) -> None:
         with self._changed:
             self._write_inputs = True  # a scene that could not be loaded is still chosen in its widget
-        self.change(lambda s: s.stopped(ticket, problem))
+            if self.state is None:
+                first = self.store.first
+                self._take(State.of(self.store.scene(first), first).failed(problem), "")
+            else:
+                self.change(lambda s: s.stopped(ticket, problem))
 
     # -- drawing ----------------------------------------------------------------------------
 

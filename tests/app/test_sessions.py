@@ -283,6 +283,35 @@ def test_what_a_person_asks_for_in_two_ways_at_once_leaves_nothing_half_begun(ho
         visitor.wait_for(lambda html: picture(html) != first and ready(html))
 
 
+def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(house, monkeypatch):
+    linked, open_scene, asked = Store.linked, Session.open_scene, threading.Event()
+
+    def slow(store, link):
+        """Load the first scene only when another has been asked for."""
+        assert asked.wait(30)
+        return linked(store, link)
+
+    def told(session, name):
+        open_scene(session, name)
+        asked.set()
+
+    monkeypatch.setattr(Store, "linked", slow)
+    monkeypatch.setattr(Session, "open_scene", told)
+    with house.visit("scene=soda_can") as visitor:
+        visitor.trigger("Next scene")
+        assert "soda_can" in title(visitor.wait_for(ready))
+
+
+def test_a_first_scene_that_breaks_in_an_unexpected_way_leaves_no_empty_page(house, monkeypatch):
+    def broken(store, link):
+        raise RuntimeError("of this test")
+
+    monkeypatch.setattr(Store, "linked", broken)
+    with house.visit("scene=soda_can") as visitor:
+        visitor.wait_for("unexpected RuntimeError: of this test")
+        assert "bottle_on_table" in title(visitor.wait_for(ready))
+
+
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
     monkeypatch.setattr(workshop, "serve", troubles.serve_compiling)
     port = any_port()
