@@ -1,7 +1,8 @@
 """Undo and redo: what a person chose, step by step; a drag is one step. Pure, like the state.
 
-Only what is chosen goes back. What was computed stays where it still fits, and comes again from
-what the server remembers where it does not.
+Only what is chosen goes back, uploads with it: a scene or an object is on offer wherever it is shown.
+What was computed stays where it still fits, and comes again from what the server remembers where it
+does not.
 """
 
 from __future__ import annotations
@@ -113,5 +114,4 @@ def _restored(now: State, then: State, history: History) -> State:
     result = now.result if now.scene is then.scene else None
     if then.plan and then.shown:
         result = then.plan.maps.get((then.task, then.arm), result)
-    kept = {"uploaded": now.uploaded, "loaded": now.loaded, "link": now.link}
-    return replace(then, history=history, result=result, book=then.book.still(), **kept)
+    return replace(then, history=history, result=result, book=then.book.still(), link=now.link)

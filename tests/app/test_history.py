@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from app.history import DRAG_PAUSE, STEPS_KEPT, History, redo, remember, undo
+from app.scene_files import Loaded
 from app.state import State
+from app.things import from_library
 from app.values import RollChoice
 from tests.app.test_state import opened, small_map, with_plan
 from tests.conftest import load_small
@@ -118,6 +120,28 @@ def test_a_plan_comes_back_with_the_poses_it_was_made_for():
     assert back.shown is shown.shown
     assert back.is_current
     assert np.allclose(back.T_world_object, shown.T_world_object)
+
+
+def test_an_upload_is_on_offer_where_it_is_shown():
+    """Also where another one followed, of the same name or not."""
+    start = opened()
+    person = Person(start)
+    scenes = [
+        Loaded(f"{name} (upload)", replace(load_small("soda_can"))) for name in ("a.yaml", "b.yaml", "b.yaml")
+    ]
+    shown = [start, *[person.does(lambda s, new=new: s.load_scene(new)) for new in scenes]]
+    things = [replace(from_library("wine_bottle"), choice=c, measurement=object()) for c in ("1", "2", "2")]
+    for thing in things:
+        scene = person.state.scene.with_object(thing.name, thing.profile)
+        shown.append(person.does(lambda s, scene=scene, thing=thing: s.choose_object(scene, thing)))
+    assert [s.own_scene for s in shown[1:4]] == [loaded.scene for loaded in scenes]
+    assert [s.uploaded for s in shown[4:]] == things
+    for step, states in ((undo, shown[-2::-1]), (redo, shown[1:])):
+        for state in states:
+            now = person.does(step)
+            assert now.scene is state.scene
+            assert (now.own_scene, now.loaded) == (state.own_scene, state.loaded)
+            assert (now.thing, now.uploaded) == (state.thing, state.uploaded)
 
 
 def test_only_so_many_steps_are_kept_and_nothing_computed_with_them():
