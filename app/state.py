@@ -15,7 +15,7 @@ from app.scene_files import Loaded
 from app.task_list import TaskList
 from app.things import Thing
 from app.values import Camera, MadeLink, MapResult, ObjectPose, PlanResult, RollChoice
-from symgrasp.errors import InputError
+from symgrasp.errors import InputError, one_of
 from symgrasp.manifold import wrap
 from symgrasp.poses import Array
 from symgrasp.scene import Scene
@@ -70,8 +70,11 @@ class State(Leafing):
         return replace(self, task=name, arm=arm, delta=0.0, step=None, problem="")
 
     def choose_arm(self, name: str) -> State:
-        """Show another arm's map; of a plan that is shown, that arm's grasp."""
-        state = replace(self, arm=self.scene.arm(name).name, problem="")
+        """Show the map of another arm of the task; of a plan that is shown, that arm's grasp."""
+        arms = self.scene.task(self.task).arms
+        if name not in arms:
+            raise InputError("page", "arm", name, one_of(arms, name))
+        state = replace(self, arm=name, problem="")
         in_plan = self.shown and any(hold.arm == name for hold in self.shown.holds)
         return state.show_step(self.step or 0) if in_plan else replace(state, step=None)
 

@@ -12,7 +12,7 @@ from app.panels.panel import Actions, Panel
 from app.state import State
 from app.values import RollChoice
 
-__all__ = ["Keyboard"]
+__all__ = ["Keyboard", "next_arm"]
 
 TASKS = 9
 """Tasks that have a digit."""
@@ -35,7 +35,7 @@ class Keyboard(Panel):
         self.command("Redo", lambda: change(redo), "Z", "cmd/ctrl+shift")
         self.command("Cancel or compute again", actions.stop_or_retry, "escape")
         self._tasks: dict[str, viser.CommandHandle] = {}
-        self.command("Next arm", lambda: change(_next_arm), "M")
+        self.command("Next arm", lambda: change(next_arm), "M")
         self.command("Next roll", lambda: change(_next_roll), "R")
         self.command("Put the object back", lambda: change(State.reset_pose), "B")
         self.command("Let go of the grasp", lambda: change(State.clear_pick), "L")
@@ -76,7 +76,8 @@ class Keyboard(Panel):
         self.actions.open_scene(self._scenes[(known + 1) % len(self._scenes)])
 
 
-def _next_arm(state: State) -> State:
+def next_arm(state: State) -> State:
+    """Show the map of the task's next arm."""
     arms = state.scene.task(state.task).arms
     return state.choose_arm(arms[(arms.index(state.arm) + 1) % len(arms)])
 

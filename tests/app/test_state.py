@@ -15,6 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.compute import Store, Workbench
+from app.history import redo, remember, undo
+from app.panels.keyboard import next_arm
 from app.plan_bench import PlanBench, PlanOrder
 from app.plan_book import Kind, PlanBook
 from app.readout import postures
@@ -369,6 +371,17 @@ def test_both_arms_hold_in_a_bimanual_plan_and_either_map_can_be_seen():
     assert not (prints[0] & prints[1]).any()
 
 
+def test_only_an_arm_of_the_task_can_be_chosen():
+    state = opened("handover_between_robots")
+    assert (state.task, state.arm) == ("pick", "left")
+    assert next_arm(state).arm == "left"
+    with pytest.raises(SymgraspError, match=r"page: arm.*'right'.*one of 'left'"):
+        state.choose_arm("right")
+    both = state.choose_task("hand over").choose_arm("right")
+    assert both.arm == "right"
+    assert next_arm(both).arm == "left"
+
+
 def test_moving_an_object_drops_the_plan_and_the_planning():
     state = with_plan("bottle_on_table", "sequential")
     assert state.move(x=0.5).plan is None
@@ -386,6 +399,8 @@ def test_which_planner_has_something_to_do():
 
 # -- anything in any order ------------------------------------------------------------------
 
+PLANNER: dict[str, Kind] = {"pick_pour_place": "sequential", "handover_between_robots": "handover"}
+
 CHANGES = st.one_of(
     st.builds(lambda v: lambda s: s.turn(v), angle),
     st.builds(lambda v: lambda s: s.move(x=v), st.sampled_from([0.5, 0.55])),
@@ -393,13 +408,16 @@ CHANGES = st.one_of(
     st.builds(lambda h, t: lambda s: s.choose(h, t), st.floats(-0.1, 0.4), angle),
     st.builds(lambda i, j: lambda s: s.choose_surface_cell(i, j), st.integers(0, 7), st.integers(0, 15)),
     st.builds(lambda v: lambda s: s.choose_roll(v), st.sampled_from(list(RollChoice))),
-    st.builds(lambda v: lambda s: s.choose_task(v), st.sampled_from(["pick", "pour", "place", "none"])),
+    st.builds(lambda v: lambda s: s.choose_task(v), st.sampled_from(["pick", "pour", "hand over", "place"])),
+    st.builds(lambda v: lambda s: s.choose_arm(v), st.sampled_from(["panda", "left", "right"])),
     st.builds(lambda v: lambda s: s.show_step(v), st.integers(-1, 5)),
     st.sampled_from(
         [
             State.reset_pose,
             State.clear_pick,
             State.retry,
+            undo,
+            redo,
             lambda s: s.map_arrived(0, s.result) if s.result else s,
             lambda s: s.started(1, "map", s.wanted) if s.wanted else s,
             lambda s: s.progressed(1, 0.5, late=True),
@@ -408,19 +426,19 @@ CHANGES = st.one_of(
             lambda s: s.started(2, "Planning"),
             lambda s: replace(s, looking=s.looking.choose_compare(not s.looking.compare)),
             lambda s: s.choose_candidate(1),
-            lambda s: s if s.poses else s.booked(2, planned("pick_pour_place", "sequential")),
+            lambda s: s if s.poses else s.booked(2, planned(s.scene_name, PLANNER[s.scene_name])),
         ]
     ),
 )
 
 
 @settings(deadline=None, max_examples=150)
-@given(st.lists(CHANGES, max_size=12))
-def test_no_order_of_changes_breaks_the_picture(changes):
-    state = opened("pick_pour_place")
-    for change in changes:
+@given(st.sampled_from(list(PLANNER)), st.lists(CHANGES, max_size=12))
+def test_no_order_of_changes_breaks_the_picture(name, changes):
+    state = opened(name)
+    for time, change in enumerate(changes):
         try:
-            state = change(state)
+            state = remember(state, change(state), "", time)
         except SymgraspError as error:
             state = state.failed(str(error))
         assert state.task in state.scene.tasks
