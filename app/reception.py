@@ -13,7 +13,7 @@ import viser
 from app.compute import Store
 from app.front_door import HELLO, FrontDoor, Visit
 from app.session import Session
-from app.viser_server import quiet_server, stop_quietly
+from app.viser_server import quiet_server
 from app.workshop import Staff
 
 __all__ = ["Reception", "open_house"]
@@ -42,7 +42,7 @@ def open_house(store: Store, host: str, port: int) -> Iterator[Reception]:
             door.close()
     finally:
         reception.close()
-        stop_quietly(server)
+        server.stop()
 
 
 class Reception:

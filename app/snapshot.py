@@ -11,7 +11,7 @@ import viser
 from app.state import State
 from app.values import Camera
 from app.view import SceneView
-from app.viser_server import quiet_server, stop_quietly
+from app.viser_server import quiet_server
 
 __all__ = ["snapshot_html"]
 
@@ -42,7 +42,7 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
         start.up = (0.0, 0.0, 1.0)
         return server.get_scene_serializer().as_html(dark_mode=state.dark)
     finally:
-        stop_quietly(server)
+        server.stop()
 
 
 def _ignore(row: int, column: int) -> None:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
-import io
 import socket
-from contextlib import redirect_stdout
 
+import rich
 import viser
 from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-__all__ = ["WakingBuffer", "any_port", "quiet_server", "stop_quietly"]
+__all__ = ["WakingBuffer", "any_port", "quiet_server"]
 
 
 class _LoopEvent(asyncio.Event):
@@ -55,16 +54,10 @@ def any_port() -> int:
 
 
 def quiet_server() -> viser.ViserServer:
-    """Start a viser server that only this machine reaches, without its banner."""
+    """Start a viser server that only this machine reaches, without its banner and farewell."""
     # viser offers no place to hand it in.
     _infra.AsyncMessageBuffer = WakingBuffer  # pyright: ignore[reportPrivateImportUsage]
-    with redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host="127.0.0.1", port=any_port(), verbose=False)
+    rich.get_console().quiet = True  # what viser prints its banner and farewell on, and nobody else here
+    server = viser.ViserServer(host="127.0.0.1", port=any_port(), verbose=False)
     server.scene.world_axes.visible = False
     return server
-
-
-def stop_quietly(server: viser.ViserServer) -> None:
-    """Stop a server without its farewell."""
-    with redirect_stdout(io.StringIO()):
-        server.stop()

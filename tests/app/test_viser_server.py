@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import threading
+from typing import Any
 
 import viser
 from viser._messages import GuiUpdateMessage
 from viser.infra import Message
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from app.viser_server import WakingBuffer, quiet_server, stop_quietly
+from app.viser_server import WakingBuffer, quiet_server
 from tests.app.wire import Wire
 
 
@@ -76,5 +78,24 @@ def test_every_browser_is_served_from_such_a_buffer():
         with Wire(server.get_port()) as visitor:
             visitor.wait_for("hello")
     finally:
-        stop_quietly(server)
+        server.stop()
     assert [type(b) for b in buffers] == [WakingBuffer, WakingBuffer]
+
+
+def test_servers_start_and_stop_without_a_word_and_leave_standard_output_to_others(monkeypatch, capsys):
+    """Several threads may start one at once, so none may put another stream in its place meanwhile."""
+    outs: list[object] = []
+
+    class Watched(viser.ViserServer):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            outs.append(sys.stdout)
+            super().__init__(*args, **options)
+
+        def stop(self) -> None:
+            outs.append(sys.stdout)
+            super().stop()
+
+    monkeypatch.setattr(viser, "ViserServer", Watched)
+    quiet_server().stop()
+    assert outs == [sys.stdout, sys.stdout]
+    assert capsys.readouterr().out == ""
