@@ -12,11 +12,15 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from app.state import State
+    from symgrasp.feasibility import FeasibilityMap
 
-__all__ = ["DRAG_PAUSE", "STEPS_KEPT", "History", "redo", "remember", "undo"]
+__all__ = ["DRAG_PAUSE", "PLANS_KEPT", "STEPS_KEPT", "History", "redo", "remember", "undo"]
 
 STEPS_KEPT = 100
 """Steps that can be undone."""
+
+PLANS_KEPT = 6
+"""Findings of planners among them: a map may take 4 MB. Earlier steps come back without their plan."""
 
 DRAG_PAUSE = 0.8
 """Changes of one value that follow each other within this time (s) are one drag."""
@@ -72,7 +76,7 @@ def remember(before: State, after: State, origin: str, now: float) -> State:
     what = _what(before, after, origin)
     if origin and history.drag and history.drag.goes_on(what, now):
         return replace(after, history=replace(history, drag=Drag(history.drag.what, now)))
-    past = (*history.past, _chosen(before))[-STEPS_KEPT:]
+    past = _light((*history.past, _chosen(before))[-STEPS_KEPT:])
     return replace(after, history=History(past, (), Drag(what, now) if origin else None))
 
 
@@ -108,6 +112,20 @@ def _chosen(state: State) -> State:
     return replace(
         state, history=History(), looking=looking, result=None, refused=None, busy=None, problem=""
     )
+
+
+def _light(past: tuple[State, ...]) -> tuple[State, ...]:
+    """Drop the plans of the earliest steps, so that not every map that was ever planned with is kept."""
+    kept: set[frozenset[FeasibilityMap]] = set()
+    steps: list[State] = []
+    for state in reversed(past):
+        maps = frozenset(result.map for result in state.book.maps.values())
+        if maps and (maps in kept or len(kept) < PLANS_KEPT):
+            kept.add(maps)
+        elif maps:
+            state = replace(state, book=state.book.cleared(), step=None)
+        steps.append(state)
+    return tuple(reversed(steps))
 
 
 def _restored(now: State, then: State, history: History) -> State:

@@ -5,22 +5,26 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from weakref import WeakSet
 
 import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from app.history import DRAG_PAUSE, STEPS_KEPT, History, redo, remember, undo
+from app.history import DRAG_PAUSE, PLANS_KEPT, STEPS_KEPT, History, redo, remember, undo
+from app.plan_book import PlanBook
 from app.scene_files import Loaded
 from app.state import State
 from app.things import from_library
 from app.values import RollChoice
 from symgrasp.errors import InputError
-from tests.app.test_state import opened, small_map, with_plan
+from symgrasp.feasibility import FeasibilityMap
+from tests.app.test_state import opened, planned, small_map, with_plan
 from tests.conftest import load_small
 
 
@@ -153,6 +157,35 @@ def test_only_so_many_steps_are_kept_and_nothing_computed_with_them():
     past = person.state.history.past
     assert len(past) == STEPS_KEPT
     assert all(s.result is None and s.busy is None and s.history.past == () for s in past)
+
+
+def with_maps_of_its_own(book: PlanBook) -> PlanBook:
+    """As a planner finds it when the object has been moved."""
+    maps = {key: replace(result, map=replace(result.map)) for key, result in book.maps.items()}
+    return replace(book, maps=maps, plans=tuple(replace(plan, maps=maps) for plan in book.plans))
+
+
+def test_only_the_newest_plans_are_kept_with_their_maps():
+    person, shown = Person(with_plan("pick_pour_place", "sequential")), []
+    maps: WeakSet[FeasibilityMap] = WeakSet()
+
+    def plan(state: State) -> State:
+        book = with_maps_of_its_own(planned("pick_pour_place", "sequential"))
+        maps.update(result.map for result in book.maps.values())
+        return state.started(1, "Planning").booked(1, book)
+
+    for k in range(PLANS_KEPT + 3):
+        person.does(plan)
+        shown.append(person.does(lambda s: s.show_step(1)).pick)
+        person.does(lambda s, k=k: s.move(x=0.3 + 0.01 * k))
+    gc.collect()
+    assert len(maps) == 3 * PLANS_KEPT
+    for k, pick in reversed(list(enumerate(shown))):
+        back = person.does(undo)
+        assert (back.plan is not None) == (back.shown is not None) == (k >= 3)
+        assert back.pick == pick  # the grasp stays also without its plan
+        person.does(undo)
+        person.does(undo)
 
 
 class UndoMachine(RuleBasedStateMachine):
