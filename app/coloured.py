@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
+from app.keeping import kept_with_first
 from app.palette import PRINTS, faded
 from app.prints import print_index, shown_prints
 from app.state import State
@@ -16,7 +15,7 @@ from symgrasp.views import Colouring, View, colour
 __all__ = ["cell_colors", "coloured"]
 
 
-@lru_cache(maxsize=16)
+@kept_with_first
 def coloured(m: FeasibilityMap, roll: RollChoice, view: View = View.REASON) -> Colouring:
     """Colour a map as one panel (H, A)."""
     return colour(view, roll.reason(m), roll.values(m, view))

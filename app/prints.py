@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
+from app.keeping import kept_with_first
 from app.palette import OVERLAP, PRINTS
 from app.state import State
 from symgrasp.handprint import Handprint
-from symgrasp.manifold import Manifold
-from symgrasp.robot import Arm
+from symgrasp.scene import Scene
 
 __all__ = ["hand_color", "hand_print", "on_surface", "print_index", "print_names", "shown_prints"]
 
@@ -41,16 +40,15 @@ def shown_prints(state: State) -> list[np.ndarray]:
     """
     grid = state.scene.manifold
     if state.climbed and state.book.climb:
-        arms = [state.scene.arm(name) for name in state.book.climb.arms]
         return [
-            hand_print(arm, grid, cell.row, cell.roll).on(grid, cell.column)
-            for arm, cell in zip(arms, state.climbed.cells, strict=True)
+            hand_print(state.scene, arm, cell.row, cell.roll).on(grid, cell.column)
+            for arm, cell in zip(state.book.climb.arms, state.climbed.cells, strict=True)
         ]
     if state.plan and state.step is not None and state.shown and len(state.shown.holds) > 1:
         return list(state.plan.prints[state.step].values())
     if state.looking.handprint and state.pick and state.cell:
         row, column = grid.cell(state.pick.h, state.pick.theta)
-        return [hand_print(state.scene.arm(state.arm), grid, row, state.cell.roll).on(grid, column)]
+        return [hand_print(state.scene, state.arm, row, state.cell.roll).on(grid, column)]
     return []
 
 
@@ -63,10 +61,10 @@ def print_names(state: State) -> list[str]:
     return [state.arm]
 
 
-@lru_cache(maxsize=4096)
-def hand_print(arm: Arm, grid: Manifold, row: int, roll: int) -> Handprint:
+@kept_with_first
+def hand_print(scene: Scene, arm: str, row: int, roll: int) -> Handprint:
     """Return an arm's handprint at column 0; kept, as a replay asks for the same ones again and again."""
-    return arm.handprint(grid, row, roll)
+    return scene.arm(arm).handprint(scene.manifold, row, roll)
 
 
 def on_surface(state: State, cells: np.ndarray) -> np.ndarray:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from functools import lru_cache
 from html import escape
 from itertools import groupby
 
 import numpy as np
 
+from app.keeping import kept_with_first
 from app.map_view import THETA_AXIS, Mark, circle, h_axis, sample_columns, to_png
 from app.palette import INK, REASONS, rgb
 from app.state import State
@@ -70,11 +70,13 @@ def measures(hold: Hold) -> tuple[str, str, str]:
     )
 
 
-@lru_cache(maxsize=64)
 def shared_columns(maps: Sequence[FeasibilityMap], turns: Sequence[float], roll: int) -> np.ndarray:
     """Return where a roll is feasible in all maps (H, COLUMNS of a picture), each turned by its δ (rad)."""
-    turned = [m.shift(turn) for m, turn in zip(maps, turns, strict=True)]
-    return np.logical_and.reduce([m.feasible[roll][:, sample_columns(m.manifold)] for m in turned])
+    shared = []
+    for m, turn in zip(maps, turns, strict=True):
+        grid, k = m.manifold.shift(turn)  # not the whole map is shifted: this is drawn while maps slide
+        shared.append(np.roll(m.feasible[roll], -k, axis=1)[:, sample_columns(grid)])
+    return np.logical_and.reduce(shared)
 
 
 def _unplanned(state: State) -> str:
@@ -144,7 +146,7 @@ def _line(theta: float) -> str:
     return f'<i class="sg-line-theta" style="left:{left:.3f}%;border-color:{INK}"></i>'
 
 
-@lru_cache(maxsize=256)
+@kept_with_first
 def _picture(m: FeasibilityMap, roll: int | None) -> str:
     """Return a map's picture as a data URI: of one roll, or of either (None)."""
     reason = m.reason.max(axis=0) if roll is None else m.reason[roll]
