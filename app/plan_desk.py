@@ -6,6 +6,7 @@ import re
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from app.plan_bench import Opened, PlanOrder
@@ -33,7 +34,15 @@ TICK = 0.05
 class Office(Protocol):
     """What the desk needs of a browser's session."""
 
-    state: State | None
+    @property
+    def state(self) -> State | None:
+        """What is shown; None before the first scene stands."""
+        ...
+
+    @property
+    def lock(self) -> AbstractContextManager[bool]:
+        """Held while the state changes; who holds it may change it."""
+        ...
 
     def change(self, change: Callable[[State], State], origin: str = "") -> None:
         """Apply a change to the state."""
@@ -117,18 +126,21 @@ class PlanDesk:
 
     def play(self, change: Callable[[State], State]) -> None:
         """Start or stop a play."""
-        self.office.change(change)
-        state = self.office.state
-        if state and state.book.moving and not (self._player and self._player.is_alive()):
-            self._player = threading.Thread(target=self._play, name="player", daemon=True)
-            self._player.start()
+        with self.office.lock:  # a player that is about to end does so first, and another one begins
+            self.office.change(change)
+            state = self.office.state
+            if state and state.book.moving and not (self._player and self._player.is_alive()):
+                self._player = threading.Thread(target=self._play, name="player", daemon=True)
+                self._player.start()
 
     def _play(self) -> None:
         last = time.monotonic()
         while not self._ended.wait(TICK):
             now = time.monotonic()
-            self.office.change(lambda s, seconds=now - last: s.played(seconds), "play")
+            with self.office.lock:
+                self.office.change(lambda s, seconds=now - last: s.played(seconds), "play")
+                state = self.office.state
+                if state is None or not state.book.moving:
+                    self._player = None
+                    return
             last = now
-            state = self.office.state
-            if state is None or not state.book.moving:
-                return

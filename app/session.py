@@ -55,13 +55,18 @@ class Session:
         store: what all browsers share.
         staff: starts the process that computes.
         visit: the address it opened, which may say what to show first.
+
+    Attributes:
+        state: what is shown; None before the first scene stands.
+        lock: held while the state changes.
     """
 
     def __init__(self, client: viser.ClientHandle, store: Store, staff: Staff, visit: Visit) -> None:
         self.client, self.store, self.visit = client, store, visit
         self.state: State | None = None
         self._tickets = itertools.count(1)
-        self._changed = threading.Condition()
+        self.lock = threading.RLock()
+        self._changed = threading.Condition(self.lock)
         self._drawn: State | None = None
         self._write_inputs = self._move_gizmo = True
         self._writing = False
