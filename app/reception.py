@@ -7,6 +7,7 @@ import secrets
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html import escape
 
 import viser
 
@@ -106,8 +107,13 @@ class Reception:
             greeting.remove()
             self._staff.prepare()
             session = Session(client, self._store, self._staff, visit)
-        except Exception:
+        except Exception as error:
             log.exception("a session could not be opened")
+            client.gui.reset()
+            why = escape(f"{type(error).__name__}: {error}")
+            client.gui.add_html(
+                f'<div style="{STYLE}">This page could not be opened ({why}). Load it again.</div>'
+            )
             return
         with self._lock:
             self._sessions[client.client_id] = session

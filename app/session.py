@@ -74,7 +74,16 @@ class Session:
         self.workshop = Workshop(store, staff, lambda: self.change(State.compiles_now))
         self.plans = PlanDesk(self, self.workshop)
         self.worker = Worker(f"worker {client.client_id}", self.workshop.close)
-        self.controls = Controls(client, self, store.names)
+        try:
+            self._furnish()
+        except BaseException:
+            self.close()
+            raise
+
+    def _furnish(self) -> None:
+        """Put everything on the page and begin to draw."""
+        client = self.client
+        self.controls = Controls(client, self, self.store.names)
         self.view = SceneView(
             client,
             self.controls.view_width,

@@ -312,6 +312,23 @@ def test_a_first_scene_that_breaks_in_an_unexpected_way_leaves_no_empty_page(hou
         assert "bottle_on_table" in title(visitor.wait_for(ready))
 
 
+def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(house, monkeypatch):
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("of <this> test")
+
+    house.wait_until_empty()
+    before = set(threading.enumerate())
+    monkeypatch.setattr(SceneView, "__init__", broken)
+    with house.visit() as visitor:
+        html = visitor.wait_for("This page could not be opened (RuntimeError: of &lt;this&gt; test)")
+        assert "Loading" not in html
+        for thread in set(threading.enumerate()) - before:
+            if thread.name.startswith(("worker", "painter")):
+                thread.join(30)
+                assert not thread.is_alive()
+        assert house.reception.open == 0
+
+
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
     monkeypatch.setattr(workshop, "serve", troubles.serve_compiling)
     port = any_port()
