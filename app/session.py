@@ -391,6 +391,9 @@ class Session:
                 self.view.show(state, move_gizmo=move_gizmo)
             except Exception as error:  # one bad picture must not end the page
                 log.exception("a picture could not be drawn")
+                with self._changed:  # the next picture makes up for what this one left out
+                    self._write_inputs |= write_inputs
+                    self._move_gizmo |= move_gizmo
                 text = f"the picture could not be drawn: {type(error).__name__}: {error}"
                 if state.problem != text:
                     self.change(lambda s, text=text: s.failed(text))

@@ -329,6 +329,26 @@ def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(house, monkeypat
         assert house.reception.open == 0
 
 
+def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(house, monkeypatch):
+    show, broke = StatusPanel.show, threading.Event()
+
+    def breaks_once(panel, state):
+        if state.base.x == 0.55 and not broke.is_set():
+            broke.set()
+            raise RuntimeError("of this test")
+        show(panel, state)
+
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("x (cm)", 51.0)
+        visitor.wait_for_quiet()
+        monkeypatch.setattr(StatusPanel, "show", breaks_once)
+        visitor.trigger("Put the object back")
+        visitor.wait_for("the picture could not be drawn: RuntimeError: of this test")
+        visitor.wait_for_quiet()
+        assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [55.0]
+
+
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
     monkeypatch.setattr(workshop, "serve", troubles.serve_compiling)
     port = any_port()
