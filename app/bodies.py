@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import viser
@@ -26,6 +26,9 @@ SEAM_LIFT = 0.0012
 
 FLAT_SIZE = (0.33, 0.22)
 """Width and height (m) of the map laid out flat."""
+
+ASIDE = float(np.cos(np.deg2rad(65)))
+"""Cosine of the angle from which on it is turned to the camera."""
 
 OnCell = Callable[[int, int], None]
 
@@ -106,18 +109,29 @@ class FlatMap:
     ) -> None:
         add, grid = client.scene, state.scene.manifold
         width, height = FLAT_SIZE
-        axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
         self.frame = add.add_frame(root, show_axes=False)
-        place(self.frame, from_rotation(axes, board_position(state, view)))
+        self._position = board_position(state, view)
+        self._turn(view)
         add.add_box(
             f"{root}/back", dimensions=(width + 0.012, height + 0.012, 0.004), position=(0, 0, -0.004),
             color=(255, 255, 255), cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
-        add.add_label(
+        self.title = add.add_label(
             f"{root}/title", "unrolled map: click a cell", position=(0, height / 2 + 0.02, 0),
             anchor="bottom-center", font_screen_scale=0.8,
         )  # fmt: skip
         self.cells = CellQuads(client, f"{root}/cells", *flat(grid, width, height), grid.angles, on_cell)
+
+    def face(self, camera: Sequence[float]) -> None:
+        """Turn its front to a camera (see `app.values.Camera`) that sees it from behind or far aside."""
+        seen = self._view.seen_from((*camera[:3], *self._position))
+        if seen.direction @ self._view.direction < ASIDE:
+            self._turn(seen)
+
+    def _turn(self, view: Viewpoint) -> None:
+        self._view = view
+        axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
+        place(self.frame, from_rotation(axes, self._position))
 
     def show(self, state: State) -> None:
         """Bring it up to the state."""

@@ -65,15 +65,21 @@ class Controls:
                 map_tab.append(ViewPanel(gui, actions))
         with left.add_tab("Sequence", viser.Icon.ROUTE):
             sequence_tab = [
+                NotesPanel(gui, actions),
                 SequencePanel(gui, actions),
                 PlanPanel(gui, actions),
                 TasksPanel(gui, actions),
                 PlanFilePanel(gui, actions),
             ]
         with left.add_tab("Hands", viser.Icon.USERS):
-            hands_tab = [HandsPanel(gui, actions), PlanPanel(gui, actions), PlanFilePanel(gui, actions)]
+            hands_tab = [
+                NotesPanel(gui, actions),
+                HandsPanel(gui, actions),
+                PlanPanel(gui, actions),
+                PlanFilePanel(gui, actions),
+            ]
         with left.add_tab("Files", viser.Icon.FILES):
-            files_tab = [FilesPanel(gui, actions), NotesPanel(gui, actions)]
+            files_tab = [NotesPanel(gui, actions), FilesPanel(gui, actions)]
         left.dock_left()
         left.set_width(map_width)
         gui.main_panel.dock_right()

@@ -49,6 +49,7 @@ class Facts:
         uploaded: the object that was uploaded last.
         roll: the rolls shown.
         poses: task → base pose, of the tasks that were moved.
+        before: that of the chosen task when it was chosen; None where it had not been moved.
         delta: turn (rad) of the object about its axis.
         result: the newest map, maybe of an earlier request.
         refused: what was cancelled or failed: not tried again unasked.
@@ -75,6 +76,7 @@ class Facts:
     uploaded: Thing | None = None
     roll: RollChoice = RollChoice.EITHER
     poses: Mapping[str, ObjectPose] = field(default_factory=dict)
+    before: ObjectPose | None = None
     delta: float = 0.0
     result: MapResult | None = None
     refused: Request | None = None
@@ -144,6 +146,11 @@ class Facts:
     def is_obsolete(self) -> bool:
         """Whether something is being computed that nobody waits for any more."""
         return bool(self.busy and self.busy.request) and self.lacking is None
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether something is lacking that is not computed unless it is asked for again."""
+        return self.busy is None and self.unmet is not None
 
     @property
     def is_waiting(self) -> bool:

@@ -67,7 +67,8 @@ def read_tasks(state: State, settings: Mapping[str, str]) -> State:
         if where == "at" and scene.task(name).name in known:
             poses[name] = pose(key, text)
     task = scene.task()
-    return replace(state, scene=scene, poses=poses, task=task.name, arm=task.arms[0])
+    before = poses.get(task.name)
+    return replace(state, scene=scene, poses=poses, before=before, task=task.name, arm=task.arms[0])
 
 
 def _listed(scene: Scene, settings: Mapping[str, str]) -> Scene:

@@ -115,8 +115,8 @@ def status_html(state: State) -> str:
         doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %"
         if state.busy.compiling:
             doing = "Compiling, once on this machine: a minute …"
-    elif not state.busy and not state.is_current:
-        doing = "Stopped: no map for this pose yet."
+    elif state.is_stopped:
+        doing = "Stopped." if state.is_current else "Stopped: no map for this pose yet."
     return (
         f'<div class="sg">Drag <b>Rotation</b>: the {thing} turns and its map slides along, with nothing '
         "computed anew. Then click a green cell to see the grasp.</div>"

@@ -94,6 +94,7 @@ class Session:
 
         @client.camera.on_update
         async def _(_: viser.CameraHandle) -> None:
+            self.view.seen_from(self._camera())
             self.change(lambda s: s.seen_from(self._camera()))
 
         self._painter = threading.Thread(target=self._paint, name=f"painter {client.client_id}", daemon=True)

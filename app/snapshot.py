@@ -36,7 +36,10 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
             camera=SimpleNamespace(image_width=1280, image_height=800),
         )
         view = SceneView(cast("viser.ClientHandle", stage), 0, _ignore, _ignore, lambda _: None)
+        view.camera = camera
         view.show(state, move_gizmo=True)
+        assert view.board
+        view.board.title.text = "unrolled map"  # nobody answers clicks
         start = server.initial_camera
         start.position, start.look_at, start.fov = np.array(camera[:3]), np.array(camera[3:]), fov
         start.up = (0.0, 0.0, 1.0)

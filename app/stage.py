@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,9 @@ VIEW_HEIGHT = np.deg2rad(24)
 VIEW_WIDTH = 1.3
 """Smallest width (m) that is seen where the camera looks at."""
 
+STEEP = 1e-3
+"""A camera that is less (m) than this beside what it looks at is above it: it has no direction."""
+
 AZIMUTHS = np.deg2rad([65, -65, 40, -40, 90, -90, 115, -115])
 """Directions to look from, against that from robot to object, the better ones first."""
 
@@ -66,6 +70,12 @@ class Viewpoint:
     def right(self) -> Array:
         """Direction (3,) that points right in the picture."""
         return np.cross([0.0, 0.0, 1.0], self.direction)
+
+    def seen_from(self, camera: Sequence[float]) -> Viewpoint:
+        """Return the view that a camera has of the same: see `app.values.Camera`."""
+        direction = (np.array(camera[:3]) - camera[3:]) * [1.0, 1.0, 0.0]
+        length = np.linalg.norm(direction)
+        return replace(self, direction=direction / length) if length > STEEP else self
 
     def camera(self, aspect: float) -> Array:
         """Return where the camera stands (3,), for a picture of this width by height."""
@@ -159,6 +169,8 @@ def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     bases = np.array([robot.T_world_base[:3, 3] for robot in scene.robots.values()])
     axis = np.array([[0.0, 0.0, h, 1.0] for h in np.linspace(scene.profile.h_min, scene.profile.h_max, 5)])
     points = (axis @ T_world_object.T)[:, :3]
+    middle = [0.0, 0.0, (scene.profile.h_min + scene.profile.h_max) / 2, 1.0]
+    places = np.array([(task.T_world_object @ middle)[:3] for task in scene.tasks.values()])
     ahead = (points[2] - bases.mean(axis=0)) * [1.0, 1.0, 0.0]
     look_at = 0.8 * points[2] + 0.2 * (bases.mean(axis=0) + np.array([0.0, 0.0, 0.5]))
     room = 0.2
@@ -173,7 +185,7 @@ def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     def view(azimuth: float) -> Viewpoint:
         direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         right = np.cross([0.0, 0.0, 1.0], direction)
-        reach = np.abs((np.concatenate([bases, points]) - look_at) @ right).max() + room
+        reach = np.abs((np.concatenate([bases, points, places]) - look_at) @ right).max() + room
         return Viewpoint(look_at, direction, float(max(VIEW_WIDTH, 2 * reach)))
 
     def badness(view: Viewpoint) -> float:

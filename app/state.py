@@ -67,7 +67,8 @@ class State(Leafing):
         if name == self.task:
             return self
         arm = self.arm if self.arm in task.arms else task.arms[0]
-        return replace(self, task=name, arm=arm, delta=0.0, step=None, problem="")
+        before = self.poses.get(name)
+        return replace(self, task=name, arm=arm, before=before, delta=0.0, step=None, problem="")
 
     def choose_arm(self, name: str) -> State:
         """Show the map of another arm of the task; of a plan that is shown, that arm's grasp."""
@@ -214,19 +215,21 @@ class State(Leafing):
             return self
         arms = after.scene.task(after.task).arms
         stays = np.array_equal(after.T_world_object, before.T_world_object)
+        is_same = len(after.scene.tasks) == len(before.scene.tasks)
         return replace(
             self._without_plan(),
             scene=after.scene,
             poses=after.poses,
             task=after.task,
             arm=self.arm if self.arm in arms else arms[0],
+            before=self.before if is_same else after.poses.get(after.task),
             delta=self.delta if stays else 0.0,
         )
 
     def add_task(self) -> State:
-        """Add a task with the object where it stands."""
+        """Add a task with the object where it stands; that of the chosen task was only moved for this."""
         pose = self.request.T_world_object
-        return self.change_tasks(lambda tasks: tasks.added(pose))
+        return self.change_tasks(lambda tasks: tasks.added(pose, self.before))
 
     def linked(self, address: str, camera: Camera) -> State:
         """Take the link that was made of it."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from app.values import ObjectPose
-from symgrasp.errors import InputError
+from symgrasp.errors import InputError, SceneError
 from symgrasp.poses import Array
 from symgrasp.scene import Scene
 from symgrasp.scene_build import Task
@@ -33,14 +33,23 @@ class TaskList(NamedTuple):
         pose = self.poses.get(self.task)
         return pose.matrix() if pose else self.scene.task(self.task).T_world_object
 
-    def added(self, pose: Array) -> TaskList:
-        """Add a task at an object pose (4, 4), after the chosen one and with its arms."""
+    def added(self, pose: Array, back: ObjectPose | None) -> TaskList:
+        """Add a task at an object pose (4, 4), after the chosen one and with its arms.
+
+        Args:
+            pose: that of the new task.
+            back: where the object of the chosen task was moved to before it was moved to the new pose;
+                None for where the scene has it.
+        """
         names = list(self.scene.tasks)
         number = next(n for n in range(len(names) + 1, 10**9) if f"task {n}" not in names)
         task = Task(f"task {number}", self.scene.task(self.task).arms, pose)
         tasks = list(self.scene.tasks.values())
         tasks.insert(names.index(self.task) + 1, task)
-        return TaskList(self.scene.with_tasks(tasks), self.poses, task.name)
+        poses = {name: known for name, known in self.poses.items() if name != self.task}
+        if back:
+            poses[self.task] = back
+        return TaskList(self.scene.with_tasks(tasks), poses, task.name)
 
     def removed(self) -> TaskList:
         """Remove the chosen task and choose its neighbour.
@@ -70,7 +79,7 @@ class TaskList(NamedTuple):
         """Call the chosen task something else.
 
         Raises:
-            SceneError: the name is taken or no name.
+            InputError: the name is taken or no name.
         """
         name = name.strip()
         if name == self.task:
@@ -80,4 +89,7 @@ class TaskList(NamedTuple):
             for task in self.scene.tasks.values()
         ]
         poses = {name if known == self.task else known: pose for known, pose in self.poses.items()}
-        return TaskList(self.scene.with_tasks(tasks), poses, name)
+        try:
+            return TaskList(self.scene.with_tasks(tasks), poses, name)
+        except SceneError as error:  # which file the tasks came from does not matter here
+            raise InputError("tasks", error.field, name, error.expected) from None

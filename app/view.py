@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import viser
@@ -12,6 +12,7 @@ from app.ghost_view import GhostView
 from app.readout import postures
 from app.stage import FIELD_OF_VIEW, add_floor, add_lights, add_obstacle, viewpoint
 from app.state import State
+from app.values import Camera
 from symgrasp.poses import Array
 from symgrasp.scene import Scene
 
@@ -43,8 +44,9 @@ class SceneView:
         self._scene: Scene | None = None
         self._builds = 0
         self._dark = False
-        self.camera: Sequence[float] | None = None  # where the first scene is looked at from, and whereto
+        self.camera: Camera | None = None  # where the first scene is looked at from, and whereto
         self._root = self._object_root = ""
+        self.board: FlatMap | None = None
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
         """Bring the view up to the state; the gizmo only moves along if nobody is dragging it."""
@@ -62,18 +64,25 @@ class SceneView:
             if state.unmet is None or not state.busy:
                 self.ghost.show(state)
             self.object.show(state, move_gizmo=move_gizmo)
-            self.board.show(state)
+            if self.board:
+                self.board.show(state)
+
+    def seen_from(self, camera: Camera) -> None:
+        """Turn the flat map to where it is looked at from, if it can no longer be read from there."""
+        if self.board:
+            self.board.face(camera)
 
     def _build(self, state: State) -> None:
         """Replace everything by another scene."""
         client, scene = self.client, state.scene
         root = self._root = self._replace(self._root, "/stage")
         self._object_root = ""
-        view = self._viewpoint = viewpoint(scene, state.T_world_object)
+        given, self.camera = self.camera, None
+        view = viewpoint(scene, state.T_world_object)
+        view = self._viewpoint = view.seen_from(given) if given else view
         with client.atomic():
             client.camera.fov = FIELD_OF_VIEW
             client.camera.up_direction = (0.0, 0.0, 1.0)
-            given, self.camera = self.camera, None
             client.camera.position = np.array(given[:3]) if given else view.camera(self._aspect())
             client.camera.look_at = np.array(given[3:]) if given else view.look_at
         client.scene.add_frame(root, show_axes=False)

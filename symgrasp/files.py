@@ -81,6 +81,10 @@ def parse_yaml(text: str) -> Any:
             raise ValueError("aliases that stand for too much")
     except RecursionError:
         raise ValueError("nested too deeply") from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise ValueError(f"{where}{error.problem}") from error
     except Exception as error:  # the parser raises whatever a malformed scalar makes Python raise
         raise ValueError(" ".join(f"{error or type(error).__name__}".split())) from error
     return content

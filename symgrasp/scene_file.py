@@ -257,5 +257,7 @@ def describe(error: ValidationError, content: Any) -> tuple[str, object, str]:
         return field, first["input"], "a key of the file format; check its spelling"
     if first["type"] == "missing":
         return field, None, "a value; this key is required"
+    if first["type"] == "too_short":
+        return field, first["input"], f"at least {first.get('ctx', {})['min_length']} of them"
     expected = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return field or "file", first["input"], expected

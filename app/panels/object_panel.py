@@ -11,14 +11,15 @@ from app.panels.panel import Actions, Panel, within
 from app.state import State
 from app.things import UNITS, UPLOAD_LIMIT, choices
 from symgrasp.mesh_io import MESH_ENDINGS
+from symgrasp.scene import Scene
 
-__all__ = ["ObjectPanel"]
+__all__ = ["ObjectPanel", "span"]
 
 TURN_STEP = 0.25
 """Step of the rotation slider (degrees): one column of the map's picture."""
 
-REACH = 200.0
-"""How far (cm) the object may be moved from the world's origin."""
+BEYOND = 100.0
+"""How far (cm) beyond every robot and task the object may be moved."""
 
 COLOURS = ("map", "symmetry error")
 """What the object's surface may show."""
@@ -64,7 +65,7 @@ class ObjectPanel(Panel):
         )  # fmt: skip
         self.on(self.turn, lambda s, v: s.turn(np.deg2rad(v)), "inputs")
         self.position = {
-            axis: gui.add_slider(f"{axis} (cm)", -REACH, REACH, 0.5, 0.0) for axis in ("x", "y", "z")
+            axis: gui.add_slider(f"{axis} (cm)", -BEYOND, BEYOND, 0.5, 0.0) for axis in ("x", "y", "z")
         }
         for axis, slider in self.position.items():
             self.on(slider, lambda s, v, axis=axis: s.move(**{axis: v / 100}), "inputs")
@@ -94,7 +95,8 @@ class ObjectPanel(Panel):
         """Show the object and its pose."""
         base = state.base
         self.turn.value = within(self.turn, np.rad2deg(state.delta))
-        for axis, slider in self.position.items():
+        for k, (axis, slider) in enumerate(self.position.items()):
+            slider.min, slider.max = span(state.scene, k)
             slider.value = within(slider, 100 * getattr(base, axis))
         self.lean.value = within(self.lean, np.rad2deg(base.lean))
         self.towards.value = within(self.towards, np.rad2deg(base.towards))
@@ -102,3 +104,12 @@ class ObjectPanel(Panel):
         self.colours.visible = bool(state.thing and state.thing.measurement)
         self.colours.value = COLOURS[state.errors]
         self.gizmo.value = state.gizmo
+
+
+def span(scene: Scene, axis: int) -> tuple[float, float]:
+    """Return how far (cm) an object may be moved along a coordinate: it ends with round figures."""
+    poses = [robot.T_world_base for robot in scene.robots.values()]
+    poses += [task.T_world_object for task in scene.tasks.values()]
+    places = [100 * pose[axis, 3] for pose in poses]
+    low, high = min(places) - BEYOND, max(places) + BEYOND
+    return float(np.floor(low / 10) * 10), float(np.ceil(high / 10) * 10)

@@ -79,7 +79,7 @@ class TasksPanel(Panel):
                 viser.Icon.PLUS,
                 lambda: actions.change(State.add_task),
                 color="gray",
-                hint="The object's present pose becomes a task after the chosen one",
+                hint="The object's present pose becomes a task after the chosen one, which stays as it was",
             )
             self.name = gui.add_text("Task name", "")
             changes: dict[str, Callable[[TaskList], TaskList]] = {

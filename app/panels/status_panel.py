@@ -29,16 +29,15 @@ class StatusPanel(Panel):
     def show(self, state: State) -> None:
         """Say what is being done."""
         self.status.show(status_html(state))
-        retry = state.busy is None and not state.is_current
         self.progress.value = 100 * state.busy.share if state.busy and state.is_waiting else 0.0
-        again = "Restart" if state.problem else "Compute the map"
-        self.stop.label = again if retry else "Cancel"
-        self.stop.icon = viser.Icon.REFRESH if retry else viser.Icon.X
-        self.stop.disabled = not state.is_waiting and not retry
+        again = "Restart" if state.problem else "Go on" if state.is_current else "Compute the map"
+        self.stop.label = again if state.is_stopped else "Cancel"
+        self.stop.icon = viser.Icon.REFRESH if state.is_stopped else viser.Icon.X
+        self.stop.disabled = not state.is_waiting and not state.is_stopped
 
 
 class NotesPanel(Panel):
-    """What went wrong, and what the object is inside of."""
+    """What went wrong, and what the object is inside of; in every tab, since only one is seen."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)

@@ -176,7 +176,8 @@ def test_only_what_differs_from_the_servers_tasks_is_in_a_link():
 
 
 def test_a_known_task_can_be_put_back_and_a_new_one_stands_where_it_was_made():
-    state = opened("pick_pour_place").move(x=0.6).add_task().move(x=0.7)
+    state = opened("pick_pour_place").move(x=0.6).choose_task("pour").choose_task("pick")
+    state = state.add_task().move(x=0.7)
     again = reopened(query_of(state), "pick_pour_place")
     assert list(again.poses) == ["pick"]
     assert again.reset_pose().base.x == pytest.approx(0.7)

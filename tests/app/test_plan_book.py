@@ -20,7 +20,7 @@ from app.prints import shown_prints
 from app.readout import postures
 from app.state import State
 from app.task_list import TaskList
-from symgrasp.errors import PlanError, SceneError, SymgraspError
+from symgrasp.errors import InputError, PlanError, SceneError, SymgraspError
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.poses import pose_error
 from symgrasp.scene import Scene
@@ -60,6 +60,22 @@ def test_the_objects_pose_becomes_a_task_whose_map_is_known():
     assert added.map_arrived(0, known).is_current
 
 
+def test_a_move_that_was_for_a_new_task_leaves_the_chosen_one_as_it_was_chosen():
+    """Also where it had been moved to before."""
+    state = opened("pick_pour_place").choose_task("place").move(x=0.45).choose_task("pick")
+    state = state.choose_task("place").move(x=0.4).add_task()
+    assert state.poses["place"].x == 0.45
+    assert state.T_world_object[0, 3] == pytest.approx(0.4)
+    fresh = opened("pick_pour_place").move(x=0.4).add_task()
+    assert "pick" not in fresh.poses
+    assert fresh.T_world_object[0, 3] == pytest.approx(0.4)
+
+
+def test_a_wrong_name_is_told_without_the_file_that_the_tasks_came_from():
+    with pytest.raises(InputError, match=r"^tasks: .*'pour': expected"):
+        opened("pick_pour_place").change_tasks(lambda tasks: tasks.renamed("pour"))
+
+
 def test_the_maps_of_the_other_tasks_outlive_a_change_of_the_list():
     state = opened("pick_pour_place")
     changed = state.change_tasks(lambda tasks: tasks.shifted(1))
@@ -85,13 +101,20 @@ EDITS = st.one_of(
 @given(st.lists(EDITS, max_size=12))
 def test_tasks_changed_in_any_order_keep_their_poses_and_can_be_written_down(edits):
     state, where = opened("pick_pour_place"), {}
+    found = at(state, state.task)  # where the chosen task's object was when it was chosen
     for edit in edits:
+        chosen = state.task
         before = {name: at(state, name) for name in state.scene.tasks}
         try:
             state = edit(state)
         except SymgraspError:
             continue
         where = {name: at(state, name) for name in state.scene.tasks}
+        if len(where) > len(before):
+            before[chosen] = found
+        is_renamed = chosen not in where and len(where) == len(before)
+        if state.task != chosen and not is_renamed:
+            found = where[state.task]
         kept = set(before) & set(where) - {state.task}
         assert all(np.array_equal(before[name], where[name]) for name in kept)
     assert state.task in state.scene.tasks

@@ -19,7 +19,7 @@ from app.history import redo, remember, undo
 from app.panels.keyboard import next_arm
 from app.plan_bench import PlanBench, PlanOrder
 from app.plan_book import Kind, PlanBook
-from app.readout import postures
+from app.readout import postures, status_html
 from app.state import State
 from app.things import OWN, from_library
 from app.values import MapRequest, MapResult, ObjectPose, RollChoice
@@ -208,6 +208,18 @@ def test_cancelled_is_not_begun_again_by_itself():
     assert stopped.wanted is None
     assert stopped.retry().wanted == state.request
     assert stopped.move(x=0.49).wanted is not None
+
+
+def test_a_comparison_that_was_stopped_can_be_begun_again():
+    state = opened()
+    compared = replace(state, looking=state.looking.choose_compare(True))
+    assert not compared.started(7, "Recomputing", compared.wanted).is_stopped
+    stopped = compared.started(7, "Recomputing", compared.wanted).stopped(7)
+    assert stopped.is_current
+    assert stopped.is_stopped
+    assert "Stopped." in status_html(stopped)
+    assert stopped.retry().wanted == compared.wanted
+    assert not opened().is_stopped
 
 
 def test_last_words_of_an_earlier_computation_do_not_count():
