@@ -16,7 +16,7 @@ from app.bodies import ASIDE
 from app.panels.object_panel import span
 from app.stage import FIELD_OF_VIEW, viewpoint
 from app.view import SceneView
-from app.viser_server import quiet_server, stop_quietly
+from app.viser_server import quiet_server
 from symgrasp.scene import Scene
 from tests.app.test_state import opened
 from tests.conftest import SHIPPED
@@ -26,7 +26,7 @@ from tests.conftest import SHIPPED
 def server() -> Iterator[viser.ViserServer]:
     server = quiet_server()
     yield server
-    stop_quietly(server)
+    server.stop()
 
 
 def view_of(server: viser.ViserServer, camera: tuple[float, ...] | None) -> SceneView:
