@@ -10,8 +10,8 @@ import sys
 import threading
 import warnings
 
-from app.compute import Store
-from app.reception import open_house
+from app.compute.cache import SharedCache
+from app.server.lobby import open_lobby
 from symgrasp.compiling import COMPILING, telling_of_compiling
 from symgrasp.errors import InputError, SymgraspError
 
@@ -34,7 +34,7 @@ def serve(scene: str, host: str, port: int) -> None:
     # A browser may leave while something is drawn for it.
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     try:
-        with open_house(store, host, port):
+        with open_lobby(store, host, port):
             shown = f"[{host}]" if ":" in host else host
             print(f"symgrasp: http://{shown}:{port}", flush=True)
             threading.Event().wait()
@@ -44,10 +44,10 @@ def serve(scene: str, host: str, port: int) -> None:
         print("\nsymgrasp: stopped", flush=True)
 
 
-def _warm_store(scene: str) -> Store:
+def _warm_store(scene: str) -> SharedCache:
     """Return the store with the first map in it, so that whoever opens the page finds it there."""
     with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
-        store = Store(scene)
+        store = SharedCache(scene)
         store.warm()
     return store
 

@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 from symgrasp.errors import InputError, NoPlanError, SymgraspError, one_of
 from symgrasp.files import resolve, write_atomically
-from symgrasp.scene import Scene, shipped_scenes
-from symgrasp.scene_file import scene_schema
+from symgrasp.scene.format import scene_schema
+from symgrasp.scene.scene import Scene
+from symgrasp.scene.shipped import shipped_scenes
 
 if TYPE_CHECKING:
-    from symgrasp.feasibility import FeasibilityMap, Progress
-    from symgrasp.plan import Plan
+    from symgrasp.feasibility.map import FeasibilityMap
+    from symgrasp.plan.plan import Plan
+    from symgrasp.progress import Progress
 
 __all__ = ["main"]
 
@@ -160,7 +162,7 @@ def _scenes(args: argparse.Namespace) -> int:
 
 
 def _map(args: argparse.Namespace) -> int:
-    from symgrasp.maps import create_map
+    from symgrasp.feasibility.create import create_map
 
     if args.out:
         _check_folder(args.out)
@@ -183,7 +185,7 @@ def _map(args: argparse.Namespace) -> int:
 
 
 def _explain(args: argparse.Namespace) -> int:
-    from symgrasp.maps import MapMaker
+    from symgrasp.feasibility.create import MapMaker
     from symgrasp.reason import Reason
     from symgrasp.world import BulletWorld
 
@@ -203,16 +205,16 @@ def _explain(args: argparse.Namespace) -> int:
         print("no candidates: the hand rules the cell out, whatever the arm does")
         return 0
     counts = [f"{count} {reason.label}" for reason, count in found.counts().items()]
-    text = f"{len(found.verdicts)} candidates: {', '.join(counts)}" if counts else "no candidates"
+    text = f"{len(found.candidates)} candidates: {', '.join(counts)}" if counts else "no candidates"
     print(f"{text}; {found.unreachable} of {len(found.phi)} redundancy samples have none")
-    for verdict in found.verdicts:
-        phi = _deg(verdict.phi)
-        print(f"  φ {phi:7.1f}°  branch {verdict.branch}  {verdict.reason.label:18}  {verdict.why}")
+    for furthest in found.candidates:
+        phi = _deg(furthest.phi)
+        print(f"  φ {phi:7.1f}°  branch {furthest.branch}  {furthest.reason.label:18}  {furthest.why}")
     return 0
 
 
 def _map_content(the_map: FeasibilityMap, ending: str) -> bytes:
-    from symgrasp.pictures import to_svg
+    from symgrasp.feasibility.pictures import to_svg
 
     if ending == ".png":
         return the_map._repr_png_()
@@ -224,8 +226,8 @@ def _map_content(the_map: FeasibilityMap, ending: str) -> bytes:
 
 
 def _plan(args: argparse.Namespace) -> int:
-    from symgrasp.listing import place_in_words
-    from symgrasp.planning import plan_bimanual, plan_sequential
+    from symgrasp.plan.listing import place_in_words
+    from symgrasp.planners.planning import plan_bimanual, plan_sequential
 
     if args.out:
         _check_folder(args.out)
@@ -259,9 +261,9 @@ def _plan(args: argparse.Namespace) -> int:
 
 def _listed(args: argparse.Namespace, scene: Scene, progress: Progress | None) -> Plan:
     """Print the best plans as far as asked for; return the one whose number is asked for."""
-    from symgrasp.listing import intervals_in_words, plan_in_words
-    from symgrasp.planners.sequential import common_grasps
-    from symgrasp.planning import bimanual_plans, handover_plans, sequential_maps, sequential_plans
+    from symgrasp.plan.listing import plan_in_words
+    from symgrasp.planners.planning import bimanual_plans, handover_plans, sequential_maps, sequential_plans
+    from symgrasp.planners.sequential import common_grasps, intervals_in_words
 
     notes: Iterator[str] = repeat("")
     if args.kind == "sequential":
@@ -287,22 +289,22 @@ def _listed(args: argparse.Namespace, scene: Scene, progress: Progress | None) -
 
 
 def _verify(args: argparse.Namespace) -> int:
-    from symgrasp.plan import Plan
-    from symgrasp.verify import verify
+    from symgrasp.plan.plan import Plan
+    from symgrasp.plan.verify import verify
 
     plan = Plan.load(args.plan)
     with _computing(f"verifying {args.plan.name}") as progress:
         report = verify(plan, progress)
     for failure in report.failures:
         print(failure)
-    verdict = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
-    print(f"{report.checks} statements checked: {verdict}")
+    furthest = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
+    print(f"{report.checks} statements checked: {furthest}")
     return 0 if report.holds else 1
 
 
 def _hand(args: argparse.Namespace) -> int:
-    from symgrasp.measure_hand import hand_yaml, measure_hand
-    from symgrasp.robot_model import RobotModel
+    from symgrasp.robot.measure_hand import hand_yaml, measure_hand
+    from symgrasp.robot.model import RobotModel
 
     path = resolve(args.urdf, Path())
     if path is None:
@@ -316,10 +318,10 @@ def _hand(args: argparse.Namespace) -> int:
 
 
 def _object(args: argparse.Namespace) -> int:
-    from symgrasp.fit import plot_openings
-    from symgrasp.hand import HANDS
-    from symgrasp.object_report import describe_object
-    from symgrasp.pictures import to_png
+    from symgrasp.feasibility.fit import plot_openings
+    from symgrasp.feasibility.object_report import describe_object
+    from symgrasp.feasibility.pictures import to_png
+    from symgrasp.robot.hand import HANDS
 
     for option, out in (("--out", args.out), ("--fit", args.fit)):
         if out:
@@ -339,8 +341,8 @@ def _object(args: argparse.Namespace) -> int:
 
 
 def _export(args: argparse.Namespace) -> int:
-    from symgrasp.exports import EXPORTS
-    from symgrasp.plan import Plan
+    from symgrasp.plan.exports import EXPORTS
+    from symgrasp.plan.plan import Plan
 
     _check_folder(args.out)
     text = EXPORTS[args.format](Plan.load(args.plan))
@@ -369,7 +371,7 @@ def _schema(args: argparse.Namespace) -> int:
     if args.format == "scene":
         schema = scene_schema()
     else:
-        from symgrasp.plan import plan_schema
+        from symgrasp.plan.plan import plan_schema
 
         schema = plan_schema()
     print(json.dumps(schema, indent=2))

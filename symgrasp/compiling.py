@@ -15,7 +15,13 @@ from numba.core import config, event
 
 __all__ = ["COMPILING", "SOURCES", "njit", "telling_of_compiling"]
 
-SOURCES = ("candidates.py", "manifold.py", "margins.py", "engine/*.py", "ik/*.py", "planners/*.py")
+SOURCES = (
+    "engine/*.py",
+    "feasibility/margins.py",
+    "ik/*.py",
+    "object/manifold.py",
+    "planners/*.py",
+)
 """Where compiled code and the constants in it come from, inside this package."""
 
 COMPILING = "compiling what this needs, once on this machine; it takes up to a minute"

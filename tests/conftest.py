@@ -12,7 +12,8 @@ import yaml
 from hypothesis import settings
 
 from symgrasp.files import SCENES_DIR
-from symgrasp.scene import Scene, shipped_scenes
+from symgrasp.scene.scene import Scene
+from symgrasp.scene.shipped import shipped_scenes
 
 # CI asks the same questions every time; on a desk every run asks new ones.
 # No deadlines: the first example may have to wait for code to be compiled.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
+from symgrasp.object.profile import Profile
 from symgrasp.poses import from_position_quat
-from symgrasp.profile import Profile
 
 angles = st.floats(-10.0, 10.0)
 unit = st.floats(-1.0, 1.0)

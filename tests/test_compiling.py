@@ -51,7 +51,7 @@ def test_what_is_read_from_the_disk_does_not_count(tmp_path):
 
 def test_the_command_line_says_so(capsys, monkeypatch, tmp_path):
     """Not by compiling everything again, which takes a minute: something new is compiled meanwhile."""
-    monkeypatch.setattr("symgrasp.maps.create_map", _compiles_something)
+    monkeypatch.setattr("symgrasp.feasibility.create.create_map", _compiles_something)
     assert main(["map", "soda_can"]) == 2
     assert COMPILING in capsys.readouterr().err
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import viser
 
-from app.asking import ExplainRequest
-from app.candidates_view import candidates_html, verdict_html
+from app.html.candidates import candidate_html, candidates_html
 from app.panels.panel import Actions, Panel
-from app.state import State
-from symgrasp.explain import Explanation
+from app.state.requests import ExplainRequest
+from app.state.state import State
+from symgrasp.feasibility.explain import Explanation
 
 __all__ = ["CandidatesPanel"]
 
@@ -30,10 +30,10 @@ class CandidatesPanel(Panel):
             return
         found = state.explanation
         self.all.show(candidates_html(state))
-        self.one.show(verdict_html(state))
-        self.step.visible = found is not None and len(found.verdicts) > 1
+        self.one.show(candidate_html(state))
+        self.step.visible = found is not None and len(found.candidates) > 1
         if found and self.step.visible and found is not self._shown:
-            self.step.max = len(found.verdicts)
+            self.step.max = len(found.candidates)
             self.write_inputs(state)
         self._shown = found
 

@@ -7,9 +7,9 @@ from html import escape
 
 import viser
 
+from app.files.scene_files import SCENE_LIMIT
 from app.panels.panel import Actions, Panel
-from app.scene_files import SCENE_LIMIT
-from app.state import State
+from app.state.state import State
 
 __all__ = ["FilesPanel", "link_html"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.html.readout import grasp_html
 from app.panels.panel import Actions, Panel
-from app.readout import grasp_html
-from app.state import Pick, State
-from app.values import RollChoice
+from app.state.map_view_state import RollChoice
+from app.state.state import Pick, State
 
 __all__ = ["GraspPanel"]
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import viser
 
-from app.hands_view import comparison_html, hands_html
+from app.html.conflicts import why_html
+from app.html.hands import comparison_html, hands_html
+from app.html.readout import hands_line
 from app.panels.panel import Actions, Panel
-from app.plan_book import FIRST_SEED
-from app.readout import hands_line
-from app.state import State
-from app.why_view import why_html
+from app.state.plan_results import FIRST_SEED
+from app.state.state import State
 
 __all__ = ["HANDS_METHODS", "HandsPanel"]
 
@@ -33,10 +33,16 @@ class HandsPanel(Panel):
         self.method = self.choice("Method", tuple(HANDS_METHODS))
         self.on(
             self.method,
-            lambda s, v: s.turn_book(lambda book: replace(book, hands_method=HANDS_METHODS[v])),
+            lambda s, v: s.turn_book(
+                lambda plan_results: replace(plan_results, hands_method=HANDS_METHODS[v])
+            ),
         )
         self.seed = gui.add_number("Seed", FIRST_SEED, min=0, max=2**31 - 1, step=1, visible=False)
-        self.on(self.seed, lambda s, v: s.turn_book(lambda book: replace(book, seed=int(v))), "inputs")
+        self.on(
+            self.seed,
+            lambda s, v: s.turn_book(lambda plan_results: replace(plan_results, seed=int(v))),
+            "inputs",
+        )
         self.run = self.button("All arms together", viser.Icon.USERS, lambda: plans.run("bimanual"))
         self.handover = self.button(
             "Hand over: all tasks in order",
@@ -59,11 +65,11 @@ class HandsPanel(Panel):
 
     def show(self, state: State) -> None:
         """Show the maps with the prints, or why there is no plan."""
-        book, climb = state.book, state.book.climb
-        refusal = book.refusal if book.kind != "sequential" else None
+        plan_results, climb = state.plan_results, state.plan_results.climb
+        refusal = plan_results.refusal if plan_results.kind != "sequential" else None
         self.title.show(hands_line(state))
         self.run.disabled = not state.can_plan("bimanual")
-        self.seed.visible = book.hands_method == "hill_climb"
+        self.seed.visible = plan_results.hands_method == "hill_climb"
         self.handover.visible = state.can_plan("handover")
         self.why.show(why_html(refusal, state.scene.manifold) if refusal else "")
         self.comparison.show(comparison_html(climb) if climb else "")
@@ -71,15 +77,19 @@ class HandsPanel(Panel):
         self.replay.visible = self.frame.visible
         if climb and self.frame.visible:
             self.frame.max = len(climb.steps)
-        playing = book.moving == "climb"
+        playing = plan_results.moving == "climb"
         self.replay.label = "Pause the climb" if playing else "Replay the climb"
         self.replay.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
         self.maps.show(hands_html(state))
 
     def write_inputs(self, state: State) -> None:
         """Show what is chosen."""
-        book = state.book
-        self.method.value = next(k for k, method in HANDS_METHODS.items() if method == book.hands_method)
-        self.seed.value = book.seed
-        if book.climb and len(book.climb.steps) > 1:
-            self.frame.value = len(book.climb.steps) if book.frame is None else book.frame + 1
+        plan_results = state.plan_results
+        self.method.value = next(
+            k for k, method in HANDS_METHODS.items() if method == plan_results.hands_method
+        )
+        self.seed.value = plan_results.seed
+        if plan_results.climb and len(plan_results.climb.steps) > 1:
+            self.frame.value = (
+                len(plan_results.climb.steps) if plan_results.frame is None else plan_results.frame + 1
+            )

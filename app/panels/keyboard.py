@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import viser
 
-from app.history import redo, undo
 from app.panels.panel import Actions, Panel
-from app.state import State
-from app.values import RollChoice
+from app.state.history import redo, undo
+from app.state.map_view_state import RollChoice
+from app.state.state import State
 
 __all__ = ["Keyboard", "next_arm"]
 
@@ -39,14 +39,14 @@ class Keyboard(Panel):
         self.command("Next roll", lambda: change(_next_roll), "R")
         self.command("Put the object back", lambda: change(State.reset_pose), "B")
         self.command("Let go of the grasp", lambda: change(State.clear_pick), "L")
-        self.command("Flat map", lambda: change(lambda s: replace(s, board=not s.board)), "F")
+        self.command("Flat map", lambda: change(lambda s: replace(s, flat_map=not s.flat_map)), "F")
         self.command("Drag handles", lambda: change(lambda s: replace(s, gizmo=not s.gizmo)), "G")
         self.command("Light or dark", lambda: change(lambda s: replace(s, dark=not s.dark)), "T")
         self.command("Plan one grasp for all tasks", lambda: plans.run("sequential"), "P")
         self.command("Plan all arms together", lambda: plans.run("bimanual"), "H")
         self.command("Hand over: plan all tasks in order", lambda: plans.run("handover"))
         self.command("List more solutions", plans.more)
-        self.command("Next solution", lambda: change(lambda s: s.choose_plan(s.book.page + 1)), "J")
+        self.command("Next solution", lambda: change(lambda s: s.choose_plan(s.plan_results.page + 1)), "J")
         self.command("Play or pause the plan", lambda: plans.play(State.play_arms), "K")
         self.command("Replay or pause the climb", lambda: plans.play(State.play_climb), "C")
         self.command("Add a task with the object here", lambda: change(State.add_task), "I")

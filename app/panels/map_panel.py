@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import viser
 
-from app.map_view import legend_html, map_html, marks_of, prints_html
+from app.html.map import legend_html, map_html, marks_of, prints_html
+from app.html.profile import holds_html, profile_html, symmetry_html
+from app.html.readout import check_html, map_title, solution_html
 from app.panels.panel import Actions, Panel
-from app.prints import print_names, shown_prints
-from app.profile_view import holds_html, profile_html, symmetry_html
-from app.readout import check_html, map_title, solution_html
-from app.state import State
+from app.render.prints import print_names, shown_prints
+from app.state.state import State
 
 __all__ = ["MapPanel"]
 
@@ -42,7 +42,7 @@ class MapPanel(Panel):
             self.check.show("")
             self.legend.show("")
             return
-        look = state.looking
+        look = state.map_view
         height = HEIGHT_OF_TWO if look.compare else HEIGHT
         prints, legend = shown_prints(state), legend_html(state.map, state.roll, look.view)
         if prints:
@@ -57,11 +57,11 @@ class MapPanel(Panel):
 
     def _check(self, state: State) -> str:
         """Draw the map that was computed from scratch, and say how many cells differ."""
-        check = state.looking.check
+        check = state.map_view.check
         if check is None:
             return check_html(state)
         shown = map_html(
-            check.map, state.roll, view=state.looking.view, height=HEIGHT_OF_TWO, name="recomputed map"
+            check.map, state.roll, view=state.map_view.view, height=HEIGHT_OF_TWO, name="recomputed map"
         )
         room = profile_html(state, HEIGHT_OF_TWO)
         return f'{check_html(state)}<div class="sg-side">{shown}{room}</div>'

@@ -8,10 +8,10 @@ import numpy as np
 import viser
 
 from app.panels.panel import Actions, Panel, within
-from app.state import State
-from app.things import UNITS, UPLOAD_LIMIT, choices
-from symgrasp.mesh_io import MESH_ENDINGS
-from symgrasp.scene import Scene
+from app.state.object_choice import UNITS, UPLOAD_LIMIT, choices
+from app.state.state import State
+from symgrasp.object.measure.mesh_io import MESH_ENDINGS
+from symgrasp.scene.scene import Scene
 
 __all__ = ["ObjectPanel", "span"]
 
@@ -36,8 +36,8 @@ class ObjectPanel(Panel):
 
     def _build_choice(self) -> None:
         gui = self.gui
-        self.thing = self.choice("Object", choices())
-        self.on_choice(self.thing, self.actions.choose_object)
+        self.object_choice = self.choice("Object", choices())
+        self.on_choice(self.object_choice, self.actions.choose_object)
         limit = (
             f"{', '.join(ending[1:].upper() for ending in MESH_ENDINGS)}; at most {UPLOAD_LIMIT / 1e6:g} MB"
         )
@@ -88,8 +88,8 @@ class ObjectPanel(Panel):
 
     def show(self, state: State) -> None:
         """Offer the object that was uploaded as well."""
-        if self.thing.options != (things := choices(state.uploaded)):
-            self.thing.options = things
+        if self.object_choice.options != (things := choices(state.uploaded)):
+            self.object_choice.options = things
 
     def write_inputs(self, state: State) -> None:
         """Show the object and its pose."""
@@ -100,8 +100,8 @@ class ObjectPanel(Panel):
             slider.value = within(slider, 100 * getattr(base, axis))
         self.lean.value = within(self.lean, np.rad2deg(base.lean))
         self.towards.value = within(self.towards, np.rad2deg(base.towards))
-        self.thing.value = state.choice
-        self.colours.visible = bool(state.thing and state.thing.measurement)
+        self.object_choice.value = state.choice
+        self.colours.visible = bool(state.object_choice and state.object_choice.measurement)
         self.colours.value = COLOURS[state.errors]
         self.gizmo.value = state.gizmo
 

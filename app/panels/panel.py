@@ -8,8 +8,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 import viser
 
-from app.plan_desk import PlanDesk
-from app.state import State
+from app.server.plan_actions import PlanActions
+from app.state.state import State
 
 __all__ = ["Actions", "Change", "Html", "Panel", "within"]
 
@@ -38,7 +38,7 @@ class Actions(Protocol):
         """Measure a mesh and put the object into the scene."""
 
     @property
-    def plans(self) -> PlanDesk:
+    def plans(self) -> PlanActions:
         """What runs planners and keeps their plans."""
         ...
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import viser
 
+from app.compute.plan_service import PLAN_LIMIT
+from app.html.conflicts import opened_html
+from app.html.readout import solution_html
+from app.html.solutions import solutions_html
 from app.panels.panel import Actions, Panel
-from app.plan_bench import PLAN_LIMIT
-from app.plan_desk import FORMATS
-from app.readout import solution_html
-from app.solutions_view import solutions_html
-from app.state import State
-from app.why_view import opened_html
+from app.server.plan_actions import FORMATS
+from app.state.state import State
 
 __all__ = ["PlanFilePanel", "PlanPanel"]
 
@@ -42,29 +42,29 @@ class PlanPanel(Panel):
 
     def show(self, state: State) -> None:
         """Offer what there is to leaf through."""
-        book = state.book
-        several = len(book.plans) > 1
+        plan_results = state.plan_results
+        several = len(plan_results.plans) > 1
         if several:
-            self.solution.max = len(book.plans)
+            self.solution.max = len(plan_results.plans)
         self.solution.visible = several
-        self.more.visible = book.more
+        self.more.visible = plan_results.more
         self.list.show(solutions_html(state))
         self.text.show(solution_html(state))
-        self.step.visible = self.play.visible = book.last > 0
-        if book.last:
-            self.step.max = float(book.last + 1)
-        playing = book.moving == "arms"
+        self.step.visible = self.play.visible = plan_results.last > 0
+        if plan_results.last:
+            self.step.max = float(plan_results.last + 1)
+        playing = plan_results.moving == "arms"
         self.play.label = "Pause" if playing else "Play"
         self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
-        self.note.show(NOT_A_MOTION if book.last else "")
+        self.note.show(NOT_A_MOTION if plan_results.last else "")
 
     def write_inputs(self, state: State) -> None:
         """Show which plan and which task it is."""
-        book = state.book
-        if len(book.plans) > 1:
-            self.solution.value = book.page + 1
-        if book.last:
-            self.step.value = round(book.position + 1, 2)
+        plan_results = state.plan_results
+        if len(plan_results.plans) > 1:
+            self.solution.value = plan_results.page + 1
+        if plan_results.last:
+            self.step.value = round(plan_results.position + 1, 2)
 
 
 class PlanFilePanel(Panel):
@@ -93,4 +93,4 @@ class PlanFilePanel(Panel):
     def show(self, state: State) -> None:
         """Offer the plan, and say what became of the file that was opened."""
         self.form.visible = self.download.visible = state.plan is not None
-        self.report.show(opened_html(state.book.opened) if state.book.opened else "")
+        self.report.show(opened_html(state.plan_results.opened) if state.plan_results.opened else "")

@@ -7,8 +7,8 @@ from dataclasses import replace
 import viser
 
 from app.panels.panel import Actions, Panel
-from app.state import State
-from symgrasp.hand import HANDS
+from app.state.state import State
+from symgrasp.robot.hand import HANDS
 
 __all__ = ["ScenePanel"]
 
@@ -32,12 +32,12 @@ class ScenePanel(Panel):
             self.task = self.choice("Task")
             self.arm = self.choice("Arm")
             self.hand = self.choice("Hand", MOUNTABLE, visible=False)
-            self.board = gui.add_checkbox("Flat map", True)
+            self.flat_map = gui.add_checkbox("Flat map", True)
         self.on_choice(self.scene, actions.open_scene)
         self.on_choice(self.hand, actions.choose_hand)
         self.on(self.task, lambda s, v: s.choose_task(v))
         self.on(self.arm, lambda s, v: s.choose_arm(v))
-        self.on(self.board, lambda s, v: replace(s, board=v))
+        self.on(self.flat_map, lambda s, v: replace(s, flat_map=v))
 
     def show(self, state: State) -> None:
         """Offer what the scene has, and the scene that was uploaded."""
@@ -57,4 +57,4 @@ class ScenePanel(Panel):
         self.hand.visible = hand is not None
         if hand is not None:
             self.hand.value = hand
-        self.board.value = state.board
+        self.flat_map.value = state.flat_map

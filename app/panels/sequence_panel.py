@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import viser
 
+from app.html.conflicts import regrasps, why_html
+from app.html.readout import sequence_html, tasks_html
+from app.html.stack import stack_html
 from app.panels.panel import Actions, Panel
-from app.readout import sequence_html, tasks_html
-from app.stack_view import stack_html
-from app.state import State
-from app.task_list import TaskList
-from app.why_view import regrasps, why_html
+from app.state.state import State
+from app.state.task_list import TaskList
 
 __all__ = ["SEQUENCE_METHODS", "SequencePanel", "TasksPanel"]
 
@@ -34,7 +34,9 @@ class SequencePanel(Panel):
         self.method = self.choice("Method", tuple(SEQUENCE_METHODS))
         self.on(
             self.method,
-            lambda s, v: s.turn_book(lambda book: replace(book, sequence_method=SEQUENCE_METHODS[v])),
+            lambda s, v: s.turn_book(
+                lambda plan_results: replace(plan_results, sequence_method=SEQUENCE_METHODS[v])
+            ),
         )
         self.run = self.button("One grasp for all tasks", viser.Icon.ROUTE, lambda: plans.run("sequential"))
         self.why = self.html()
@@ -46,12 +48,16 @@ class SequencePanel(Panel):
             "Slide by δ (%)", 0, 100, 1, 100, visible=False,
             hint="Turning the object by δ slides a task's map until the common grasp is feasible in it.",
         )  # fmt: skip
-        self.on(self.slide, lambda s, v: s.turn_book(lambda book: replace(book, slide=v / 100)), "inputs")
+        self.on(
+            self.slide,
+            lambda s, v: s.turn_book(lambda plan_results: replace(plan_results, slide=v / 100)),
+            "inputs",
+        )
 
     def show(self, state: State) -> None:
         """Show the maps with the grasp, or why there is none."""
-        book = state.book
-        refusal = book.refusal if book.kind == "sequential" else None
+        plan_results = state.plan_results
+        refusal = plan_results.refusal if plan_results.kind == "sequential" else None
         count = regrasps(refusal)
         self.title.show(sequence_html(state))
         self.run.disabled = not state.can_plan("sequential")
@@ -59,12 +65,12 @@ class SequencePanel(Panel):
         self.regrasp.visible = count > 0
         self.regrasp.label = f"Plan with {count} regrasp{'s' * (count > 1)}"
         self.stack.show(stack_html(state))
-        self.slide.visible = book.kind == "sequential" and book.last > 0
+        self.slide.visible = plan_results.kind == "sequential" and plan_results.last > 0
 
     def write_inputs(self, state: State) -> None:
         """Show what is chosen."""
-        self.method.value = _label(SEQUENCE_METHODS, state.book.sequence_method)
-        self.slide.value = round(100 * state.book.slide)
+        self.method.value = _label(SEQUENCE_METHODS, state.plan_results.sequence_method)
+        self.slide.value = round(100 * state.plan_results.slide)
 
 
 class TasksPanel(Panel):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import viser
 
-from app.history import redo, undo
+from app.html.readout import notes_html, status_html
 from app.panels.panel import Actions, Panel
-from app.readout import notes_html, status_html
-from app.state import State
+from app.state.history import redo, undo
+from app.state.state import State
 
 __all__ = ["NotesPanel", "StatusPanel"]
 

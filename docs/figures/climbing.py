@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.patches import Patch
 
-from app.palette import INK, OVERLAP, PRINTS
-from app.prints import print_index
+from app.render.palette import INK, OVERLAP, PRINTS
+from app.render.prints import print_index
 from docs.figures.holding import WOOD
 from docs.figures.models import cells_paint, object_body, robot
 from docs.figures.render import Body, Camera
 from docs.figures.style import board, new, photo, save
-from symgrasp.maps import create_map
+from symgrasp.feasibility.create import create_map
 from symgrasp.planners.bimanual import ClimbStep
-from symgrasp.planning import plan_bimanual
-from symgrasp.scene import Scene
+from symgrasp.planners.planning import plan_bimanual
+from symgrasp.scene.scene import Scene
 
 __all__ = ["handprints"]
 

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from app.palette import INK, PRINTS
+from app.render.palette import INK, PRINTS
 from docs.figures.models import (
     cells_paint,
     floor,
@@ -22,12 +22,12 @@ from docs.figures.models import (
 from docs.figures.render import Camera
 from docs.figures.style import IMAGES, board, label, legend, map_axes, mark, new, photo, save
 from docs.pages import refresh
-from symgrasp.feasibility import Cell
-from symgrasp.manifold import ROLLS, Manifold
-from symgrasp.maps import create_map
-from symgrasp.plan import Hold, Plan
-from symgrasp.planning import plan_bimanual, plan_sequential
-from symgrasp.scene import Scene
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.create import create_map
+from symgrasp.object.manifold import ROLLS, Manifold
+from symgrasp.plan.plan import Hold, Plan
+from symgrasp.planners.planning import plan_bimanual, plan_sequential
+from symgrasp.scene.scene import Scene
 
 __all__ = ["log_four_robots", "pick_pour_place", "tutorial", "wine_bottle"]
 

@@ -10,21 +10,21 @@ import trimesh
 from numpy.typing import ArrayLike
 from trimesh.visual import TextureVisuals
 
-from app.meshes import link_visuals
-from app.palette import INK, rgb
-from app.stage import OBSTACLES
+from app.render.palette import INK, rgb
+from app.scene3d.backdrop import OBSTACLES
+from app.scene3d.visual_meshes import link_visuals
 from docs.figures.render import Body
-from symgrasp.feasibility import FeasibilityMap
-from symgrasp.manifold import Manifold
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.meshes import read_mesh
-from symgrasp.plan import Hold, PlanTask
+from symgrasp.object.manifold import Manifold
+from symgrasp.object.profile import Profile
+from symgrasp.plan.plan import Hold, PlanTask
 from symgrasp.poses import Array, inverse
-from symgrasp.profile import Profile
 from symgrasp.reason import Reason
-from symgrasp.robot import Robot
-from symgrasp.robot_model import RobotModel
-from symgrasp.scene import Scene
-from symgrasp.scene_build import Obstacle
+from symgrasp.robot.model import RobotModel
+from symgrasp.robot.robot import Robot
+from symgrasp.scene.parts import Obstacle
+from symgrasp.scene.scene import Scene
 
 __all__ = [
     "SurfacePaint",

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from app.palette import INK, PICK
+from app.render.palette import INK, PICK
 from docs.figures.render import Body, Camera, Picture, render
 from symgrasp.files import write_atomically
-from symgrasp.manifold import Manifold
+from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
 

@@ -10,18 +10,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch
 
-from app.palette import INK, PICK, rgb
+from app.render.palette import INK, PICK, rgb
 from docs.figures.models import SurfacePaint, cells_paint, floor, map_colors, object_body, with_seam
 from docs.figures.render import Camera
 from docs.figures.style import board, label, legend, map_axes, mark, new, photo, save
-from symgrasp.feasibility import FeasibilityMap
-from symgrasp.manifold import ROLLS, wrap
-from symgrasp.maps import create_map
-from symgrasp.planning import plan_sequential
+from symgrasp.feasibility.create import create_map
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.manifold import ROLLS, wrap
+from symgrasp.object.profile import Profile
+from symgrasp.planners.planning import plan_sequential
 from symgrasp.poses import Array
-from symgrasp.profile import Profile
 from symgrasp.reason import Reason
-from symgrasp.scene import Scene
+from symgrasp.scene.scene import Scene
 
 __all__ = ["maps_slide", "soda_can", "turn_shifts"]
 

@@ -15,8 +15,8 @@ import pinocchio  # pyright: ignore[reportMissingImports]
 from symgrasp.ik import ClosedFormIK
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, axis_frame
-from symgrasp.robot import Arm, RobotModel
-from symgrasp.scene_build import Obstacle
+from symgrasp.robot.robot import Arm, RobotModel
+from symgrasp.scene.parts import Obstacle
 from symgrasp.world import BulletWorld, Shape, checked_self_pairs
 
 __all__ = ["BruteForce"]

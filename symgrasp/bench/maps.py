@@ -12,17 +12,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from symgrasp.algorithm1 import verdict
 from symgrasp.bench.figures import Figure
-from symgrasp.candidates import Judge
-from symgrasp.engine import ExactEngine
-from symgrasp.feasibility import Cell, FeasibilityMap
+from symgrasp.feasibility.algorithm1 import furthest
+from symgrasp.feasibility.candidates import CandidateChecker
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.exact import ExactEngine
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.files import SCENES_DIR
 from symgrasp.ik import solver_for
-from symgrasp.maps import MapMaker
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
-from symgrasp.scene import Scene, shipped_scenes
+from symgrasp.scene.scene import Scene
+from symgrasp.scene.shipped import shipped_scenes
 from symgrasp.world import BulletWorld
 
 __all__ = ["against_others", "boxes", "growth", "process", "run", "turning"]
@@ -141,8 +143,8 @@ def _ways(world: BulletWorld, scene: Scene) -> Iterator[tuple[str, Decide]]:
     task = scene.task()
     arm = scene.arm(task.arms[0])
     ik = solver_for(arm, scene.settings.redundancy)
-    judge = Judge(world, arm, ik, scene.settings.approach)
-    yield "reference", lambda T, opening: verdict(judge.candidates(T, opening))
+    checker = CandidateChecker(world, arm, ik, scene.settings.approach)
+    yield "reference", lambda T, opening: furthest(checker.candidates(T, opening))
     if has_coal() and scene.settings.approach == scene.settings.margin == 0:
         from symgrasp.bench.brute import BruteForce
 

@@ -10,26 +10,27 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.bench.figures import Figure
-from symgrasp.candidates import Judge
 from symgrasp.errors import NoPlanError
-from symgrasp.feasibility import Cell, FeasibilityMap
-from symgrasp.fit import fit
+from symgrasp.feasibility.candidates import CandidateChecker
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.fit import fit
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
-from symgrasp.manifold import ROLLS, grasp_to_tool
-from symgrasp.maps import MapMaker, create_map
+from symgrasp.object.manifold import ROLLS, grasp_to_tool
 from symgrasp.planners.bimanual import Climb, hill_climb
+from symgrasp.planners.configurations import ConfigurationFinder
 from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch
-from symgrasp.planners.postures import Postures
+from symgrasp.planners.planning import plan_sequential
 from symgrasp.planners.sequential import surface_margin
-from symgrasp.planning import plan_sequential
 from symgrasp.poses import Array, inverse, rotation_z, translation
 from symgrasp.reason import Reason
-from symgrasp.robot import Arm
-from symgrasp.scene import Scene
-from symgrasp.scene_build import Task
-from symgrasp.world import BulletWorld, Collision, Near
+from symgrasp.robot.robot import Arm
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+from symgrasp.world import BulletWorld, Collision, NearBodies
 
 __all__ = ["long_sequence", "run", "several_hands", "without_the_manifold"]
 
@@ -71,7 +72,7 @@ class _CountingWorld(BulletWorld):
 
     checks = 0
 
-    def first_collision(self, arm: Arm, near: Near | None = None) -> Collision | None:
+    def first_collision(self, arm: Arm, near: NearBodies | None = None) -> Collision | None:
         """Count, and answer."""
         self.checks += 1
         return super().first_collision(arm, near)
@@ -113,7 +114,9 @@ def _sample_grasps(
 ) -> bool:
     """Draw grasps until one is feasible in every task as it is posed, or the budget is used up."""
     arm = scene.arm()
-    judge = Judge(world, arm, solver_for(arm, scene.settings.redundancy), scene.settings.approach)
+    checker = CandidateChecker(
+        world, arm, solver_for(arm, scene.settings.redundancy), scene.settings.approach
+    )
     rng = np.random.default_rng(seed)
     world.checks = 0
     T_base_world = inverse(arm.robot.T_world_base)
@@ -127,7 +130,7 @@ def _sample_grasps(
         def feasible(T_world_object: Array, h=h, theta=theta, roll=roll, radius=radius) -> bool:
             world.set_object(T_world_object)
             tool = grasp_to_tool(T_world_object, h, theta, roll, arm.hand.standoff(radius))
-            candidates = judge.candidates(T_base_world @ tool, arm.hand.opening(radius))
+            candidates = checker.candidates(T_base_world @ tool, arm.hand.opening(radius))
             return any(c.fate == Reason.FEASIBLE for c in candidates)
 
         if all(feasible(task.T_world_object) for task in tasks):
@@ -227,7 +230,7 @@ def _compare(
     names = [arm.name for arm in arms]
     keyed = {(0, name): m for name, m in zip(names, maps, strict=True)}
     search = HoldingSearch(keyed, [names], gaps)
-    found = next(iter(FreePlacements(search, [Postures(world, arms, maps)])), None)
+    found = next(iter(FreePlacements(search, [ConfigurationFinder(world, arms, maps)])), None)
     exact_time = perf_counter() - start
     start = perf_counter()
     climbed = _climb_as_printed(world, arms, maps, seed)
@@ -241,11 +244,11 @@ def _climb_as_printed(
     world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap], seed: int
 ) -> tuple[Cell, ...] | None:
     """Algorithm 3, counting collisions of the robots in the world at every step."""
-    postures = Postures(world, arms, maps)
+    configurations = ConfigurationFinder(world, arms, maps)
 
     def count(cells: Sequence[Cell]) -> int:
         world.set_object(maps[0].T_world_object)
-        world.set_arms(postures.witnesses(cells))
+        world.set_arms(configurations.witnesses(cells))
         return len(world.collisions(arms))
 
     always: Callable[[Sequence[Cell]], bool] = lambda cells: True  # noqa: E731

@@ -1,5 +1,1 @@
-"""The exact fast path to the maps of Algorithm 1: certificates first, PyBullet for what they leave open."""
-
-from symgrasp.engine.exact import ExactEngine
-
-__all__ = ["ExactEngine"]
+"""The compiled search for free configurations: convex pieces, certified distances, cells in parallel."""

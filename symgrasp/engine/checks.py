@@ -18,7 +18,7 @@ from symgrasp.engine.tree import box_of
 from symgrasp.poses import Array
 
 __all__ = [
-    "HIT_BAND", "UNDECIDED", "Body", "Scratch", "check_arm", "check_hand", "check_round",
+    "HIT_BAND", "UNDECIDED", "MovingBodies", "Scratch", "check_arm", "check_hand", "check_round",
     "mark_near", "new_scratch", "place_arm", "place_hand",
 ]  # fmt: skip
 
@@ -39,7 +39,7 @@ UNDECIDED = -1e9
 """Stands for the clearance (m) of what is neither certified free nor certified colliding."""
 
 
-class Body(NamedTuple):
+class MovingBodies(NamedTuple):
     """The moving body of an arm and what it may not touch. Pieces: M move, the first G with the tool.
 
     Attributes:

@@ -16,12 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from symgrasp.candidates import RETREAT_TURN
 from symgrasp.compiling import njit
 from symgrasp.engine.checks import (
     FREE_BAND,
     UNDECIDED,
-    Body,
+    MovingBodies,
     check_arm,
     check_hand,
     check_round,
@@ -33,6 +32,7 @@ from symgrasp.engine.solids import Solids
 from symgrasp.engine.tree import Tree
 from symgrasp.ik.branches import BRANCHES, STRICT, branches_at
 from symgrasp.ik.chain import Chain
+from symgrasp.ik.retreat import RETREAT_TURN
 from symgrasp.poses import Array
 
 __all__ = [
@@ -42,8 +42,8 @@ __all__ = [
     "LIMITS",
     "OPEN_KEPT",
     "UNREACHABLE",
-    "Found",
-    "Goals",
+    "SearchInput",
+    "SearchResult",
     "search",
 ]
 
@@ -54,7 +54,7 @@ UNREACHABLE, LIMITS, HIT, BLOCKED, OPEN, FEASIBLE = 0, 1, 2, 3, 4, 5
 """What became of a cell: BLOCKED on the retreat. Of a candidate: OPEN means PyBullet must decide."""
 
 
-class Goals(NamedTuple):
+class SearchInput(NamedTuple):
     """What is asked. Cells come in runs: all those of one row and roll, r runs of the same length.
 
     Attributes:
@@ -80,7 +80,7 @@ class Goals(NamedTuple):
     parts: int
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """What was found, for each of m cells.
 
     Attributes:
@@ -132,8 +132,8 @@ class _Branches(NamedTuple):
 
 
 def search(
-    chain: Chain, body: Body, solids: Solids, tree: Tree, pose: Array, goals: Goals, joints: int
-) -> Found:
+    chain: Chain, body: MovingBodies, solids: Solids, tree: Tree, pose: Array, goals: SearchInput, joints: int
+) -> SearchResult:
     """Search cells, on all cores.
 
     Args:
@@ -146,7 +146,7 @@ def search(
         joints: number of joints n.
     """
     m = len(goals.T_base_tool)
-    found = Found(
+    found = SearchResult(
         status=np.zeros(m, dtype=np.uint8),
         pair=np.full((m, 2), -1, dtype=np.int32),
         depth=np.full(m, np.nan),
@@ -242,16 +242,16 @@ def _cell(chain, body, solids, tree, scratch, branches, goals, around, cell, fou
                         True,
                         _hand_retreats(body, solids, tree, scratch, branches, goals, around, run, T),
                     )
-                verdict = _retreats(
+                furthest = _retreats(
                     chain, body, solids, tree, scratch, branches, goals, around, run, T, k, b, steps_free
                 )
                 place_hand(body, solids, scratch, goals.T_world_base, T, goals.row[run])
-                if verdict == BLOCKED:
+                if furthest == BLOCKED:
                     if found.status[cell] == HIT:
                         found.status[cell] = BLOCKED
                         _name(scratch, found, cell)
                     continue
-                if verdict == OPEN:
+                if furthest == OPEN:
                     gap = UNDECIDED
             if gap == UNDECIDED:
                 _list(found, cell, q[b], k, b)
@@ -324,11 +324,11 @@ def _hand_retreats(body, solids, tree, scratch, branches, goals, around, run, T)
 
 @njit(**STRICT)
 def _retreats(chain, body, solids, tree, scratch, branches, goals, around, run, T, k, b, hand_free):
-    """Follow a candidate along the retreat, as `symgrasp.candidates.Judge`: FEASIBLE, BLOCKED or OPEN."""
+    """Follow a candidate along the retreat, as the reference does: FEASIBLE, BLOCKED or OPEN."""
     q, exists, inside, at = branches.q[1], branches.exists[1], branches.inside[1], branches.at
     moved = branches.T
     _copy(branches.q[0][b], at)
-    verdict = FEASIBLE
+    furthest = FEASIBLE
     for s in range(len(goals.retreat)):
         _step(T, goals.retreat[s], moved)
         scratch.hit[0] = scratch.hit[2] = -1
@@ -336,7 +336,7 @@ def _retreats(chain, body, solids, tree, scratch, branches, goals, around, run, 
             chain.geometry, chain.joint, chain.limits, chain.forward, k, moved, True, q, exists, inside
         )
         if not _follow(chain.limits, q, inside, at):
-            verdict = BLOCKED
+            furthest = BLOCKED
             break
         gap = 0.0  # how much room there is does not matter here
         if hand_free:
@@ -347,14 +347,14 @@ def _retreats(chain, body, solids, tree, scratch, branches, goals, around, run, 
             place_arm(body, solids, scratch, at)
             gap = check_arm(body, solids, tree, scratch, goals.margin, gap, -math.inf)
         if gap == -math.inf:
-            verdict = BLOCKED
+            furthest = BLOCKED
             break
         if gap == UNDECIDED:
             # A later step may still be certified to collide, but PyBullet will find that as well.
-            verdict = OPEN
+            furthest = OPEN
             break
     scratch.hit[2] = -1
-    return verdict
+    return furthest
 
 
 @njit(**STRICT)

@@ -2,7 +2,7 @@
 
 from symgrasp.ik.closed_form import ClosedFormIK, Solutions
 from symgrasp.ik.spherical import SphericalIK
-from symgrasp.robot import Arm
+from symgrasp.robot.robot import Arm
 
 __all__ = ["ClosedFormIK", "Solutions", "SphericalIK", "solver_for"]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.poses import Array, rotation_about
-from symgrasp.robot import Arm
+from symgrasp.robot.robot import Arm
 
 __all__ = [
     "AXES", "CENTRE", "CENTRE_SEEN", "CLEARLY", "MIDDLE", "P0", "PHI", "R0", "TRIPLE", "WRIST", "WRIST_SEEN",

@@ -15,7 +15,7 @@ from eaik.IK_HP import HPRobot
 
 from symgrasp.errors import UrdfError
 from symgrasp.poses import Array, pose_error
-from symgrasp.robot import Arm
+from symgrasp.robot.robot import Arm
 
 __all__ = ["ClosedFormIK", "Solutions", "Tolerance"]
 

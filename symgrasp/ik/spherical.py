@@ -24,7 +24,7 @@ from symgrasp.ik.branches import BRANCHES, solve_batch, solve_range
 from symgrasp.ik.chain import CLEARLY, Chain, structures
 from symgrasp.ik.closed_form import ClosedFormIK, Solutions, Tolerance
 from symgrasp.poses import Array
-from symgrasp.robot import Arm
+from symgrasp.robot.robot import Arm
 
 __all__ = ["SphericalIK"]
 

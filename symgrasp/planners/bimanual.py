@@ -14,10 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.errors import NoPlanError
-from symgrasp.feasibility import Cell, FeasibilityMap, Progress
-from symgrasp.handprint import Handprint
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.planners.sequential import check_same_grid
-from symgrasp.robot import Arm
+from symgrasp.progress import Progress
+from symgrasp.robot.handprint import Handprint
+from symgrasp.robot.robot import Arm
 
 __all__ = ["Climb", "ClimbStep", "Placement", "hill_climb", "print_overlap"]
 

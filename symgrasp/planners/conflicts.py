@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.errors import NoPlanError
-from symgrasp.feasibility import FeasibilityMap
-from symgrasp.manifold import ROLLS
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.manifold import ROLLS
 
 __all__ = [
     "Conflict",

@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.feasibility import Cell, Progress
+from symgrasp.feasibility.cell import Cell
+from symgrasp.planners.configurations import ConfigurationFinder
 from symgrasp.planners.holding import Holding, HoldingSearch
-from symgrasp.planners.postures import Posture, Postures
+from symgrasp.progress import Progress
+from symgrasp.robot.configuration import ArmConfiguration
 
 __all__ = ["FreePlacement", "FreePlacements", "Step"]
 
@@ -25,7 +27,7 @@ class Step(NamedTuple):
     """
 
     turn: int
-    postures: Sequence[Posture]
+    configurations: Sequence[ArmConfiguration]
     cells: Sequence[Cell]
 
 
@@ -70,10 +72,10 @@ class FreePlacements:
     """
 
     def __init__(
-        self, search: HoldingSearch, desks: Sequence[Postures], progress: Progress | None = None
+        self, search: HoldingSearch, finders: Sequence[ConfigurationFinder], progress: Progress | None = None
     ) -> None:
         self.tried = 0
-        self._search, self._desks, self._progress = search, desks, progress
+        self._search, self._desks, self._progress = search, finders, progress
 
     def __iter__(self) -> Iterator[FreePlacement]:
         """Yield them; lazily, as finding one may take a while."""
@@ -132,12 +134,12 @@ class FreePlacements:
 
     def _step(self, k: int, grasps: Sequence[Cell], turn: int) -> Step | None:
         """Return task k with the object at a turn, or None if nothing is free there."""
-        desk = self._desks[k]
-        angles = desk.maps[0].manifold.angles
+        finder = self._desks[k]
+        angles = finder.maps[0].manifold.angles
         held = {run.arm: cell for run, cell in zip(self._search.holds, grasps, strict=True) if k in run.tasks}
-        cells = [held[arm.name].turned(turn, angles) for arm in desk.arms]
-        postures = desk.find(cells)
-        return Step(turn, postures, cells) if postures else None
+        cells = [held[arm.name].turned(turn, angles) for arm in finder.arms]
+        configurations = finder.find(cells)
+        return Step(turn, configurations, cells) if configurations else None
 
 
 def _near(a: Sequence[Cell], b: Sequence[Cell], angles: int) -> bool:

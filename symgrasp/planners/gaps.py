@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.compiling import njit
-from symgrasp.handprint import Handprint
-from symgrasp.manifold import ROLLS, Manifold, grasp_to_tool
+from symgrasp.object.manifold import ROLLS, Manifold, grasp_to_tool
 from symgrasp.planners.passing import Hands
 from symgrasp.poses import Array
-from symgrasp.robot import Arm
+from symgrasp.robot.handprint import Handprint
+from symgrasp.robot.robot import Arm
 
 __all__ = ["OVERLAP", "PASSING", "GapTable", "PrintGaps", "print_gap"]
 

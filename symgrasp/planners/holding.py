@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.feasibility import Cell, FeasibilityMap
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.planners.gaps import GapTable, PrintGaps
 from symgrasp.planners.placements import Problem, explore
 from symgrasp.planners.sequential import check_same_grid, surface_margin

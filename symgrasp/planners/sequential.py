@@ -7,18 +7,20 @@ that, and so are linear in the number of tasks.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from symgrasp.errors import InputError
-from symgrasp.feasibility import Cell, FeasibilityMap
-from symgrasp.manifold import ROLLS, wrap
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.planners.conflicts import ConflictError, find_conflict
 from symgrasp.poses import Array
 
-__all__ = ["CommonGrasp", "SequentialGrasp", "common_grasps", "first_common_grasp"]
+__all__ = ["CommonGrasp", "SequentialGrasp", "common_grasps", "first_common_grasp", "intervals_in_words"]
 
 
 class SequentialGrasp(NamedTuple):
@@ -155,3 +157,14 @@ def _runs(feasible: np.ndarray) -> tuple[tuple[int, int], ...]:
     starts = np.flatnonzero(feasible & ~np.roll(feasible, 1))
     ends = np.flatnonzero(feasible & ~np.roll(feasible, -1))
     return tuple((int(s), int(min((e - s) % len(feasible) for e in ends)) + 1) for s in starts)
+
+
+def intervals_in_words(grasp: CommonGrasp, maps: Sequence[FeasibilityMap]) -> str:
+    """Say at which angles (°, outer edges of the cells) each task allows a grasp's height and roll."""
+    parts = []
+    for m, runs in zip(maps, grasp.intervals, strict=True):
+        start, step = math.degrees(m.manifold.theta_start), math.degrees(m.manifold.dtheta)
+        spans = [(start + first * step, start + (first + count) * step) for first, count in runs]
+        texts = [f"{low:.1f}° to {high:.1f}°" for low, high in spans]
+        parts.append(f"{m.task} {' and '.join(texts)}")
+    return "; ".join(parts)

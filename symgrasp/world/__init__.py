@@ -5,11 +5,13 @@ poses alone; its contact cache, which remembers earlier configurations, is not u
 margins are set to zero, so distances are those of the shapes themselves.
 """
 
-from symgrasp.world.bullet import Body, BulletWorld, Collision, Near
+from symgrasp.world.bullet import BulletWorld
+from symgrasp.world.collision import Body, Collision, NearBodies
 from symgrasp.world.self_pairs import checked_self_pairs
 from symgrasp.world.shapes import Shape
 from symgrasp.world.tasks import RESTING_DEPTH, check_tasks
 
 __all__ = [
-    "RESTING_DEPTH", "Body", "BulletWorld", "Collision", "Near", "Shape", "check_tasks", "checked_self_pairs",
+    "RESTING_DEPTH", "Body", "BulletWorld", "Collision", "NearBodies", "Shape", "check_tasks",
+    "checked_self_pairs",
 ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple, Self
 
@@ -14,48 +14,20 @@ from symgrasp.errors import MeshError, SceneError, SymgraspError
 from symgrasp.meshes import depth_inside, read_mesh
 from symgrasp.poses import Array, axis_frame
 from symgrasp.reason import Reason
-from symgrasp.robot import Arm, Robot
-from symgrasp.robot_model import RobotModel
-from symgrasp.scene import Scene
-from symgrasp.scene_build import Obstacle
+from symgrasp.robot.model import RobotModel
+from symgrasp.robot.robot import Arm, Robot
+from symgrasp.scene.parts import Obstacle
+from symgrasp.scene.scene import Scene
 from symgrasp.world.client import link_names, load_urdf, pybullet, xyzw
+from symgrasp.world.collision import Body, Collision, NearBodies
 from symgrasp.world.self_pairs import checked_self_pairs
 from symgrasp.world.shapes import Shape, link_shapes
 
-__all__ = ["Body", "BulletWorld", "Collision", "Near"]
+__all__ = ["BulletWorld"]
 
 MOST_TRIANGLES = 60_000
 """More than this PyBullet does not take in one mesh."""
 
-
-class Body(NamedTuple):
-    """A link of a robot, or a whole obstacle or object (with an empty or inner link name)."""
-
-    body: str
-    link: str
-
-    def __str__(self) -> str:
-        return f"{self.body}/{self.link}" if self.link else self.body
-
-
-class Collision(NamedTuple):
-    """Two bodies that are closer than they may be.
-
-    Attributes:
-        reason: the kind of collision, seen from the arm.
-        a: the link of the robot.
-        b: what it hits.
-        depth: how much closer (m) than allowed; the penetration where the margin is zero.
-    """
-
-    reason: Reason
-    a: Body
-    b: Body
-    depth: float
-
-
-Near = Collection[str | frozenset[str]]
-"""What could be in the way of an arm: bodies by their names, and pairs of the robot's own links."""
 
 _KEPT_AT_A_DISTANCE = (Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION)
 
@@ -258,10 +230,10 @@ class BulletWorld:
         """Put an arm at joint values (n,) with its hand open by ``opening`` (m), the robot's rest at home."""
         self._set(arm.robot.name, arm.robot_values(q, opening))
 
-    def set_arms(self, postures: Iterable[tuple[Arm, ArrayLike, float]]) -> None:
+    def set_arms(self, configurations: Iterable[tuple[Arm, ArrayLike, float]]) -> None:
         """Put several arms at (arm, joint values, opening), and everything else at home."""
         values = {name: robot.home.copy() for name, robot in self.scene.robots.items()}
-        for arm, q, opening in postures:
+        for arm, q, opening in configurations:
             robot = values[arm.robot.name]
             moved = arm.robot_values(q, opening)
             changed = moved != arm.robot.home
@@ -323,7 +295,7 @@ class BulletWorld:
 
     # -- questions --------------------------------------------------------------------------
 
-    def first_collision(self, arm: Arm, near: Near | None = None) -> Collision | None:
+    def first_collision(self, arm: Arm, near: NearBodies | None = None) -> Collision | None:
         """Return the deepest collision of the first stage at which the arm collides, or None.
 
         Stages in order: with its own robot, the object, obstacles, other robots. Links that no
@@ -419,7 +391,7 @@ class BulletWorld:
         """Return the smallest distance (m) of all pairs that are checked for an arm, at most ``limit``."""
         return min((limit - c.depth for c in self.near(arm, limit)), default=limit)
 
-    def near(self, arm: Arm, distance: float, among: Near | None = None) -> list[Collision]:
+    def near(self, arm: Arm, distance: float, among: NearBodies | None = None) -> list[Collision]:
         """Return the pairs checked for an arm that are closer than a distance (m), as if it were a margin.
 
         Args:

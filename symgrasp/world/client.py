@@ -12,7 +12,7 @@ from pathlib import Path
 
 from symgrasp.errors import UrdfError
 from symgrasp.poses import Array, from_position_quat, quat_wxyz, wxyz_to_xyzw, xyzw_to_wxyz
-from symgrasp.robot_model import RobotModel
+from symgrasp.robot.model import RobotModel
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from symgrasp.robot_model import RobotModel
+from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import link_names, load_urdf, pybullet
 
 __all__ = ["checked_self_pairs"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from symgrasp.errors import SceneError
-from symgrasp.scene import Scene
+from symgrasp.scene.scene import Scene
 from symgrasp.world.bullet import BulletWorld
 
 __all__ = ["RESTING_DEPTH", "check_tasks"]

@@ -13,11 +13,11 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import ConsoleMessage, Locator, Page, expect
 
-from app.controls import panel_widths
-from app.palette import rgb
-from app.stage import FIELD_OF_VIEW, viewpoint
+from app.panels.layout import panel_widths
+from app.render.palette import rgb
+from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
 from symgrasp.reason import Reason
-from symgrasp.scene import Scene
+from symgrasp.scene.scene import Scene
 
 WAIT = 30_000
 """Longest wait (ms) for anything: the machine may be busy."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from symgrasp.scene import Scene
+from symgrasp.scene.scene import Scene
 from tests.e2e.page import GraspPage
 
 BOTTLE = Scene.load("bottle_on_table")

@@ -10,10 +10,10 @@ import pybullet_data
 import yaml
 from playwright.sync_api import Browser, expect
 
-from app.palette import rgb
-from symgrasp.maps import create_map
+from app.render.palette import rgb
+from symgrasp.feasibility.create import create_map
 from symgrasp.reason import Reason
-from symgrasp.scene import Scene
+from symgrasp.scene.scene import Scene
 from tests.e2e.page import GraspPage
 from tests.e2e.test_keyboard import shoot
 from tests.e2e.test_page import drawn

@@ -11,17 +11,17 @@ import pytest
 from PIL import Image
 from playwright.sync_api import expect
 
-from app.candidates_view import verdict_line
-from app.coloured import coloured
-from app.ghost_view import HIT
-from app.map_view import sample_columns
-from app.values import RollChoice
-from symgrasp.explain import Explanation
-from symgrasp.feasibility import FeasibilityMap
-from symgrasp.maps import MapMaker, create_map
+from app.html.candidates import candidate_line
+from app.html.map import sample_columns
+from app.render.cell_colors import coloured
+from app.scene3d.ghost_view import HIT
+from app.state.map_view_state import RollChoice
+from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.explain import Explanation
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.reason import Reason
-from symgrasp.scene import Scene
-from symgrasp.views import View
+from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.e2e.page import GraspPage
 
@@ -34,7 +34,7 @@ def bottle_map() -> FeasibilityMap:
     return create_map(BOTTLE)
 
 
-def drawn(m: FeasibilityMap, view: View) -> np.ndarray:
+def drawn(m: FeasibilityMap, view: ColorBy) -> np.ndarray:
     found = coloured(m, RollChoice.EITHER, view)
     return found.colors[found.index[::-1, sample_columns(m.manifold)]]
 
@@ -69,7 +69,7 @@ def test_shifted_against_recomputed(open_page, bottle_map):
         page.slide("Rotation (°)", degrees)
         expect(page.text(f"from scratch for {degrees:.2f}°: 0 of {cells} cells differ")).to_be_visible()
         shifted = bottle_map.shift(np.deg2rad(degrees))
-        page.wait_for_picture(lambda p, m=shifted: np.array_equal(p, drawn(m, View.REASON)))
+        page.wait_for_picture(lambda p, m=shifted: np.array_equal(p, drawn(m, ColorBy.REASON)))
         assert np.array_equal(page.picture("recomputed map"), page.picture())
     slider = page.page.get_by_role("slider").first
     slider.focus()
@@ -86,7 +86,7 @@ def test_views_of_the_map_and_their_pictures(open_page, bottle_map, tmp_path):
     page = open_page()
     before = page.settled_view()
     page.page.get_by_role("tab", name="View").click()
-    for view in (View.FEASIBLE, View.ALONG, View.AROUND, View.OPENING, View.CLEARANCE):
+    for view in (ColorBy.FEASIBLE, ColorBy.ALONG, ColorBy.AROUND, ColorBy.OPENING, ColorBy.CLEARANCE):
         page.choose("Colours show", view)
         page.wait_for_picture(lambda p, v=view: np.array_equal(p, drawn(bottle_map, v)))
         expect(page.text(f"{view} ({view.unit})" if view.unit else "not feasible").first).to_be_visible()
@@ -116,23 +116,23 @@ def test_the_candidates_of_a_cell(open_page, bottle_map):
     hit = pick(page, bottle_map, Reason.SCENE_COLLISION)
     best = hit.best
     assert best
-    expect(page.text(verdict_line(best))).to_be_visible()
+    expect(page.text(candidate_line(best))).to_be_visible()
     expect(page.page.locator("img[alt='candidates']")).to_be_visible()
     page.wait_for_view(lambda v: reds(v) > reds(parked) + 300)
     shoot(page, "ghost")
-    last = len(hit.verdicts)
+    last = len(hit.candidates)
     page.slide("Candidate", last)
     expect(page.text(f"Candidate {last} of {last}")).to_be_visible()
-    expect(page.text(verdict_line(hit.verdicts[-1]))).to_be_visible()
+    expect(page.text(candidate_line(hit.candidates[-1]))).to_be_visible()
     expect(page.text("One of")).to_be_visible()
 
     held = pick(page, bottle_map, Reason.FEASIBLE)
     assert held.best
     expect(page.text("panda holds it: feasible")).to_be_visible()
-    expect(page.text(f" of {len(held.verdicts)}: φ")).to_be_visible()
+    expect(page.text(f" of {len(held.candidates)}: φ")).to_be_visible()
     page.wait_for_view(lambda v: reds(v) < reds(parked) + 50)
     page.slide("Candidate", 1)
-    expect(page.text(verdict_line(held.best))).to_be_visible()
+    expect(page.text(candidate_line(held.best))).to_be_visible()
 
     pick(page, bottle_map, Reason.UNREACHABLE)
     expect(page.text("Out of reach: no configuration of the arm gets there")).to_be_visible()

@@ -12,24 +12,24 @@ import pybullet_data
 import pytest
 from playwright.sync_api import expect
 
-from app.bodies import FLAT_SIZE, board_position
-from app.candidates_view import verdict_line
-from app.map_view import sample_columns
-from app.palette import REASONS
-from app.stage import viewpoint
-from app.state import State
-from app.things import from_mesh
-from app.values import RollChoice
-from symgrasp.feasibility import FeasibilityMap
-from symgrasp.manifold import grasp_to_tool
-from symgrasp.maps import MapMaker, create_map
-from symgrasp.objects import load_object
-from symgrasp.plan import Plan, plan_schema
+from app.html.candidates import candidate_line
+from app.html.map import sample_columns
+from app.render.palette import REASONS
+from app.scene3d.flat_map import FLAT_SIZE, flat_map_position
+from app.scene3d.viewpoint import viewpoint
+from app.state.map_view_state import RollChoice
+from app.state.object_choice import from_mesh
+from app.state.state import State
+from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.library import load_object
+from symgrasp.object.manifold import grasp_to_tool
+from symgrasp.plan.plan import Plan, plan_schema
 from symgrasp.poses import pose_error
 from symgrasp.reason import Reason
-from symgrasp.scene import Scene
+from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
-from tests.app.test_profile_view import oval_stl
+from tests.app.html.test_profile import oval_stl
 from tests.conftest import write_scene
 from tests.e2e.page import GraspPage
 
@@ -130,7 +130,7 @@ def test_an_infeasible_cell_says_why(open_page, bottle_map):
     assert best
     assert best.collisions[0].b.body in ("table", "parcel", "lamp")
     expect(page.text("panda cannot hold it here: hits an obstacle. The best of")).to_be_visible()
-    expect(page.text(verdict_line(best))).to_be_visible()
+    expect(page.text(candidate_line(best))).to_be_visible()
 
 
 def test_the_roll_can_be_chosen(open_page, bottle_map):
@@ -165,7 +165,7 @@ def test_clicking_the_flat_map_picks_a_cell(open_page, bottle_map):
     row, column = grid.cell(0.08, np.deg2rad(150.0))
     x = (np.rad2deg(grid.theta[column]) / 360) * FLAT_SIZE[0]
     y = (grid.h[row] / 0.3 - 0.5) * FLAT_SIZE[1]
-    point = board_position(State.of(BOTTLE, ""), view) + x * view.right + [0.0, 0.0, y]
+    point = flat_map_position(State.of(BOTTLE, ""), view) + x * view.right + [0.0, 0.0, y]
     page.click_3d(BOTTLE, point)
     expect_picked(page, grid.h[row], grid.theta[column])
 
@@ -196,16 +196,16 @@ def check_plan(content: dict[str, Any], kind: str) -> Plan:
             arms = [scene.arm(hold.arm) for hold in task.holds]
             pose = task.object_pose_turned.array()
             world.set_object(pose)
-            postures = []
+            joint_values = []
             for arm, hold in zip(arms, task.holds, strict=True):
                 q = np.array([hold.joints[name] for name in arm.joint_names])
-                postures.append((arm, q, hold.opening))
+                joint_values.append((arm, q, hold.opening))
                 standoff = arm.hand.standoff(float(scene.profile.radius(hold.grasp.h)))
                 grasp = grasp_to_tool(pose, hold.grasp.h, hold.grasp.theta, hold.grasp.roll, standoff)
                 distance, angle = pose_error(arm.world_tool_pose(q), grasp)
                 assert distance < 1e-5
                 assert angle < 1e-5
-            world.set_arms(postures)
+            world.set_arms(joint_values)
             assert world.collisions(arms) == []
     return plan
 
@@ -309,13 +309,13 @@ def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
     expect(page.page.get_by_label("Object", exact=True)).to_have_value(f"{hostile} (upload)")
     expect(page.alerts).to_have_count(0)
     page.expect_title("bottle_on_table")
-    thing = from_mesh(hostile, path.read_bytes(), 1e-3)
-    expected = drawn(create_map(BOTTLE.with_object(thing.name, thing.profile)))
+    object_choice = from_mesh(hostile, path.read_bytes(), 1e-3)
+    expected = drawn(create_map(BOTTLE.with_object(object_choice.name, object_choice.profile)))
     assert np.array_equal(page.picture(), expected)
     page.choose("Scene", "soda_can")
     page.expect_title("soda_can")
     page.choose("Object", f"{hostile} (upload)")  # it may go into any scene
-    expect(page.text(f"the {thing.name} turns")).to_be_visible()
+    expect(page.text(f"the {object_choice.name} turns")).to_be_visible()
     page.expect_title("soda_can")
     assert page.page.evaluate("window.hacked") is None
     assert page.complaints == []

@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 from playwright.sync_api import Locator, expect
 
-from symgrasp.plan import Plan
-from symgrasp.verify import verify
+from symgrasp.plan.plan import Plan
+from symgrasp.plan.verify import verify
 from tests.e2e.page import GraspPage
 
 SCREENSHOTS = Path(__file__).parent / "screenshots"

@@ -6,13 +6,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from symgrasp.candidates import Judge
-from symgrasp.feasibility import Cell, FeasibilityMap
+from symgrasp.feasibility.candidates import CandidateChecker
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import ClosedFormIK
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
-from symgrasp.robot import Arm
-from symgrasp.scene import Scene
+from symgrasp.robot.robot import Arm
+from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 
 TOLERANCE = 1e-6
@@ -41,7 +42,7 @@ def assert_true(
         cells: the cells to check; all of them if None.
     """
     ik = ClosedFormIK(arm, scene.settings.redundancy)  # EAIK: the engine has another solver
-    judge = Judge(world, arm, ik, scene.settings.approach)
+    checker = CandidateChecker(world, arm, ik, scene.settings.approach)
     tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
     world.margin = scene.settings.margin
     world.set_arms(())
@@ -49,33 +50,44 @@ def assert_true(
     for index in np.argwhere(m.reason >= Reason.SELF_COLLISION) if cells is None else cells:
         cell = Cell(*index)
         if m.feasible[cell]:
-            _check_witness(world, arm, judge, m, cell, tools[cell])
+            _check_witness(world, arm, checker, m, cell, tools[cell])
         else:
-            _check_collision(world, arm, judge, m, cell, tools[cell])
+            _check_collision(world, arm, checker, m, cell, tools[cell])
 
 
 def _check_witness(
-    world: BulletWorld, arm: Arm, judge: Judge, m: FeasibilityMap, cell: Cell, T_base_tool: np.ndarray
+    world: BulletWorld,
+    arm: Arm,
+    checker: CandidateChecker,
+    m: FeasibilityMap,
+    cell: Cell,
+    T_base_tool: np.ndarray,
 ) -> None:
     witness = m.witness(cell)
     assert witness is not None
     assert np.allclose(arm.tool_pose(witness.q), T_base_tool, atol=TOLERANCE)
-    fate = judge.fate(T_base_tool, witness.q, witness.sample, witness.opening)
+    fate = checker.fate(T_base_tool, witness.q, witness.sample, witness.opening)
     assert fate.reason == Reason.FEASIBLE
     world.set_arm(arm, witness.q, witness.opening)
     assert 0 <= witness.clearance <= world.clearance(arm, 0.1) + TOLERANCE
 
 
 def _check_collision(
-    world: BulletWorld, arm: Arm, judge: Judge, m: FeasibilityMap, cell: Cell, T_base_tool: np.ndarray
+    world: BulletWorld,
+    arm: Arm,
+    checker: CandidateChecker,
+    m: FeasibilityMap,
+    cell: Cell,
+    T_base_tool: np.ndarray,
 ) -> None:
     """Some candidate comes to the collision that the map names."""
     reason, opening = Reason(int(m.reason[cell])), float(m.opening[cell.row])
-    solutions = judge.ik.solve(T_base_tool)
+    solutions = checker.ik.solve(T_base_tool)
     inside = np.flatnonzero(solutions.inside)
     if reason == Reason.APPROACH_BLOCKED:
         fates = (
-            judge.fate(T_base_tool, solutions.q[k], int(solutions.sample[k]), opening).reason for k in inside
+            checker.fate(T_base_tool, solutions.q[k], int(solutions.sample[k]), opening).reason
+            for k in inside
         )
         assert reason in fates
         return

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from symgrasp.files import SCENES_DIR
-from symgrasp.hand import HANDS
+from symgrasp.robot.hand import HANDS
 
 BASES = ("bottle_on_table", "soda_can", "log_iiwa_and_panda", "handover_between_robots", "log_four_robots")
 """Shipped scenes whose robots are used."""

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND, new_scratch, place_arm, place_hand
 from symgrasp.engine.distance import distance_bounds
-from symgrasp.engine.exact import ExactEngine
-from symgrasp.engine.rig import Rig
+from symgrasp.engine.geometry import ArmGeometry
 from symgrasp.engine.solids import Piece, pack, pose_rows
+from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.poses import axis_frame
 from symgrasp.world import BulletWorld
 from tests.conftest import SHIPPED, load_small
@@ -95,9 +95,9 @@ def by_bodies(
     engine: ExactEngine, world: BulletWorld, q, row: int
 ) -> dict[frozenset[str], tuple[float, float]]:
     """Return for every pair of bodies of which one moves the bounds of the true shapes' distance."""
-    rig: Rig = engine._rig
-    arm, body, solids = engine.arm, rig.body, rig.solids
-    pose = rig.pose.copy()
+    arm_geometry: ArmGeometry = engine._geometry
+    arm, body, solids = engine.arm, arm_geometry.body, arm_geometry.solids
+    pose = arm_geometry.pose.copy()
     pose[body.objects] = pose_rows(axis_frame(world._object_pose))
     scratch = new_scratch(pose, solids, len(q))
     T_base_world = np.ascontiguousarray(arm.robot.T_world_base)
@@ -105,9 +105,9 @@ def by_bodies(
     place_arm(body, solids, scratch, q)
     found: dict[frozenset[str], tuple[float, float]] = {}
     for a in range(len(body.frame)):
-        for b in range(len(rig.names)):
-            if rig.names[a] != rig.names[b]:
-                key = frozenset((str(rig.names[a]), str(rig.names[b])))
+        for b in range(len(arm_geometry.names)):
+            if arm_geometry.names[a] != arm_geometry.names[b]:
+                key = frozenset((str(arm_geometry.names[a]), str(arm_geometry.names[b])))
                 lower, upper = bounds(solids, scratch.pose, a, b)
                 upper += solids.size[a, 1] + solids.size[b, 1]
                 known = found.get(key, (math.inf, math.inf))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from symgrasp.maps import MapMaker
-from symgrasp.scene import Scene
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import SHIPPED
 from tests.engine.identity import assert_same, assert_true

@@ -1,0 +1,119 @@
+"""Long computations off the threads that answer the browser: one at a time, the newest wins."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from app.compute.compute_process import ProcessDied
+from symgrasp.errors import Cancelled, SymgraspError
+from symgrasp.progress import Progress
+
+__all__ = ["Job", "JobQueue"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A computation and who hears of it; all are called on the worker's thread.
+
+    Attributes:
+        run: computes; calls its argument with the finished share, which may raise `Cancelled`.
+        progress: told the finished share.
+        done: told the result.
+        failed: told one line about what went wrong.
+    """
+
+    run: Callable[[Progress], Any]
+    progress: Progress
+    done: Callable[[Any], None]
+    failed: Callable[[str], None]
+
+
+class JobQueue:
+    """One thread with room for one waiting job.
+
+    A new job replaces the waiting one and cancels the one under way, which stops at its next
+    progress; its listeners may still hear a last word that was on its way.
+
+    Args:
+        name: of the thread.
+        finish: called on the thread at the very end, and after a job broke in an unexpected way, to free
+            what the jobs used.
+    """
+
+    def __init__(self, name: str, finish: Callable[[], object]) -> None:
+        self._finish = finish
+        self._changed = threading.Condition()
+        self._waiting: Job | None = None
+        self._running: Job | None = None
+        self._closed = False
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self._thread.start()
+
+    def submit(self, job: Job) -> None:
+        """Do this next, and nothing else any more."""
+        with self._changed:
+            if not self._closed:
+                self._waiting, self._running = job, None
+                self._changed.notify()
+
+    def cancel(self) -> None:
+        """Stop what is under way and forget what waits."""
+        with self._changed:
+            self._waiting = self._running = None
+
+    def close(self) -> None:
+        """Cancel everything and end the thread; may be called from anywhere, more than once."""
+        with self._changed:
+            self._closed = True
+            self._waiting = self._running = None
+            self._changed.notify()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait until the thread has ended after `close`."""
+        self._thread.join(timeout)
+
+    def _work(self) -> None:
+        try:
+            while job := self._next():
+                self._do(job)
+        finally:
+            self._finish()
+
+    def _next(self) -> Job | None:
+        with self._changed:
+            self._running = None
+            self._changed.wait_for(lambda: self._closed or self._waiting)
+            self._running, self._waiting = self._waiting, None
+            return None if self._closed else self._running
+
+    def _do(self, job: Job) -> None:
+        def progress(share: float) -> None:
+            self._tell(job, job.progress, share)
+            if self._running is not job:
+                raise Cancelled
+
+        try:
+            result = job.run(progress)
+        except Cancelled:
+            return
+        except SymgraspError as error:
+            self._tell(job, job.failed, str(error))
+        except Exception as error:  # whatever a library raises must not end the thread
+            died = isinstance(error, ProcessDied)
+            log.error("a computation failed", exc_info=None if died else error)
+            self._finish()
+            text = " ".join(str(error).split())
+            text = text if died else f"unexpected {type(error).__name__}: {text}"
+            self._tell(job, job.failed, f"{text}; what you set is kept, and the physics begins anew")
+        else:
+            self._tell(job, job.done, result)
+
+    def _tell(self, job: Job, listener: Callable[[Any], None], value: Any) -> None:
+        if self._running is job:
+            listener(value)

@@ -1,0 +1,1 @@
+"""Scene files as the page reads and writes them, and links."""

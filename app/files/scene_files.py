@@ -1,0 +1,150 @@
+"""Scenes as files of the page: written as they were changed, and read without trusting them.
+
+An uploaded scene comes from whoever uses the page, so it must not make the server read whatever
+lies on its machine. It may refer to files that installed Python packages ship (``package://…``) and
+to files in the server's own folders of scenes; anything else is refused, and the refusal does not
+tell whether there is such a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from app.state.uploaded_scene import UploadedScene
+from symgrasp.errors import SceneError
+from symgrasp.files import SCENES_DIR, package_dir, parse_yaml, resolve
+from symgrasp.scene.format import SceneFile, describe
+from symgrasp.scene.scene import Scene
+
+__all__ = ["SCENE_LIMIT", "read_scene", "refuse_foreign_files", "scene_yaml"]
+
+SCENE_LIMIT = 1_000_000
+"""Largest scene file (bytes) that is looked at."""
+
+MAX_NAME = 100
+
+SHIPPED = f"package://{SCENES_DIR.name}/"
+
+
+def scene_yaml(scene: Scene) -> str:
+    """Write a scene so that the page and the command line read the same scene again.
+
+    Files that come with this software are written as ``package://``; others keep their absolute
+    paths, and the first lines say so.
+    """
+    content = scene.file.model_dump(mode="json", exclude_none=True)
+    elsewhere = []
+    for _, holder, key in _references(content):
+        path = Path(holder[key])
+        if path.is_absolute() and path.is_relative_to(SCENES_DIR):
+            holder[key] = SHIPPED + path.relative_to(SCENES_DIR).as_posix()
+        elif not holder[key].startswith("package://"):
+            elsewhere.append(holder[key])
+    lines = ["# A scene of symgrasp: `symgrasp app FILE` opens it."]
+    if elsewhere:
+        lines.append(
+            "# It needs these files; on another machine, put them beside it and write their names only:"
+        )
+        lines += [f"#   {path!r}" for path in dict.fromkeys(elsewhere)]
+    text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
+    return "\n".join([*lines, text])
+
+
+def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> UploadedScene:
+    """Build the scene in an uploaded file.
+
+    Args:
+        name: of the file.
+        content: what it holds.
+        folders: where the server's own scenes lie; relative paths are sought there, in this order.
+
+    Raises:
+        SceneError: the file is too large or no scene, or refers to a file that it may not.
+        UrdfError, ProfileError, MeshError: as `symgrasp.scene.scene.Scene.load`.
+    """
+    source = name[:MAX_NAME]
+    if len(content) > SCENE_LIMIT:
+        size = f"{len(content) / 1e6:.1f} MB"
+        raise SceneError(source, "size of the file", size, f"a scene of at most {SCENE_LIMIT / 1e6:g} MB")
+    try:
+        data = parse_yaml(content.decode("utf-8"))
+    except ValueError as error:
+        raise SceneError(source, "file", str(error), "a YAML document") from None
+    if not isinstance(data, dict):
+        raise SceneError(source, "file", data, "a YAML mapping with schema_version, name, robots, …")
+    try:
+        plain = SceneFile.model_validate(data).model_dump(mode="json", exclude_none=True)
+    except ValidationError as error:
+        raise SceneError(source, *describe(error, data)) from None
+    roots = [folder.resolve() for folder in folders]
+    for field, holder, key in _references(plain):
+        holder[key] = str(_allowed(source, field, holder[key], roots))
+    return UploadedScene(f"{source} (upload)", Scene.from_content(plain, source))
+
+
+def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable[Path]) -> None:
+    """Refuse the content of a scene that came with a plan if it refers to a file that it may not.
+
+    A plan is checked as it is written, so its paths have to be absolute.
+
+    Raises:
+        SceneError: it does, or is no content of a scene.
+    """
+    try:
+        plain = SceneFile.model_validate(content).model_dump(mode="json", exclude_none=True)
+    except ValidationError as error:
+        raise SceneError(source, *describe(error, content)) from None
+    roots = [folder.resolve() for folder in folders]
+    for field, holder, key in _references(plain):
+        reference = holder[key]
+        if not reference.startswith("package://") and not Path(reference).is_absolute():
+            raise SceneError(source, field, reference, "package://<package>/<path>, or an absolute path")
+        _allowed(source, field, reference, roots)
+
+
+def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> Path | str:
+    """Return where an allowed reference leads; packages stay references."""
+    if reference.startswith("package://"):
+        package = package_dir(reference.removeprefix("package://").partition("/")[0])
+        # A folder beside which the server happens to run passes for a package without code.
+        if package and ((package / "__init__.py").is_file() or package.resolve() == SCENES_DIR):
+            path = _inside(resolve(reference, package), [package.resolve()])
+            if path:
+                return reference
+    else:
+        for root in roots:
+            if path := _inside(resolve(reference, root), roots):
+                return path
+    folder = f"in {roots[0]}" if roots else "of the server"
+    expected = f"a file that a Python package ships (package://<package>/<path>), or one {folder}"
+    raise SceneError(source, field, reference, expected)
+
+
+def _inside(path: Path | None, roots: list[Path]) -> Path | None:
+    """Return the path with every link and ``..`` followed, if it leads into one of the folders."""
+    if path is None:
+        return None
+    path = path.resolve()
+    return path if any(path.is_relative_to(root) for root in roots) else None
+
+
+def _references(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], str]]:
+    """Give all references to files in the content of a scene: field, the mapping it is in, its key."""
+    holders: list[tuple[str, dict[str, Any]]] = [("object", content["object"])]
+    for i, robot in enumerate(content["robots"]):
+        holders.append((f"robots[{i}]", robot))
+        arms = [(f"robots[{i}]", robot)]
+        arms += [(f"robots[{i}].arms[{k}]", arm) for k, arm in enumerate(robot.get("arms", []))]
+        holders += [
+            (f"{field}.hand", arm["hand"]) for field, arm in arms if isinstance(arm.get("hand"), dict)
+        ]
+    holders += [(f"obstacles[{i}]", obstacle) for i, obstacle in enumerate(content["obstacles"])]
+    for field, holder in holders:
+        for key in ("urdf", "mesh"):
+            if key in holder:
+                yield f"{field}.{key}", holder, key

@@ -1,0 +1,106 @@
+"""Why there is no plan: which tasks exclude each other, the heights each allows, what would help."""
+
+from __future__ import annotations
+
+from html import escape
+
+from app.html.map import h_axis
+from app.state.plan_results import PlanFileReport, Refusal
+from symgrasp.object.manifold import ROLLS, Manifold
+from symgrasp.planners.conflicts import Conflict, Exclusion
+from symgrasp.reason import Reason
+
+__all__ = ["opened_html", "regrasps", "why_html"]
+
+HEIGHT = 130
+"""Of the picture of the heights (px)."""
+
+FAILURES_SHOWN = 12
+
+
+def why_html(refusal: Refusal, grid: Manifold) -> str:
+    """Say why no plan was found."""
+    conflict = refusal.conflict
+    if conflict is None:
+        return f'<div class="sg sg-note sg-warning" role="alert">{escape(_sentence(refusal.text))}</div>'
+    rows = "".join(f"<div>{escape(_excluded(e))}</div>" for e in conflict.exclusions)
+    return (
+        f'<div class="sg sg-note sg-warning" role="alert"><b>No grasp serves all tasks.</b>{rows}</div>'
+        '<div class="sg sg-small">Heights that each task allows, left at roll 0°, right at 180°:</div>'
+        f"{_heights(conflict, grid)}{_helps(conflict)}"
+    )
+
+
+def regrasps(refusal: Refusal | None) -> int:
+    """Return how often the object has to be set down to be grasped anew, 0 if that is of no use."""
+    shared = refusal.conflict.regrasps if refusal and refusal.conflict else None
+    return len(shared) - 1 if shared else 0
+
+
+def opened_html(opened: PlanFileReport) -> str:
+    """Report on a plan that came from a file."""
+    name = escape(opened.name)
+    if not opened.failures:
+        text = f"{name} holds: {opened.checks} statements verified."
+        return f'<div class="sg sg-note sg-good" role="status">{text}</div>'
+    count = len(opened.failures)
+    rows = "".join(f"<li>{escape(text)}</li>" for text in opened.failures[:FAILURES_SHOWN])
+    more = f"<li>and {count - FAILURES_SHOWN} more</li>" if count > FAILURES_SHOWN else ""
+    wrong = f"{name} does not hold, so it is not shown: {count} of {opened.checks} statements are wrong."
+    return f'<div class="sg sg-note sg-error" role="alert">{wrong}<ul>{rows}{more}</ul></div>'
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _excluded(exclusion: Exclusion) -> str:
+    names, apart = exclusion
+    if len(names) == 1:
+        return f"{names[0]} cannot be done at all."
+    far = "share no roll" if apart is None else f"are {100 * apart:.1f} cm apart along the axis"
+    return f"{' and '.join(names)} exclude each other: they {far}."
+
+
+def _heights(conflict: Conflict, grid: Manifold) -> str:
+    """Draw for every task the heights that it allows, a bar for each roll."""
+    low, high = grid.profile.h_min, grid.profile.h_max
+    guilty = {name for exclusion in conflict.exclusions for name in exclusion.tasks}
+    width = 100 / len(conflict.heights)
+    columns = []
+    for k, (task, spans) in enumerate(conflict.heights):
+        bars = "".join(
+            _bar(width * (k + 0.22 + 0.3 * roll), 0.26 * width, (a - low, b - low), (high - low, grid.dh))
+            for roll, runs in enumerate(spans[: len(ROLLS)])
+            for a, b in runs
+        )
+        look = ' class="sg-guilty"' if task in guilty else ""
+        columns.append(f'{bars}<b{look} style="left:{width * (k + 0.5):.2f}%">{escape(task)}</b>')
+    return (
+        f'<div class="sg-heights" style="height:{HEIGHT}px" role="img" aria-label="heights of the tasks">'
+        f"{h_axis(grid, HEIGHT)}<div>{''.join(columns)}</div></div>"
+    )
+
+
+def _bar(left: float, width: float, span: tuple[float, float], size: tuple[float, float]) -> str:
+    """Draw a run of cells from its lowest to its highest centre."""
+    whole, cell = size
+    bottom = 100 * (span[0] - cell / 2) / whole
+    height = 100 * (span[1] - span[0] + cell) / whole
+    return (
+        f'<i style="left:{left:.2f}%;width:{width:.2f}%;'
+        f'bottom:{bottom:.2f}%;height:{height:.2f}%;background:{Reason.FEASIBLE.color}"></i>'
+    )
+
+
+def _helps(conflict: Conflict) -> str:
+    if conflict.regrasps is None:
+        return ""
+    if not conflict.regrasps:
+        return '<div class="sg sg-small">Setting the object down and grasping it anew does not help.</div>'
+    parts = [
+        " and ".join(part.tasks) + (f", then set it down at {part.set_down}" if part.set_down else "")
+        for part in conflict.regrasps
+    ]
+    text = f"{len(parts)} grasps do: {'; '.join(parts)}."
+    return f'<div class="sg sg-small">{escape(text)}</div>'

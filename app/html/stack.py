@@ -1,0 +1,162 @@
+"""The maps of a sequence in a stack, slid over each other by each task's δ: figure 6 of the paper."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from html import escape
+from itertools import groupby
+
+import numpy as np
+
+from app.html.map import THETA_AXIS, Mark, circle, h_axis, sample_columns, to_png
+from app.render.palette import INK, REASONS, rgb
+from app.render.weak_cache import cached_with_first
+from app.state.plan_results import PlanResult
+from app.state.requests import MapResult
+from app.state.state import State
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.manifold import ROLLS, wrap
+from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold
+from symgrasp.reason import Reason
+
+__all__ = ["measures", "shared_columns", "stack_html"]
+
+ROOM = 300
+"""Height (px) that all strips share."""
+
+TALLEST, LOWEST = 64, 26
+"""Of one strip (px)."""
+
+SHARED = np.array([rgb("#eceef1"), rgb(Reason.FEASIBLE.color)], dtype=np.uint8)
+"""(2, 3) sRGB: cells that some task excludes, and those that serve all."""
+
+HEADINGS = ("task", "turned by δ", "room along", "around", "clear")
+
+
+def stack_html(state: State) -> str:
+    """Draw the maps of the plan's tasks below each other, its grasp in all of them."""
+    if state.plan is None or state.plan.plan.kind != "sequential":
+        return _unplanned(state)
+    plan = state.plan
+    steps = [(k, task, task.holds[0]) for k, task in enumerate(plan.plan.tasks)]
+    groups = [list(group) for _, group in groupby(steps, lambda step: step[2].grasp)]
+    height = _height(len(steps) + sum(len(group) > 1 for group in groups))
+    rows = [_row(HEADINGS, "sg-faint")]
+    for number, group in enumerate(groups, start=1):
+        grasp = group[0][2].grasp
+        if len(groups) > 1:
+            rows.append(f'<div class="sg-part">grasp {number}: {_place(grasp)}</div>')
+        for k, task, hold in group:
+            turn = f"{np.rad2deg(task.delta) + 0.0:.1f}°"
+            now = "sg-now" if k == state.step else ""
+            rows.append(_row((f"{k + 1} · {task.name}", turn, *measures(hold)), now))
+            result = plan.maps[task.name, hold.arm]
+            rows.append(_strip(result, grasp, state.plan_results.slide * task.delta, task.delta, height))
+        if len(group) > 1:
+            turns = tuple(state.plan_results.slide * task.delta for _, task, _ in group)
+            rows.append(_row((f"all {len(group)} over each other", "", "", "", ""), ""))
+            rows.append(_overlay(plan, tuple(k for k, _, _ in group), turns, grasp, height))
+    axis = f'<div class="sg-map sg-axis">{THETA_AXIS}</div>'
+    return f'<div class="sg-stack" role="img" aria-label="maps of the tasks">{"".join(rows)}{axis}</div>'
+
+
+def measures(hold: Hold) -> tuple[str, str, str]:
+    """Say how much room a grasp has along the axis and around it, and how clear the arm is."""
+    more = "> " if hold.clearance >= CLEARANCE_LIMIT else ""
+    return (
+        f"{1e3 * hold.margin_along:.0f} mm",
+        f"{np.rad2deg(hold.margin_around):.0f}°",
+        f"{more}{1e3 * hold.clearance:.0f} mm",
+    )
+
+
+def shared_columns(maps: Sequence[FeasibilityMap], turns: Sequence[float], roll: int) -> np.ndarray:
+    """Return where a roll is feasible in all maps (H, COLUMNS of a picture), each turned by its δ (rad)."""
+    shared = []
+    for m, turn in zip(maps, turns, strict=True):
+        grid, k = m.manifold.shift(turn)  # not the whole map is shifted: this is drawn while maps slide
+        shared.append(np.roll(m.feasible[roll], -k, axis=1)[:, sample_columns(grid)])
+    return np.logical_and.reduce(shared)
+
+
+def _unplanned(state: State) -> str:
+    """Draw the maps that are known without a plan, as they were computed."""
+    known = {
+        key: result
+        for key, result in state.plan_results.maps.items()
+        if state.plan_results.kind == "sequential"
+    }
+    if not known:
+        return ""
+    height = _height(len(known))
+    rows = [
+        _row((task, "", "", "", ""), "") + _strip(r, None, 0.0, 0.0, height) for (task, _), r in known.items()
+    ]
+    axis = f'<div class="sg-map sg-axis">{THETA_AXIS}</div>'
+    return f'<div class="sg-stack" role="img" aria-label="maps of the tasks">{"".join(rows)}{axis}</div>'
+
+
+def _height(strips: int) -> int:
+    return int(np.clip(ROOM / strips - 17, LOWEST, TALLEST))
+
+
+def _row(cells: Sequence[str], look: str) -> str:
+    return f'<div class="sg-head {look}">{"".join(f"<span>{escape(cell)}</span>" for cell in cells)}</div>'
+
+
+def _place(grasp: Grasp) -> str:
+    turn, roll = np.rad2deg(grasp.theta) + 0.0, np.rad2deg(grasp.roll)
+    return f"h = {100 * grasp.h:.1f} cm, θ = {turn:.1f}°, roll {roll:.0f}°"
+
+
+def _strip(result: MapResult, grasp: Grasp | None, slid: float, delta: float, height: int) -> str:
+    """Draw one map, slid by an angle of the way to δ (rad), with the cell of it that the grasp uses."""
+    roll = None if grasp is None else ROLLS.index(grasp.roll)
+    share = float(np.mod(slid / (2 * np.pi), 1.0))
+    source = _picture(result.map, roll)
+    name = f"plan map {result.request.task} {result.request.arm}"
+    images = f'<img alt="{escape(name)}" src="{source}"><img alt="" src="{source}">'
+    sliding = f'<div class="sg-sliding" style="transform:translateX(-{50 * share:.4f}%)">{images}</div>'
+    marks = ""
+    if grasp:
+        at = Mark(grasp.h, float(wrap(grasp.theta + delta - slid)))
+        marks = _line(grasp.theta) + circle(at, result.map.manifold)
+    return _framed(sliding + marks, result.map, height)
+
+
+def _overlay(
+    plan: PlanResult, steps: tuple[int, ...], turns: tuple[float, ...], grasp: Grasp, height: int
+) -> str:
+    tasks = [plan.plan.tasks[k] for k in steps]
+    maps = tuple(plan.maps[task.name, task.holds[0].arm].map for task in tasks)
+    shared = shared_columns(maps, turns, ROLLS.index(grasp.roll))
+    source = _uri(to_png(shared[::-1].astype(np.uint8), SHARED))
+    grid = maps[0].manifold
+    picture = f'<img class="sg-whole" alt="common grasps" src="{source}">'
+    marks = _line(grasp.theta) + circle(Mark(grasp.h, grasp.theta), grid)
+    return _framed(picture + marks, maps[0], height)
+
+
+def _framed(picture: str, m: FeasibilityMap, height: int) -> str:
+    axis = h_axis(m.manifold, height)
+    return (
+        f'<div class="sg-strip" style="height:{height}px">{axis}<div class="sg-window">{picture}</div></div>'
+    )
+
+
+def _line(theta: float) -> str:
+    """Draw the grasp's θ across a strip."""
+    left = 100 * (float(wrap(theta)) + np.pi) / (2 * np.pi)
+    return f'<i class="sg-line-theta" style="left:{left:.3f}%;border-color:{INK}"></i>'
+
+
+@cached_with_first
+def _picture(m: FeasibilityMap, roll: int | None) -> str:
+    """Return a map's picture as a data URI: of one roll, or of either (None)."""
+    reason = m.reason.max(axis=0) if roll is None else m.reason[roll]
+    return _uri(to_png(reason[::-1, sample_columns(m.manifold)], REASONS))
+
+
+def _uri(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"

@@ -1,0 +1,123 @@
+"""Where the panels of one browser stand, and how they are brought up to its state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import viser
+
+from app.panels.candidates_panel import CandidatesPanel
+from app.panels.files_panel import FilesPanel
+from app.panels.grasp_panel import GraspPanel
+from app.panels.hands_panel import HandsPanel
+from app.panels.keyboard import Keyboard
+from app.panels.map_panel import MapPanel
+from app.panels.object_panel import ObjectPanel
+from app.panels.panel import Actions, Panel
+from app.panels.plan_panel import PlanFilePanel, PlanPanel
+from app.panels.scene_panel import ScenePanel
+from app.panels.sequence_panel import SequencePanel, TasksPanel
+from app.panels.status_panel import NotesPanel, StatusPanel
+from app.panels.view_panel import ViewPanel
+from app.state.state import State
+
+__all__ = ["Layout", "panel_widths"]
+
+WINDOW = 1280
+"""Width (px) of a window from which on the panels have all the room they want."""
+
+MAP_WIDTH = 480
+CONTROLS_WIDTH = 320
+NARROWEST = 240
+
+
+class Layout:
+    """All panels of a browser: maps to read on the left, what to choose on the right.
+
+    Args:
+        client: the browser.
+        actions: what the widgets do.
+        scenes: names to choose from.
+
+    Attributes:
+        view_width: width (px) that is left for the 3D view.
+    """
+
+    def __init__(self, client: viser.ClientHandle, actions: Actions, scenes: tuple[str, ...]) -> None:
+        gui = client.gui
+        self.gui, self._dark = gui, False
+        window = client.camera.image_width  # read before the panels take their part of it
+        map_width, controls_width = panel_widths(window)
+        self.view_width = window - map_width - controls_width
+        self._theme(dark=False)
+        gui.set_panel_label("symgrasp")
+        left = gui.add_panel()
+        with left.add_tab("Grasp map", viser.Icon.MAP_2):
+            gui.add_html(f"<style>{_style()}</style>")
+            map_tab: list[Panel] = [
+                MapPanel(gui, actions),
+                NotesPanel(gui, actions),
+            ]
+            tabs = gui.add_tab_group()
+            with tabs.add_tab("Grasp", viser.Icon.HAND_GRAB):
+                map_tab += [GraspPanel(gui, actions), CandidatesPanel(gui, actions)]
+            with tabs.add_tab("View", viser.Icon.PALETTE):
+                map_tab.append(ViewPanel(gui, actions))
+        with left.add_tab("Sequence", viser.Icon.ROUTE):
+            sequence_tab = [
+                NotesPanel(gui, actions),
+                SequencePanel(gui, actions),
+                PlanPanel(gui, actions),
+                TasksPanel(gui, actions),
+                PlanFilePanel(gui, actions),
+            ]
+        with left.add_tab("Hands", viser.Icon.USERS):
+            hands_tab = [
+                NotesPanel(gui, actions),
+                HandsPanel(gui, actions),
+                PlanPanel(gui, actions),
+                PlanFilePanel(gui, actions),
+            ]
+        with left.add_tab("Files", viser.Icon.FILES):
+            files_tab = [NotesPanel(gui, actions), FilesPanel(gui, actions)]
+        left.dock_left()
+        left.set_width(map_width)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(controls_width)
+        main = [
+            StatusPanel(gui, actions),
+            ScenePanel(gui, actions, scenes),
+            ObjectPanel(gui, actions),
+            Keyboard(gui, actions, scenes),
+        ]
+        self.panels: tuple[Panel, ...] = (*map_tab, *sequence_tab, *hands_tab, *files_tab, *main)
+
+    def show(self, state: State, *, write_inputs: bool) -> None:
+        """Bring the panels up to the state.
+
+        Args:
+            state: the state.
+            write_inputs: write the inputs as well; not while a person is moving them.
+        """
+        if state.dark != self._dark:
+            self._dark = state.dark
+            self._theme(dark=state.dark)
+        for panel in self.panels:
+            panel.show(state)
+            if write_inputs:
+                panel.write_inputs(state)
+
+    def _theme(self, *, dark: bool) -> None:
+        self.gui.configure_theme(
+            dark_mode=dark, show_logo=False, show_share_button=False, brand_color=(38, 102, 190)
+        )
+
+
+def panel_widths(window: int) -> tuple[int, int]:
+    """Return how wide (px) the maps and the controls are, so that a tablet shows the scene as well."""
+    share = min(1.0, window / WINDOW)
+    return round(MAP_WIDTH * share), max(round(CONTROLS_WIDTH * share), NARROWEST)
+
+
+def _style() -> str:
+    return (Path(__file__).parent / "style.css").read_text(encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Colours and pictures of maps and handprints, and the frames of a playback."""

@@ -1,0 +1,71 @@
+"""How the arms get from one task of a plan to the next when it is played: for show, not to be run.
+
+Joint values go straight from one task's to the next one's. Nothing is checked on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from symgrasp.plan.plan import Hold, PlanTask
+from symgrasp.poses import Array, inverse
+from symgrasp.scene.scene import Scene
+
+__all__ = ["PlaybackFrame", "plan_joint_values"]
+
+
+def plan_joint_values(scene: Scene, task: PlanTask) -> dict[str, Array]:
+    """Return robot name → values (n,) of all its joints in a task; arms that do not hold are parked."""
+    values = {robot.name: robot.home.copy() for robot in scene.robots.values()}
+    for hold in task.holds:
+        names = scene.robots[hold.robot].model.joint_names
+        for joint, value in (hold.joints | hold.hand_joints).items():
+            values[hold.robot][names.index(joint)] = value
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class PlaybackFrame:
+    """A moment between two tasks of a plan.
+
+    Attributes:
+        scene: the plan's scene.
+        before, after: the tasks.
+        share: how far on the way, 0 to 1.
+    """
+
+    scene: Scene
+    before: PlanTask
+    after: PlanTask
+    share: float
+
+    @cached_property
+    def joint_values(self) -> dict[str, Array]:
+        """Robot name → values (n,) of all its joints."""
+        start, end = (plan_joint_values(self.scene, task) for task in (self.before, self.after))
+        return {name: (1 - self.share) * start[name] + self.share * end[name] for name in start}
+
+    @cached_property
+    def T_world_object(self) -> Array:
+        """Where the object is (4, 4): in the hand that carries it, or where it was set down."""
+        hold = self._carrier
+        if hold is None:
+            return (self.before if self.share < 0.5 else self.after).object_pose_turned.array()
+        tool = self.scene.arm(hold.arm).world_tool_pose(self._joints(hold))
+        in_hand = inverse(hold.tool_pose.array()) @ self.before.object_pose_turned.array()
+        return tool @ in_hand
+
+    @property
+    def _carrier(self) -> Hold | None:
+        """How the first arm holds that has the same grasp in both tasks."""
+        after = {(hold.arm, hold.grasp) for hold in self.after.holds}
+        return next((hold for hold in self.before.holds if (hold.arm, hold.grasp) in after), None)
+
+    def _joints(self, hold: Hold) -> Array:
+        arm = self.scene.arm(hold.arm)
+        names = arm.robot.model.joint_names
+        values = self.joint_values[hold.robot]
+        return np.array([values[names.index(name)] for name in arm.joint_names])

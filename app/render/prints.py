@@ -1,0 +1,73 @@
+"""Which cells lie under which hand, for the maps and for the object's surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.render.palette import OVERLAP, PRINTS
+from app.render.weak_cache import cached_with_first
+from app.state.state import State
+from symgrasp.robot.handprint import Handprint
+from symgrasp.scene.scene import Scene
+
+__all__ = ["hand_color", "hand_print", "on_surface", "print_index", "print_names", "shown_prints"]
+
+
+def print_index(prints: Sequence[np.ndarray]) -> np.ndarray:
+    """Return for every cell the index (H, A) into `PRINTS` of what lies on it.
+
+    Args:
+        prints: cells (H, A) under each hand.
+
+    Returns:
+        0 for nothing, the hand's own index, or `OVERLAP` where there are several hands.
+    """
+    index = sum(np.where(cells, hand_color(k), 0) for k, cells in enumerate(prints))
+    return np.where(np.sum(prints, axis=0) > 1, OVERLAP, index)
+
+
+def hand_color(k: int) -> int:
+    """Return the index into `PRINTS` of the k-th hand of a task."""
+    return 1 + k % (len(PRINTS) - 2)
+
+
+def shown_prints(state: State) -> list[np.ndarray]:
+    """Return the prints (H, A), in the object's frame, of the hands that hold the object.
+
+    Of those that hold it together in a plan or climb, or of the picked grasp where that is asked for.
+    """
+    grid = state.scene.manifold
+    if state.climbed and state.plan_results.climb:
+        return [
+            hand_print(state.scene, arm, cell.row, cell.roll).on(grid, cell.column)
+            for arm, cell in zip(state.plan_results.climb.arms, state.climbed.cells, strict=True)
+        ]
+    if state.plan and state.step is not None and state.shown and len(state.shown.holds) > 1:
+        return list(state.plan.prints[state.step].values())
+    if state.map_view.handprint and state.pick and state.cell:
+        row, column = grid.cell(state.pick.h, state.pick.theta)
+        return [hand_print(state.scene, state.arm, row, state.cell.roll).on(grid, column)]
+    return []
+
+
+def print_names(state: State) -> list[str]:
+    """Return the arms that the shown prints belong to."""
+    if state.climbed and state.plan_results.climb:
+        return list(state.plan_results.climb.arms)
+    if state.shown and len(state.shown.holds) > 1:
+        return [hold.arm for hold in state.shown.holds]
+    return [state.arm]
+
+
+@cached_with_first
+def hand_print(scene: Scene, arm: str, row: int, roll: int) -> Handprint:
+    """Return an arm's handprint at column 0; kept, as a replay asks for the same ones again and again."""
+    return scene.arm(arm).handprint(scene.manifold, row, roll)
+
+
+def on_surface(state: State, cells: np.ndarray) -> np.ndarray:
+    """Bring cells (H, A, …) of the object's frame to the coloured surface, which does not turn with it."""
+    _, turned = state.scene.manifold.shift(state.delta)
+    return np.roll(cells, turned, axis=1)

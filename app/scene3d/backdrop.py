@@ -1,0 +1,90 @@
+"""What stands in a scene and never moves by itself: obstacles, floor, lights and camera."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.scene3d.nodes import add_links, place
+from app.scene3d.viewpoint import (
+    Viewpoint,
+)
+from symgrasp.meshes import read_mesh
+from symgrasp.poses import quat_wxyz
+from symgrasp.robot.model import RobotModel
+from symgrasp.scene.parts import Obstacle
+from symgrasp.scene.scene import Scene
+
+__all__ = ["add_floor", "add_lights", "add_obstacle"]
+
+OBSTACLES = ((202, 199, 193), (164, 173, 184), (190, 172, 150), (170, 180, 160))
+"""Colours of the obstacles in turn, paler than those of the map."""
+
+FLOOR = ((247, 248, 249), (225, 225, 225), (205, 205, 205))
+DARK_FLOOR = ((38, 40, 44), (52, 55, 60), (70, 74, 80))
+"""Colours of the floor, its lines, and every fifth of them."""
+
+FLOOR_GAP = 0.002
+
+
+def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int) -> None:
+    """Add an obstacle, the index-th of its scene."""
+    scene = client.scene
+    look: dict[str, Any] = {
+        "color": OBSTACLES[index % len(OBSTACLES)],
+        "cast_shadow": False,
+        "receive_shadow": False,
+        "wxyz": quat_wxyz(o.T_world_obstacle),
+        "position": o.T_world_obstacle[:3, 3],
+    }
+    if o.kind == "box":
+        scene.add_box(name, dimensions=np.array(o.size), **look)
+    elif o.kind == "cylinder":
+        scene.add_cylinder(name, radius=o.size[0], height=o.size[1], radial_segments=48, **look)
+    elif o.kind == "sphere":
+        scene.add_icosphere(name, radius=o.size[0], **look)
+    elif o.kind == "mesh":
+        assert o.path is not None
+        mesh = read_mesh(o.path, f"obstacle {o.name}")
+        scene.add_mesh_simple(name, mesh.vertices, mesh.faces, side="double", flat_shading=True, **look)
+    else:
+        assert o.path is not None
+        model = RobotModel(o.path)
+        place(scene.add_frame(name, show_axes=False), o.T_world_obstacle)
+        poses = model.forward(model.default_values())
+        for link, node in add_links(client, name, model).items():
+            place(node, poses[model.link_index(link)])
+
+
+def add_floor(client: viser.ClientHandle, name: str, scene: Scene, *, dark: bool) -> None:
+    """Add a faint grid under everything, or replace it."""
+    plane, cell, section = DARK_FLOOR if dark else FLOOR
+    low = [robot.T_world_base[2, 3] for robot in scene.robots.values()]
+    low += [o.T_world_obstacle[2, 3] - o.size[2] / 2 for o in scene.obstacles if o.kind == "box"]
+    client.scene.add_grid(
+        name,
+        width=4.0,
+        height=4.0,
+        cell_size=0.1,
+        section_size=0.5,
+        cell_color=cell,
+        section_color=section,
+        plane_color=plane,
+        plane_opacity=1.0,
+        shadow_opacity=0.0,
+        position=(0.0, 0.0, min(low) - FLOOR_GAP),
+    )
+
+
+def add_lights(client: viser.ClientHandle, name: str, view: Viewpoint) -> None:
+    """Light the scene evenly, so that colours are those of the legend, with just enough shade for shape."""
+    scene = client.scene
+    scene.configure_default_lights(enabled=False)
+    scene.configure_environment_map(None)
+    scene.add_light_ambient(f"{name}/ambient", intensity=1.5)
+    key = view.direction - 0.7 * view.right + np.array([0.0, 0.0, 1.0])
+    fill = view.direction + 1.5 * view.right + np.array([0.0, 0.0, 0.3])
+    scene.add_light_directional(f"{name}/key", intensity=1.8, position=tuple(key))
+    scene.add_light_directional(f"{name}/fill", intensity=0.5, position=tuple(fill))

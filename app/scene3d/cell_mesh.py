@@ -1,0 +1,102 @@
+"""The map in 3D: one coloured quad for every cell, round the object and laid out flat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.render.palette import to_linear
+from symgrasp.object.manifold import Manifold
+from symgrasp.poses import Array, from_rotation, quat_wxyz
+
+__all__ = ["CellMesh", "around", "flat"]
+
+LIFT = 0.0004
+"""How far (m) the quads float over the object, so that they hide its surface."""
+
+QUAD = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def around(grid: Manifold) -> tuple[Array, Array]:
+    """Return poses (H·A, 4, 4) in the object frame and sizes (H·A, 3) of quads round the object.
+
+    A quad's x runs along the tangent, its y up the surface, its z outwards.
+    """
+    edges = grid.profile.h_min + np.arange(grid.heights + 1) * grid.dh
+    r = grid.profile.radius(np.minimum(edges, grid.profile.h_max))
+    dr, middle = np.diff(r), (r[:-1] + r[1:]) / 2
+    slant = np.hypot(dr, grid.dh)
+    i, j = np.indices((grid.heights, grid.angles)).reshape(2, -1)
+    theta = grid.theta[j]
+    radial = np.stack([np.cos(theta), np.sin(theta), np.zeros_like(theta)], axis=-1)
+    tangent = np.stack([-np.sin(theta), np.cos(theta), np.zeros_like(theta)], axis=-1)
+    up = ((dr / slant)[i, None] * radial) + (grid.dh / slant)[i, None] * np.array([0.0, 0.0, 1.0])
+    outwards = np.cross(tangent, up)
+    centres = middle[i, None] * radial + grid.h[i, None] * np.array([0.0, 0.0, 1.0]) + LIFT * outwards
+    width = 2 * (middle + LIFT) * np.tan(grid.dtheta / 2)
+    sizes = np.stack([width[i], slant[i], np.ones(len(i))], axis=-1)
+    return from_rotation(np.stack([tangent, up, outwards], axis=-1), centres), sizes
+
+
+def flat(grid: Manifold, width: float, height: float) -> tuple[Array, Array]:
+    """Return poses and sizes of quads in the xy plane: θ from -π along x, h along y, centred."""
+    i, j = np.indices((grid.heights, grid.angles)).reshape(2, -1)
+    x = ((j + 0.5) / grid.angles - 0.5) * width
+    y = ((i + 0.5) / grid.heights - 0.5) * height
+    centres = np.stack([x, y, np.zeros(len(i))], axis=-1)
+    size = np.array([width / grid.angles, height / grid.heights, 1.0])
+    return from_rotation(np.eye(3), centres), np.tile(size, (len(i), 1))
+
+
+class CellMesh:
+    """A batch of quads, one for each cell (i, j) of a map, that can be coloured and clicked.
+
+    Args:
+        client: the browser.
+        name: path of the node.
+        poses, sizes: as `around` and `flat` return them.
+        angles: number of columns of the map.
+        on_cell: called with (row, column) when a quad is clicked.
+    """
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        name: str,
+        poses: Array,
+        sizes: Array,
+        angles: int,
+        on_cell: Callable[[int, int], None],
+    ) -> None:
+        self.node = client.scene.add_batched_meshes_simple(
+            name,
+            vertices=QUAD,
+            faces=TRIANGLES,
+            batched_wxyzs=quat_wxyz(poses),
+            batched_positions=poses[:, :3, 3],
+            batched_scales=sizes.astype(np.float32),
+            batched_colors=np.full((len(poses), 3), 200, dtype=np.uint8),
+            lod="off",
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._shown: bytes = b""
+
+        @self.node.on_click
+        def _(event: viser.SceneNodePointerEvent) -> None:
+            if event.instance_index is not None:
+                on_cell(*divmod(event.instance_index, angles))
+
+    def paint(self, colors: np.ndarray) -> None:
+        """Colour the cells: sRGB (H, A, 3)."""
+        linear = to_linear(colors.reshape(-1, 3))
+        if linear.tobytes() != self._shown:
+            self._shown = linear.tobytes()
+            self.node.batched_colors = linear
+
+
+OnCell = Callable[[int, int], None]

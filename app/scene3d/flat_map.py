@@ -1,0 +1,80 @@
+"""The unwrapped map laid out flat in the 3D view, to be clicked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+
+from app.render.cell_colors import cell_colors
+from app.scene3d.cell_mesh import CellMesh, OnCell, flat
+from app.scene3d.nodes import place
+from app.scene3d.viewpoint import Viewpoint, stand_around
+from app.state.state import State
+from symgrasp.poses import Array, from_rotation
+
+__all__ = ["FLAT_SIZE", "FlatMap", "flat_map_position"]
+
+
+FLAT_SIZE = (0.33, 0.22)
+"""Width and height (m) of the map laid out flat."""
+
+
+ASIDE = float(np.cos(np.deg2rad(65)))
+"""Cosine of the angle from which on it is turned to the camera."""
+
+
+class FlatMap:
+    """The unwrapped map as a board in the scene, to be clicked."""
+
+    def __init__(
+        self, client: viser.ClientHandle, root: str, state: State, view: Viewpoint, on_cell: OnCell
+    ) -> None:
+        add, grid = client.scene, state.scene.manifold
+        width, height = FLAT_SIZE
+        self.frame = add.add_frame(root, show_axes=False)
+        self._position = flat_map_position(state, view)
+        self._turn(view)
+        add.add_box(
+            f"{root}/back", dimensions=(width + 0.012, height + 0.012, 0.004), position=(0, 0, -0.004),
+            color=(255, 255, 255), cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        self.title = add.add_label(
+            f"{root}/title", "unrolled map: click a cell", position=(0, height / 2 + 0.02, 0),
+            anchor="bottom-center", font_screen_scale=0.8,
+        )  # fmt: skip
+        self.cells = CellMesh(client, f"{root}/cells", *flat(grid, width, height), grid.angles, on_cell)
+
+    def face(self, camera: Sequence[float]) -> None:
+        """Turn its front to a camera that sees it from behind or far aside."""
+        seen = self._view.seen_from((*camera[:3], *self._position))
+        if seen.direction @ self._view.direction < ASIDE:
+            self._turn(seen)
+
+    def _turn(self, view: Viewpoint) -> None:
+        self._view = view
+        axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
+        place(self.frame, from_rotation(axes, self._position))
+
+    def show(self, state: State) -> None:
+        """Bring it up to the state."""
+        self.frame.visible = state.flat_map
+        if state.map:
+            self.cells.paint(cell_colors(state, state.map))
+            # What a turn leaves over beside whole cells moves the start of the grid.
+            rest = (state.map.manifold.theta_start + np.pi) / (2 * np.pi)
+            self.cells.node.position = (rest * FLAT_SIZE[0], 0.0, 0.0)
+
+
+def flat_map_position(state: State, view: Viewpoint) -> Array:
+    """Return where the flat map is in nobody's way: beyond the object, or over it."""
+    profile, pose = state.scene.profile, state.T_world_object
+    centre = (pose @ [0.0, 0.0, (profile.h_min + profile.h_max) / 2, 1.0])[:3]
+    if stand_around(state.scene, pose):
+        return centre + np.array([0.0, 0.0, 0.55])
+    bases = np.array([robot.T_world_base[:3, 3] for robot in state.scene.robots.values()])
+    away = 1.0 if (centre - bases.mean(axis=0)) @ view.right >= 0 else -1.0
+    position = centre + away * (profile.r_max + 0.07 + FLAT_SIZE[0] / 2) * view.right
+    position[2] = max(position[2], FLAT_SIZE[1] / 2 + 0.06)
+    return position

@@ -1,0 +1,82 @@
+"""The ghost arm in 3D, and in red what it hits."""
+
+from __future__ import annotations
+
+import trimesh
+import viser
+
+from app.render.palette import rgb
+from app.scene3d.ghost import Ghost, body_mesh, ghost, link_mesh
+from app.scene3d.nodes import place
+from app.state.state import State
+from symgrasp.scene.scene import Scene
+from symgrasp.world import Body
+
+__all__ = ["GhostView"]
+
+PALE, HIT = rgb("#7d93ad"), rgb("#e5202b")
+PALE_OPACITY, HIT_OPACITY = 0.35, 0.75
+
+
+class GhostView:
+    """Shows the collision shapes of a robot where it cannot be; made when they are first needed.
+
+    Args:
+        client: the browser.
+        root: name of its node.
+        scene: the scene.
+    """
+
+    def __init__(self, client: viser.ClientHandle, root: str, scene: Scene) -> None:
+        self.client, self.root, self.scene = client, root, scene
+        client.scene.add_frame(root, show_axes=False)
+        self._robots: dict[str, dict[str, tuple[viser.MeshHandle, viser.MeshHandle]]] = {}
+        self._bodies: dict[Body, viser.MeshHandle] = {}
+
+    def show(self, state: State) -> None:
+        """Bring it up to the state."""
+        found = ghost(state)
+        if found:
+            self._make(found, state)
+        for robot, links in self._robots.items():
+            is_shown = found is not None and found.robot == robot
+            hit = found.links() if found and is_shown else frozenset()
+            for link, (pale, red) in links.items():
+                pale.visible, red.visible = is_shown and link not in hit, is_shown and link in hit
+        for body, node in self._bodies.items():
+            node.visible = found is not None and body in found.others()
+            if body.body == self.scene.file.object.name:
+                place(node, state.T_world_object)
+        if found:
+            self._pose(found)
+
+    def _make(self, found: Ghost, state: State) -> None:
+        """Add what was not shown before."""
+        model = self.scene.robots[found.robot].model
+        if found.robot not in self._robots:
+            self._robots[found.robot] = {
+                link: (
+                    self._add(f"{found.robot}/{link}/pale", link_mesh(model, link), PALE, PALE_OPACITY),
+                    self._add(f"{found.robot}/{link}/hit", link_mesh(model, link), HIT, HIT_OPACITY),
+                )
+                for link in model.colliding_links()
+            }
+        for body in found.others() - set(self._bodies):
+            mesh, pose = body_mesh(self.scene, body, state.T_world_object)
+            node = self._bodies[body] = self._add(f"hit{len(self._bodies)}", mesh, HIT, HIT_OPACITY)
+            place(node, pose)
+
+    def _pose(self, found: Ghost) -> None:
+        robot = self.scene.robots[found.robot]
+        poses = robot.T_world_base @ robot.model.forward(found.values)
+        for link, nodes in self._robots[found.robot].items():
+            for node in nodes:
+                place(node, poses[robot.model.link_index(link)])
+
+    def _add(
+        self, name: str, mesh: trimesh.Trimesh, color: tuple[int, int, int], opacity: float
+    ) -> viser.MeshHandle:
+        return self.client.scene.add_mesh_simple(
+            f"{self.root}/{name}", mesh.vertices, mesh.faces, color=color, opacity=opacity,
+            flat_shading=True, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip

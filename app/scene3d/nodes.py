@@ -1,0 +1,26 @@
+"""Nodes of viser's scene tree: their poses, and the links of a robot."""
+
+from __future__ import annotations
+
+import viser
+
+from app.scene3d.visual_meshes import link_visuals
+from symgrasp.poses import Array, quat_wxyz
+from symgrasp.robot.model import RobotModel
+
+__all__ = ["add_links", "place"]
+
+
+def place(node: viser.SceneNodeHandle, pose: Array) -> None:
+    """Put a node at a pose (4, 4) in its parent."""
+    node.wxyz = quat_wxyz(pose)
+    node.position = pose[:3, 3]
+
+
+def add_links(client: viser.ClientHandle, root: str, model: RobotModel) -> dict[str, viser.GlbHandle]:
+    """Add the visible links of a robot under a node; link name → its node."""
+    visuals = link_visuals(model.urdf)
+    return {
+        link: client.scene.add_glb(f"{root}/{k}", glb, cast_shadow=False, receive_shadow=False)
+        for k, (link, glb) in enumerate(visuals.items())
+    }

@@ -1,0 +1,96 @@
+"""The object in the 3D view, with its map on the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.html.profile import deviation_colors
+from app.render.cell_colors import cell_colors
+from app.render.palette import INK, PICK, rgb
+from app.render.prints import on_surface
+from app.scene3d.cell_mesh import CellMesh, OnCell, around
+from app.scene3d.nodes import place
+from app.state.state import State
+from symgrasp.object.profile import Profile
+from symgrasp.poses import Array, from_position_quat, rotation_z
+from symgrasp.scene.scene import Scene
+
+__all__ = ["ObjectView"]
+
+
+OBJECT = (222, 226, 230)
+
+
+SEAM_LIFT = 0.0012
+
+
+class ObjectView:
+    """The object, which turns, under its coloured surface, which does not.
+
+    Turning the object by δ shifts the map by -δ in the object's frame, so in the world the colours
+    stay where they are: m((h, θ), T·Rz(δ)) = m((h, θ + δ), T).
+    """
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        root: str,
+        scene: Scene,
+        on_cell: OnCell,
+        on_drag: Callable[[Array], None],
+    ) -> None:
+        add, self.grid = client.scene, scene.manifold
+        self.body = add.add_frame(f"{root}/object", show_axes=False)
+        mesh = scene.profile.mesh()
+        add.add_mesh_simple(
+            f"{root}/object/body", mesh.vertices, mesh.faces, color=OBJECT, side="double",
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        _add_seam(client, f"{root}/object/seam", scene.profile)
+        self.pick = add.add_icosphere(f"{root}/object/pick", radius=0.007, color=rgb(PICK), visible=False)
+        self.surface = CellMesh(client, f"{root}/surface", *around(self.grid), self.grid.angles, on_cell)
+        self.gizmo = add.add_transform_controls(f"{root}/gizmo", scale=0.16, line_width=3.0, depth_test=False)
+
+        @self.gizmo.on_update
+        def _(event: viser.TransformControlsEvent) -> None:
+            on_drag(from_position_quat(event.target.position, event.target.wxyz))
+
+    def show(self, state: State, *, move_gizmo: bool) -> None:
+        """Bring it up to the state."""
+        place(self.body, state.T_world_seen)
+        place(self.surface.node, state.T_world_seen @ rotation_z(-state.delta))
+        if state.errors and state.object_choice and state.object_choice.measurement:
+            colors = deviation_colors(state.object_choice.measurement, self.grid)
+            self.surface.paint(on_surface(state, colors))
+        elif state.result:
+            self.surface.paint(cell_colors(state, state.result.map))
+        self.pick.visible = state.pick is not None
+        if state.pick:
+            self.pick.position = self.grid.contact(state.pick.h, state.pick.theta)
+        self.gizmo.visible = state.gizmo
+        if move_gizmo:
+            place(self.gizmo, state.T_world_object)
+
+
+def _add_seam(client: viser.ClientHandle, name: str, profile: Profile) -> None:
+    """Draw lines along the object at θ = 0 and every quarter turn, which turn with it."""
+    h, r = profile.points.T
+    r = r + SEAM_LIFT
+    low, high = [0.0, 0.0, h[0] - SEAM_LIFT], [0.0, 0.0, h[-1] + SEAM_LIFT]
+    for quarter in range(4):
+        angle = quarter * np.pi / 2
+        line = np.stack([r * np.cos(angle), r * np.sin(angle), h], axis=-1)
+        line = np.vstack([low, line, high])  # across both ends as well
+        client.scene.add_line_segments(
+            f"{name}{quarter}",
+            np.stack([line[:-1], line[1:]], axis=1),
+            colors=rgb(INK),
+            thickness=0.0025 if quarter == 0 else 0.0006,
+        )
+    client.scene.add_label(
+        f"{name}_label", "θ = 0", position=(float(r[-1]), 0.0, float(h[-1])), anchor="bottom-left",
+        font_screen_scale=0.7,
+    )  # fmt: skip

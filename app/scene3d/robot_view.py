@@ -1,0 +1,32 @@
+"""A robot in the 3D view: its links as meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.scene3d.nodes import add_links, place
+from symgrasp.poses import Array
+from symgrasp.robot.robot import Robot
+
+__all__ = ["RobotView"]
+
+
+class RobotView:
+    """The links of one robot."""
+
+    def __init__(self, client: viser.ClientHandle, root: str, robot: Robot) -> None:
+        self.model = robot.model
+        place(client.scene.add_frame(root, show_axes=False), robot.T_world_base)
+        nodes = add_links(client, root, robot.model)
+        self.nodes = {self.model.link_index(link): node for link, node in nodes.items()}
+        self._shown: Array | None = None
+
+    def show(self, values: Array) -> None:
+        """Take the joint values (n,) of the whole robot."""
+        if self._shown is not None and np.array_equal(values, self._shown):
+            return
+        self._shown = values
+        poses = self.model.forward(values)
+        for index, node in self.nodes.items():
+            place(node, poses[index])

@@ -1,0 +1,123 @@
+"""The 3D view of one browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.html.readout import joint_values
+from app.scene3d.backdrop import add_floor, add_lights, add_obstacle
+from app.scene3d.flat_map import FlatMap
+from app.scene3d.ghost_view import GhostView
+from app.scene3d.object_view import ObjectView
+from app.scene3d.robot_view import RobotView
+from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
+from app.state.page_link import Camera
+from app.state.state import State
+from symgrasp.poses import Array
+from symgrasp.scene.scene import Scene
+
+__all__ = ["SceneView"]
+
+
+class SceneView:
+    """Shows a state in 3D.
+
+    Args:
+        client: the browser.
+        width: width (px) of the view at first: browsers tell it only once its panels are in place.
+        on_surface: called with the cell (row, column) that was clicked on the object.
+        on_board: called with the cell that was clicked on the flat map.
+        on_drag: called with the pose (4, 4) that the gizmo was dragged to.
+    """
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        width: int,
+        on_surface: Callable[[int, int], None],
+        on_flat_map: Callable[[int, int], None],
+        on_drag: Callable[[Array], None],
+    ) -> None:
+        self.client = client
+        self.on_surface, self.on_flat_map, self.on_drag = on_surface, on_flat_map, on_drag
+        self._first_width: int | None = width
+        self._scene: Scene | None = None
+        self._builds = 0
+        self._dark = False
+        self.camera: Camera | None = None  # where the first scene is looked at from, and whereto
+        self._root = self._object_root = ""
+        self.flat_map: FlatMap | None = None
+
+    def show(self, state: State, *, move_gizmo: bool) -> None:
+        """Bring the view up to the state; the gizmo only moves along if nobody is dragging it."""
+        if self._scene is None or state.scene.robots is not self._scene.robots:
+            self._build(state)
+        elif (state.scene.profile, state.scene.settings) != (self._scene.profile, self._scene.settings):
+            self._build_object(state)
+        if state.dark != self._dark:
+            self._dark = state.dark
+            add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.dark)
+        with self.client.atomic():
+            if state.is_current or not state.busy:  # arms wait where they are for a new map
+                for name, values in joint_values(state).items():
+                    self.robots[name].show(values)
+            if state.unmet is None or not state.busy:
+                self.ghost.show(state)
+            self.object.show(state, move_gizmo=move_gizmo)
+            if self.flat_map:
+                self.flat_map.show(state)
+
+    def seen_from(self, camera: Camera) -> None:
+        """Turn the flat map to where it is looked at from, if it can no longer be read from there."""
+        if self.flat_map:
+            self.flat_map.face(camera)
+
+    def _build(self, state: State) -> None:
+        """Replace everything by another scene."""
+        client, scene = self.client, state.scene
+        root = self._root = self._replace(self._root, "/stage")
+        self._object_root = ""
+        given, self.camera = self.camera, None
+        view = viewpoint(scene, state.T_world_object)
+        view = self._viewpoint = view.seen_from(given) if given else view
+        with client.atomic():
+            client.camera.fov = FIELD_OF_VIEW
+            client.camera.up_direction = (0.0, 0.0, 1.0)
+            client.camera.position = np.array(given[:3]) if given else view.camera(self._aspect())
+            client.camera.look_at = np.array(given[3:]) if given else view.look_at
+        client.scene.add_frame(root, show_axes=False)
+        add_lights(client, root, view)
+        self._dark = state.dark
+        add_floor(client, f"{root}/floor", scene, dark=state.dark)
+        for k, obstacle in enumerate(scene.obstacles):
+            add_obstacle(client, f"{root}/obstacle{k}", obstacle, k)
+        self._build_object(state)
+        self.robots = {
+            name: RobotView(client, f"{root}/robot{k}", robot)
+            for k, (name, robot) in enumerate(scene.robots.items())
+        }
+
+    def _build_object(self, state: State) -> None:
+        """Replace the object and its map by another."""
+        root = self._object_root = self._replace(self._object_root, f"{self._root}/thing")
+        self.client.scene.add_frame(root, show_axes=False)
+        self.object = ObjectView(self.client, root, state.scene, self.on_surface, self.on_drag)
+        self.ghost = GhostView(self.client, f"{root}/ghost", state.scene)
+        self.flat_map = FlatMap(self.client, f"{root}/board", state, self._viewpoint, self.on_flat_map)
+        self._scene = state.scene
+
+    def _replace(self, old: str, new: str) -> str:
+        """Remove a node; return the name of a new one, since browsers keep poses under their names."""
+        if old:
+            self.client.scene.remove_by_name(old)
+        self._builds += 1
+        return f"{new}{self._builds}"
+
+    def _aspect(self) -> float:
+        """Return width by height of the 3D view."""
+        camera = self.client.camera
+        width, self._first_width = self._first_width or camera.image_width, None
+        return width / max(camera.image_height, 1)

@@ -1,0 +1,122 @@
+"""What robots look like: the visual shapes of a URDF as one GLB for each link."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+import trimesh
+import yourdfpy
+from trimesh.exchange.gltf import export_glb
+from trimesh.graph import smooth_shade
+from trimesh.visual import ColorVisuals, TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from symgrasp.errors import MeshError
+
+__all__ = ["link_visuals"]
+
+Color = tuple[int, ...]
+
+PLAIN: Color = (200, 202, 206, 255)
+"""Colour of shapes that neither the URDF nor the mesh gives one."""
+
+WHITEST = 235
+"""Brightest channel shown: pure white has no shading left to tell its shape."""
+
+FINEST = 2000
+"""Triangles of a visual; those with more are simplified, so that small machines draw them smoothly, too."""
+
+CARE = 3
+"""Of 0 to 10: lower ones keep closer to the shape but, in metres, may stop early."""
+
+CREASE = np.deg2rad(30)
+"""Edges of simplified meshes that are sharper look sharp."""
+
+
+@lru_cache(maxsize=16)
+def link_visuals(urdf: bytes) -> dict[str, bytes]:
+    """Return link name → GLB in the link frame, of every link that can be seen.
+
+    Args:
+        urdf: the robot with everything that is mounted on it, as `symgrasp.robot.model.RobotModel.urdf`
+            has it.
+
+    Raises:
+        MeshError: a mesh cannot be read.
+    """
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf), build_scene_graph=False, load_meshes=False).robot
+    materials = [*robot.materials, *(v.material for link in robot.links for v in link.visuals)]
+    named = {m.name: m.color.rgba for m in reversed(materials) if m is not None and m.color is not None}
+    glbs = {}
+    for link in robot.links:
+        scene = trimesh.Scene()
+        for visual in link.visuals:
+            _add_visual(scene, visual, link.name, named)
+        if scene.geometry:
+            glbs[link.name] = export_glb(scene, include_normals=True)
+    return glbs
+
+
+def _add_visual(
+    scene: trimesh.Scene, visual: yourdfpy.Visual, link: str, named: Mapping[str | None, np.ndarray]
+) -> None:
+    meshes = _shapes(visual, link)
+    own = [_own_color(mesh) for mesh in meshes]
+    given = named.get(visual.material.name) if visual.material is not None else None
+    # A mesh of several colours knows better than the one colour of the URDF; a mesh of one
+    # colour (often an exporter's grey) does not.
+    painted = len({color for color in own if color}) > 1
+    origin = np.eye(4) if visual.origin is None else visual.origin
+    share = FINEST / sum(len(mesh.faces) for mesh in meshes)
+    for mesh, color in zip(meshes, own, strict=True):
+        mesh = _simplified(mesh, share)
+        if given is not None and not painted:
+            color = tuple(round(255 * c) for c in given)
+        paint = np.minimum(color or PLAIN, [WHITEST, WHITEST, WHITEST, 255]).astype(np.uint8)
+        material = PBRMaterial(baseColorFactor=paint, metallicFactor=0.0, roughnessFactor=0.55)
+        mesh.visual = TextureVisuals(material=material)
+        mesh.merge_vertices(merge_tex=True, merge_norm=False)
+        scene.add_geometry(mesh, transform=origin)
+
+
+def _own_color(mesh: trimesh.Trimesh) -> Color | None:
+    if isinstance(mesh.visual, TextureVisuals):
+        return tuple(int(c) for c in mesh.visual.material.main_color) if mesh.visual.defined else None
+    if isinstance(mesh.visual, ColorVisuals) and mesh.visual.defined:
+        return tuple(int(c) for c in mesh.visual.main_color)
+    return None
+
+
+def _shapes(visual: yourdfpy.Visual, link: str) -> list[trimesh.Trimesh]:
+    geometry = visual.geometry
+    assert geometry is not None  # the parser gives every visual one
+    if geometry.box is not None:
+        return [trimesh.creation.box(extents=geometry.box.size)]
+    if geometry.cylinder is not None:
+        return [trimesh.creation.cylinder(geometry.cylinder.radius, geometry.cylinder.length)]
+    if geometry.sphere is not None:
+        return [trimesh.creation.icosphere(subdivisions=3, radius=geometry.sphere.radius)]
+    assert geometry.mesh is not None
+    path = geometry.mesh.filename
+    try:
+        loaded = trimesh.load_scene(path, process=False)
+        meshes = [m for m in loaded.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
+    except Exception as error:  # trimesh raises whatever its many parsers raise
+        raise MeshError(path, f"link {link}: visual", str(error), "a readable mesh") from error
+    if not meshes:
+        raise MeshError(path, f"link {link}: visual", "no triangles", "a mesh with triangles")
+    for mesh in meshes:
+        mesh.apply_scale(np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3))
+    return meshes
+
+
+def _simplified(mesh: trimesh.Trimesh, share: float) -> trimesh.Trimesh:
+    """Return the shape of a mesh with this share of its triangles, or itself if that is all of them."""
+    if share >= 1.0:
+        return mesh
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)  # where vertices are double, gaps would open
+    simple = mesh.simplify_quadric_decimation(percent=1.0 - share, aggression=CARE)
+    return smooth_shade(simple, angle=CREASE)

@@ -1,0 +1,1 @@
+"""The server: the proxy in front of viser, the lobby, and one session for each browser."""

@@ -1,0 +1,121 @@
+"""Who is here: every browser gets a session of its own once it came in through the front door."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from html import escape
+
+import viser
+
+from app.compute.cache import SharedCache
+from app.compute.process_pool import ProcessPool
+from app.server.proxy import HELLO, Proxy, Visit
+from app.server.session import Session
+from app.server.viser_server import quiet_server
+
+__all__ = ["Lobby", "open_lobby"]
+
+log = logging.getLogger(__name__)
+
+STYLE = "font:13px/1.5 system-ui,sans-serif;margin:12px"
+
+
+@contextmanager
+def open_lobby(store: SharedCache, host: str, port: int) -> Iterator[Lobby]:
+    """Serve the page on a port while the ``with`` block runs.
+
+    Raises:
+        OSError: the port cannot be listened on.
+    """
+    server = quiet_server()
+    reception = Lobby(store, lambda client_id: client_id in server.get_clients())
+    server.on_client_connect(reception.arrived)
+    server.on_client_disconnect(reception.left)
+    try:
+        door = Proxy(host, port, server.get_port(), reception.visited)
+        try:
+            yield reception
+        finally:
+            door.close()
+    finally:
+        reception.close()
+        server.stop()
+
+
+class Lobby:
+    """Opens and closes the sessions of a server; its methods may be called from any thread.
+
+    Args:
+        store: what all sessions share.
+        is_here: whether the browser of that number is still connected.
+    """
+
+    def __init__(self, store: SharedCache, is_here: Callable[[int], bool]) -> None:
+        self._store, self._is_here = store, is_here
+        self._pool = ProcessPool(store.folders)
+        self._lock = threading.Lock()
+        self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
+        self._sessions: dict[int, Session] = {}
+
+    @property
+    def open(self) -> int:
+        """How many sessions there are."""
+        return len(self._sessions)
+
+    def arrived(self, client: viser.ClientHandle) -> None:
+        """A browser connected to viser: ask it to come in through the door, and show something meanwhile."""
+        token = secrets.token_urlsafe(24)
+        client.gui.set_panel_label("symgrasp")
+        client.gui.configure_theme(show_logo=False, show_share_button=False)
+        with self._lock:
+            greeting = client.gui.add_html(
+                f'<div style="{STYLE}">Loading …<img src="{HELLO}{token}" alt="" width="1" height="1"></div>'
+            )
+            self._waiting[token] = client, greeting
+
+    def visited(self, visit: Visit) -> bool:
+        """A browser came in: open its session, unless it is a stranger or was served already."""
+        with self._lock:
+            if (known := self._waiting.pop(visit.token, None)) is None:
+                return False
+        threading.Thread(target=self._open, args=(*known, visit), daemon=True).start()
+        return True
+
+    def left(self, client: viser.ClientHandle) -> None:
+        """A browser disconnected."""
+        with self._lock:
+            session = self._sessions.pop(client.client_id, None)
+            self._waiting = {t: known for t, known in self._waiting.items() if known[0] is not client}
+        if session:
+            session.close()
+
+    def close(self) -> None:
+        """Close all sessions."""
+        with self._lock:
+            sessions, self._sessions = list(self._sessions.values()), {}
+            self._waiting.clear()
+        for session in sessions:
+            session.close()
+        self._pool.close()
+
+    def _open(self, client: viser.ClientHandle, greeting: viser.GuiHtmlHandle, visit: Visit) -> None:
+        try:
+            greeting.remove()
+            self._pool.prepare()
+            session = Session(client, self._store, self._pool, visit)
+        except Exception as error:
+            log.exception("a session could not be opened")
+            client.gui.reset()
+            why = escape(f"{type(error).__name__}: {error}")
+            client.gui.add_html(
+                f'<div style="{STYLE}">This page could not be opened ({why}). Load it again.</div>'
+            )
+            return
+        with self._lock:
+            self._sessions[client.client_id] = session
+        if not self._is_here(client.client_id):  # gone while its session was made
+            self.left(client)

@@ -1,0 +1,52 @@
+"""The 3D view as one HTML file that opens anywhere, without a server or a network."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import viser
+
+from app.scene3d.scene_view import SceneView
+from app.server.viser_server import quiet_server
+from app.state.page_link import Camera
+from app.state.state import State
+
+__all__ = ["snapshot_html"]
+
+
+def snapshot_html(state: State, camera: Camera, fov: float) -> str:
+    """Draw a state once more, for nobody, and write down what was drawn.
+
+    viser writes down what all browsers of a server share, but not what one browser has of its own,
+    so the drawing is done on a server of its own.
+
+    Args:
+        state: what to show.
+        camera: where the camera stands and what it looks at.
+        fov: its vertical field of view (rad).
+    """
+    server = quiet_server()
+    try:
+        # A server has all that the view asks of a browser, except a camera.
+        stage = SimpleNamespace(
+            scene=server.scene,
+            atomic=server.atomic,
+            camera=SimpleNamespace(image_width=1280, image_height=800),
+        )
+        view = SceneView(cast("viser.ClientHandle", stage), 0, _ignore, _ignore, lambda _: None)
+        view.camera = camera
+        view.show(state, move_gizmo=True)
+        assert view.flat_map
+        view.flat_map.title.text = "unrolled map"  # nobody answers clicks
+        start = server.initial_camera
+        start.position, start.look_at, start.fov = np.array(camera[:3]), np.array(camera[3:]), fov
+        start.up = (0.0, 0.0, 1.0)
+        return server.get_scene_serializer().as_html(dark_mode=state.dark)
+    finally:
+        server.stop()
+
+
+def _ignore(row: int, column: int) -> None:
+    """Clicks lead nowhere in a file."""

@@ -1,0 +1,108 @@
+"""Objects that may take the place of a scene's own: those of the library, and uploaded meshes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from symgrasp.errors import InputError, MeshError, one_of
+from symgrasp.object.library import library_objects, load_object
+from symgrasp.object.measure.measurement import Measurement, measure_mesh
+from symgrasp.object.measure.mesh_io import LARGEST, MESH_ENDINGS, SMALLEST
+from symgrasp.object.profile import Profile
+
+__all__ = [
+    "OWN",
+    "UNITS",
+    "UPLOAD_LIMIT",
+    "ObjectChoice",
+    "check_size",
+    "choices",
+    "from_library",
+    "from_mesh",
+]
+
+OWN = "the scene's own"
+"""The choice of the object that the scene came with."""
+
+UPLOAD_LIMIT = 20_000_000
+"""Largest mesh file (bytes) that is looked at."""
+
+UNITS: Mapping[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+"""Units that a mesh may be in → metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectChoice:
+    """An object that is put into a scene.
+
+    Attributes:
+        choice: what the page offers it as.
+        name: what the scene calls it.
+        profile: its r(h).
+        measurement: how the mesh was measured, of an uploaded one.
+    """
+
+    choice: str
+    name: str
+    profile: Profile
+    measurement: Measurement | None = None
+
+
+def choices(uploaded: ObjectChoice | None = None) -> tuple[str, ...]:
+    """Return what there is to choose from."""
+    return (OWN, *library_objects(), *([uploaded.choice] if uploaded else []))
+
+
+def from_library(choice: str) -> ObjectChoice:
+    """Load an object of the library.
+
+    Raises:
+        ProfileError: there is none of that name.
+    """
+    if choice not in library_objects():  # a page can ask for any name, but for no file
+        raise InputError("library", "object", choice, one_of(library_objects(), choice))
+    return ObjectChoice(choice, *load_object(choice))
+
+
+def check_size(name: str, content: bytes) -> None:
+    """Refuse a file that is too large to be looked at.
+
+    Raises:
+        MeshError: it is.
+    """
+    if len(content) > UPLOAD_LIMIT:
+        size, limit = f"{len(content) / 1e6:.1f} MB", f"{UPLOAD_LIMIT / 1e6:g} MB"
+        raise MeshError(name, "size of the file", size, f"a mesh file of at most {limit}")
+
+
+def from_mesh(name: str, content: bytes, scale: float) -> ObjectChoice:
+    """Measure the object of revolution in the content of a mesh file.
+
+    Args:
+        name: of the file; its ending says what it is.
+        content: what it holds.
+        scale: metres in one of its units.
+
+    Raises:
+        MeshError: the file is too large or unusable, or shows no object of revolution.
+    """
+    check_size(name, content)
+    file = Path(Path(name).name)
+    if file.suffix.lower() not in MESH_ENDINGS:
+        raise MeshError(name, "ending", file.suffix, one_of(MESH_ENDINGS, file.suffix.lower()))
+    # A folder of its own: a mesh may refer to files beside it, and there are none.
+    with tempfile.TemporaryDirectory(prefix="symgrasp-") as folder:
+        path = Path(folder, "mesh" + file.suffix.lower())
+        path.write_bytes(content)
+        try:
+            measurement = measure_mesh(path, scale=scale)
+        except MeshError as error:
+            expected = error.expected
+            if error.field == "size":
+                expected = f"{SMALLEST:g} to {LARGEST:g} m; choose the unit of the mesh and upload it again"
+            raise MeshError(name, error.field, error.value, expected) from None
+    measurement = replace(measurement, source=name)
+    return ObjectChoice(f"{file.name} (upload)", file.stem[:100], Profile.measured(measurement), measurement)

@@ -1,0 +1,259 @@
+"""What the planners found, as one browser leafs through it: plans, why there are none, climbs, the play."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from app.state.requests import MapResult
+from symgrasp.plan.plan import Plan
+from symgrasp.planners.bimanual import ClimbStep
+from symgrasp.planners.conflicts import Conflict
+
+__all__ = ["FIRST_SEED", "ClimbReplay", "Kind", "PlanFileReport", "PlanResult", "PlanResults", "Refusal"]
+
+Kind = Literal["sequential", "bimanual", "handover"]
+
+Moving = Literal["", "arms", "climb"]
+"""What is being played."""
+
+FIRST_SEED = 39
+"""Seed of hill climbing at first: one whose hands start on each other where two hold the shipped log.
+
+Most start apart already, and then there is nothing to replay.
+"""
+
+SECONDS_A_TASK = 2.0
+"""How long the arms take from one task to the next when they are played."""
+
+STEPS_A_SECOND = 10.0
+"""How fast a climb is replayed."""
+
+LONGEST_REPLAY = 12.0
+"""How long (s) the replay of a long climb takes: it then skips steps."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why there is no plan.
+
+    Attributes:
+        text: in words.
+        conflict: which tasks exclude each other, where that is the reason.
+    """
+
+    text: str
+    conflict: Conflict | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ClimbReplay:
+    """A hill climbing to replay, and what the complete search finds on the same maps.
+
+    Attributes:
+        task: the task.
+        arms: names of its arms.
+        seed: of the random choices.
+        steps: every position of the hands; at least one.
+        found: the plan it ended in, None where it found none.
+        exact: the best plan, None where there is none.
+    """
+
+    task: str
+    arms: tuple[str, ...]
+    seed: int
+    steps: tuple[ClimbStep, ...]
+    found: PlanResult | None
+    exact: PlanResult | None
+
+    @property
+    def speed(self) -> float:
+        """Steps a second of the replay."""
+        return max(STEPS_A_SECOND, len(self.steps) / LONGEST_REPLAY)
+
+
+@dataclass(frozen=True)
+class PlanFileReport:
+    """What was found out about a plan that came from a file.
+
+    Attributes:
+        name: of the file.
+        checks: how many statements were checked.
+        failures: those that do not hold, in words.
+    """
+
+    name: str
+    checks: int
+    failures: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResults:
+    """Everything about plans that a browser shows; a change returns a new one.
+
+    Attributes:
+        sequence_method, hands_method: the methods chosen.
+        seed: of hill climbing.
+        plans: the plans listed so far, best first.
+        page: which of them is shown.
+        more: whether the list may go on.
+        kind: which planner was run last.
+        maps: (task, arm) → the maps it used, also where it found nothing.
+        refusal: why it found nothing.
+        climb: the climbing, if the plan came from it.
+        frame: which of its steps is shown.
+        slide: how far the maps are slid over each other: 0 as computed, 1 by each task's δ.
+        position: where the play is: k at task k, and between.
+        moving: what is being played.
+        opened: what is known about the file that was opened last.
+    """
+
+    sequence_method: str = "best"
+    hands_method: str = "exact"
+    seed: int = FIRST_SEED
+    plans: tuple[PlanResult, ...] = ()
+    page: int = 0
+    more: bool = False
+    kind: Kind | None = None
+    maps: Mapping[tuple[str, str], MapResult] = field(default_factory=dict)
+    refusal: Refusal | None = None
+    climb: ClimbReplay | None = None
+    frame: int | None = None
+    slide: float = 1.0
+    position: float = 0.0
+    moving: Moving = ""
+    opened: PlanFileReport | None = None
+
+    # -- what follows from it ---------------------------------------------------------------
+
+    @property
+    def plan(self) -> PlanResult | None:
+        """The plan that is shown."""
+        return self.plans[self.page] if self.plans else None
+
+    @property
+    def last(self) -> int:
+        """Index of the plan's last task."""
+        return len(self.plan.plan.tasks) - 1 if self.plan else 0
+
+    @property
+    def nearest(self) -> int:
+        """The task that the play is nearest to."""
+        return int(np.clip(np.floor(self.position + 0.5), 0, self.last))
+
+    @property
+    def leg(self) -> tuple[int, float]:
+        """The task that the play comes from, and the share of the way to the next one, eased at both ends."""
+        start = min(int(self.position), max(self.last - 1, 0))
+        share = self.position - start
+        return start, share * share * (3 - 2 * share)
+
+    @property
+    def is_between(self) -> bool:
+        """Whether the play is between two tasks."""
+        return self.position != self.nearest
+
+    @property
+    def inputs(self) -> tuple[object, ...]:
+        """What widgets show and can change."""
+        return (
+            self.sequence_method, self.hands_method, self.seed, self.page, self.plans, self.frame, self.slide,
+            self.position, self.climb,
+        )  # fmt: skip
+
+    # -- changes ----------------------------------------------------------------------------
+
+    def cleared(self) -> PlanResults:
+        """Drop what was found; what was chosen stays."""
+        return PlanResults(self.sequence_method, self.hands_method, self.seed, slide=self.slide)
+
+    def found(
+        self, kind: Kind, plans: tuple[PlanResult, ...], *, more: bool, climb: ClimbReplay | None = None
+    ) -> PlanResults:
+        """Take the first plans of a list, one at least."""
+        return replace(
+            self.cleared(), kind=kind, plans=plans, more=more, climb=climb, maps=plans[0].maps, slide=1.0
+        )
+
+    def refused(
+        self,
+        kind: Kind,
+        refusal: Refusal,
+        maps: Mapping[tuple[str, str], MapResult],
+        climb: ClimbReplay | None = None,
+    ) -> PlanResults:
+        """Take that there is no plan."""
+        plan_results = replace(self.cleared(), kind=kind, refusal=refusal, maps=maps, climb=climb)
+        return replace(plan_results, frame=len(climb.steps) - 1) if climb else plan_results
+
+    def extended(self, plans: tuple[PlanResult, ...], *, more: bool) -> PlanResults:
+        """Take further plans of the list."""
+        return replace(self, plans=(*self.plans, *plans), more=more)
+
+    def turned_to(self, page: int) -> PlanResults:
+        """Show another plan of the list."""
+        if not self.plans:
+            return self
+        page = int(np.clip(page, 0, len(self.plans) - 1))
+        return replace(self, page=page, maps=self.plans[page].maps)
+
+    def at(self, position: float) -> PlanResults:
+        """Move the play to a position."""
+        position = float(np.clip(position, 0.0, self.last)) if np.isfinite(position) else self.position
+        return replace(self, position=position, frame=None)
+
+    def at_frame(self, frame: int) -> PlanResults:
+        """Show a step of the climb."""
+        if self.climb is None:
+            return self
+        return replace(self, frame=int(np.clip(frame, 0, len(self.climb.steps) - 1)))
+
+    def play_arms(self) -> PlanResults:
+        """Start or stop the play; from the end it starts anew."""
+        if self.moving == "arms" or not self.last:
+            return self.still()
+        position = 0.0 if self.position >= self.last else self.position
+        return replace(self, moving="arms", position=position, frame=None)
+
+    def play_climb(self) -> PlanResults:
+        """Start or stop the replay of the climb; from the end it starts anew."""
+        if self.moving == "climb" or self.climb is None:
+            return self.still()
+        over = self.frame is None or self.frame >= len(self.climb.steps) - 1
+        return replace(self, moving="climb", frame=0 if over else self.frame)
+
+    def still(self) -> PlanResults:
+        """Play nothing."""
+        return replace(self, moving="") if self.moving else self
+
+    def advanced(self, seconds: float) -> PlanResults:
+        """Let the play go on; at the end it stops."""
+        if self.moving == "arms":
+            plan_results = self.at(self.position + seconds / SECONDS_A_TASK)
+            return plan_results if plan_results.position < plan_results.last else plan_results.still()
+        if self.moving == "climb" and self.climb is not None:
+            steps = max(1, round(seconds * self.climb.speed))
+            plan_results = self.at_frame((self.frame or 0) + steps)
+            return plan_results if plan_results.frame != len(self.climb.steps) - 1 else plan_results.still()
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """A plan and what is needed to show it.
+
+    Attributes:
+        plan: the plan.
+        maps: for every (task, arm) the map it was made from, at δ = 0.
+        prints: for every task of the plan, in order, arm → the cells (H, A) under its hand.
+        gaps: for every task of the plan the smallest gap (m) between two prints, negative where they
+            overlap, None where one hand holds alone.
+    """
+
+    plan: Plan
+    maps: Mapping[tuple[str, str], MapResult]
+    prints: tuple[Mapping[str, np.ndarray], ...]
+    gaps: tuple[float | None, ...]

@@ -1,0 +1,95 @@
+"""Changes to the list of a scene's tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from app.state.object_pose import ObjectPose
+from symgrasp.errors import InputError, SceneError
+from symgrasp.poses import Array
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+
+__all__ = ["TaskList"]
+
+
+class TaskList(NamedTuple):
+    """The tasks of a scene and where their object was moved to; a change returns a new one.
+
+    Attributes:
+        scene: the scene.
+        poses: task → base pose, of the tasks that were moved.
+        task: the chosen task.
+    """
+
+    scene: Scene
+    poses: Mapping[str, ObjectPose]
+    task: str
+
+    @property
+    def T_world_object(self) -> Array:
+        """Base pose (4, 4) of the object in the chosen task."""
+        pose = self.poses.get(self.task)
+        return pose.matrix() if pose else self.scene.task(self.task).T_world_object
+
+    def added(self, pose: Array, back: ObjectPose | None) -> TaskList:
+        """Add a task at an object pose (4, 4), after the chosen one and with its arms.
+
+        Args:
+            pose: that of the new task.
+            back: where the object of the chosen task was moved to before it was moved to the new pose;
+                None for where the scene has it.
+        """
+        names = list(self.scene.tasks)
+        number = next(n for n in range(len(names) + 1, 10**9) if f"task {n}" not in names)
+        task = Task(f"task {number}", self.scene.task(self.task).arms, pose)
+        tasks = list(self.scene.tasks.values())
+        tasks.insert(names.index(self.task) + 1, task)
+        poses = {name: known for name, known in self.poses.items() if name != self.task}
+        if back:
+            poses[self.task] = back
+        return TaskList(self.scene.with_tasks(tasks), poses, task.name)
+
+    def removed(self) -> TaskList:
+        """Remove the chosen task and choose its neighbour.
+
+        Raises:
+            InputError: it is the only one.
+        """
+        names = list(self.scene.tasks)
+        if len(names) == 1:
+            raise InputError("tasks", "remove", self.task, "another task that stays")
+        at = names.index(self.task)
+        scene = self.scene.with_tasks(task for task in self.scene.tasks.values() if task.name != self.task)
+        poses = {name: pose for name, pose in self.poses.items() if name != self.task}
+        return TaskList(scene, poses, (names[:at] + names[at + 1 :])[max(at - 1, 0)])
+
+    def shifted(self, by: int) -> TaskList:
+        """Move the chosen task by so many places; the ends stop it."""
+        tasks = list(self.scene.tasks.values())
+        at = next(k for k, task in enumerate(tasks) if task.name == self.task)
+        to = min(max(at + by, 0), len(tasks) - 1)
+        if to == at:
+            return self
+        tasks.insert(to, tasks.pop(at))
+        return self._replace(scene=self.scene.with_tasks(tasks))
+
+    def renamed(self, name: str) -> TaskList:
+        """Call the chosen task something else.
+
+        Raises:
+            InputError: the name is taken or no name.
+        """
+        name = name.strip()
+        if name == self.task:
+            return self
+        tasks = [
+            Task(name, task.arms, task.T_world_object) if task.name == self.task else task
+            for task in self.scene.tasks.values()
+        ]
+        poses = {name if known == self.task else known: pose for known, pose in self.poses.items()}
+        try:
+            return TaskList(self.scene.with_tasks(tasks), poses, name)
+        except SceneError as error:  # which file the tasks came from does not matter here
+            raise InputError("tasks", error.field, name, error.expected) from None

@@ -1,0 +1,1 @@
+"""Feasibility maps: computing, explaining and drawing them."""

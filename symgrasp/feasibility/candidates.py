@@ -1,0 +1,129 @@
+"""The candidate configurations of one tool pose, and the fate of each in PyBullet.
+
+Lines 5 to 9 of Algorithm 1: every redundancy sample, every branch of the closed form, inside the
+limits, free of collision, and free along the straight retreat where the scene asks for one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.ik import ClosedFormIK
+from symgrasp.ik.retreat import RETREAT_TURN, retreat_distances, retreated
+from symgrasp.poses import Array
+from symgrasp.reason import Reason
+from symgrasp.robot.robot import Arm
+from symgrasp.world import BulletWorld, Collision, NearBodies
+
+__all__ = ["Candidate", "CandidateChecker", "CheckResult"]
+
+
+class Candidate(NamedTuple):
+    """A configuration that reaches the tool pose.
+
+    Attributes:
+        q: (n,) joint values.
+        phi: redundancy value (rad).
+        sample: its index.
+        branch: branch of the closed form.
+        fate: the stage at which it failed, or FEASIBLE.
+        collision: the deepest collision of that stage, None where it is not a collision.
+    """
+
+    q: Array
+    phi: float
+    sample: int
+    branch: int
+    fate: Reason
+    collision: Collision | None
+
+
+class CheckResult(NamedTuple):
+    """What became of a candidate inside the limits.
+
+    Attributes:
+        reason: the stage at which it failed, or FEASIBLE.
+        collision: the deepest collision of that stage, None where it is not a collision.
+        retreat: how far (m) from the grasp that was, along the retreat; the whole length if FEASIBLE.
+        q: (n,) joint values there, or the last ones before the arm could not follow.
+    """
+
+    reason: Reason
+    collision: Collision | None
+    retreat: float
+    q: Array
+
+
+class CandidateChecker:
+    """Decides the candidates of an arm in a world, whose object must be in place.
+
+    Args:
+        world: where collisions are asked.
+        arm: the arm.
+        ik: its inverse kinematics.
+        approach: length (m) of the straight retreat against the approach that must be free too.
+        near: says what could be in the way at joint values (n,) that reach a tool pose (4, 4) in the
+            frame of the robot's base, for those who know; all is asked about if None.
+    """
+
+    def __init__(
+        self,
+        world: BulletWorld,
+        arm: Arm,
+        ik: ClosedFormIK,
+        approach: float,
+        near: Callable[[Array, Array], NearBodies] | None = None,
+    ) -> None:
+        self.world, self.arm, self.ik, self._near = world, arm, ik, near
+        self._retreat = retreat_distances(approach).tolist()
+
+    def candidates(self, T_base_tool: Array, opening: float) -> Iterator[Candidate]:
+        """Yield the candidates of a tool pose (4, 4), by φ, then by branch, each decided as it is asked for.
+
+        Args:
+            T_base_tool: tool pose in the frame of the robot's base.
+            opening: opening (m) of the hand.
+        """
+        solutions = self.ik.solve(T_base_tool)
+        for k, q in enumerate(solutions.q):
+            sample, branch = int(solutions.sample[k]), int(solutions.branch[k])
+            fate, collision = Reason.JOINT_LIMITS, None
+            if solutions.inside[k]:
+                fate, collision, *_ = self.fate(T_base_tool, q, sample, opening)
+            yield Candidate(q, float(self.ik.phi[sample]), sample, branch, fate, collision)
+
+    def fate(self, T_base_tool: Array, q: Array, sample: int, opening: float) -> CheckResult:
+        """Return at which stage a candidate inside the limits fails, or FEASIBLE."""
+        collision = self._collision(T_base_tool, q, opening)
+        if collision:
+            return CheckResult(collision.reason, collision, 0.0, q)
+        for distance in self._retreat:
+            T = retreated(T_base_tool, distance)
+            follow = self._follow(T, q, sample)
+            if follow is None:
+                return CheckResult(Reason.APPROACH_BLOCKED, None, distance, q)
+            q = follow
+            collision = self._collision(T, q, opening)
+            if collision:
+                return CheckResult(Reason.APPROACH_BLOCKED, collision, distance, q)
+        return CheckResult(Reason.FEASIBLE, None, self._retreat[-1] if self._retreat else 0.0, q)
+
+    def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
+        self.world.set_arm(self.arm, q, opening)
+        return self.world.first_collision(self.arm, self._near(q, T_base_tool) if self._near else None)
+
+    def _follow(self, T_base_tool: Array, q: Array, sample: int) -> Array | None:
+        """Return the configuration at the same φ that continues q to the next pose, if any does."""
+        solutions = self.ik.solve_sample(T_base_tool, sample)
+        choices = solutions.q[solutions.inside]
+        if not len(choices):
+            return None
+        # A joint that turns further than once around goes on from where it is, where its limits allow.
+        near = choices + 2 * np.pi * np.round((q - choices) / (2 * np.pi))
+        choices = np.where((near >= self.arm.lower) & (near <= self.arm.upper), near, choices)
+        turn = np.abs(choices - q).max(axis=1)
+        nearest = int(turn.argmin())
+        return choices[nearest] if turn[nearest] <= RETREAT_TURN else None

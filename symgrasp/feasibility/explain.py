@@ -1,0 +1,246 @@
+"""Every candidate of one cell, and what becomes of each in PyBullet: a map's verdict, taken apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.feasibility.candidates import CandidateChecker, CheckResult
+from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
+from symgrasp.feasibility.fit import fit
+from symgrasp.ik import ClosedFormIK
+from symgrasp.ik.retreat import retreated
+from symgrasp.object.manifold import Manifold
+from symgrasp.poses import Array, inverse
+from symgrasp.progress import Progress
+from symgrasp.reason import Reason
+from symgrasp.robot.robot import Arm
+from symgrasp.scene.parts import Task
+from symgrasp.world import BulletWorld, Collision
+
+__all__ = ["CandidateResult", "Explanation", "LimitViolation", "RetreatFailure", "explain"]
+
+
+class RetreatFailure(StrEnum):
+    """Why an arm cannot follow the retreat any further at the same φ."""
+
+    REACH = "out of reach"
+    LIMITS = "joint limits"
+    BRANCH = "only by changing branch"
+
+
+class LimitViolation(NamedTuple):
+    """A joint outside its limits.
+
+    Attributes:
+        joint: its name.
+        value: its value (rad), with the full turns that bring it nearest to its range.
+        limit: the limit (rad) that it breaks.
+    """
+
+    joint: str
+    value: float
+    limit: float
+
+    @property
+    def excess(self) -> float:
+        """By how much (rad)."""
+        return abs(self.value - self.limit)
+
+    def __str__(self) -> str:
+        side = "above" if self.value > self.limit else "below"
+        excess, limit = math.degrees(self.excess), math.degrees(self.limit)
+        return f"{self.joint} {excess:.1f}° {side} {limit:.1f}°"
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateResult:
+    """A candidate configuration of a cell and its fate.
+
+    Attributes:
+        reason: the stage at which it failed, or FEASIBLE.
+        q: (n,) joint values at the grasp.
+        phi: redundancy value (rad).
+        sample: its index.
+        branch: branch of the closed form.
+        beyond: the joints outside their limits, furthest first; for JOINT_LIMITS.
+        collisions: all pairs that are closer than they may be, those of the stage first, deepest
+            first; for a collision, and for one on the retreat.
+        retreat: how far (m) from the grasp the retreat ended, the whole length if FEASIBLE.
+        lost: why the arm could not follow the retreat, None where it could.
+        ended: (n,) joint values where it ended: those of the collisions.
+        clearance: distance (m) at the grasp of all pairs that are checked at least, at most
+            `CLEARANCE_LIMIT`; for FEASIBLE, else None.
+    """
+
+    reason: Reason
+    q: Array
+    phi: float
+    sample: int
+    branch: int
+    violations: tuple[LimitViolation, ...]
+    collisions: tuple[Collision, ...]
+    retreat: float
+    failure: RetreatFailure | None
+    ended: Array
+    clearance: float | None
+
+    @property
+    def why(self) -> str:
+        """Say in one line what decided it."""
+        if self.clearance is not None:
+            most = " or more" if self.clearance >= CLEARANCE_LIMIT else ""
+            return f"{1e3 * self.clearance:.1f} mm clear{most}"
+        parts = [str(joint) for joint in self.violations]
+        parts += [f"{c.a} and {c.b} {1e3 * c.depth:.1f} mm too close" for c in self.collisions]
+        parts += [str(self.failure)] if self.failure else []
+        text = ", ".join(parts)
+        return (
+            f"after {1e3 * self.retreat:.0f} mm: {text}" if self.reason == Reason.APPROACH_BLOCKED else text
+        )
+
+    def _rank(self) -> tuple[float, ...]:
+        """Sort key: the furthest stage first, then the one that came closest to being free."""
+        deepest = max(
+            (c.depth for c in self.collisions if c.reason == self.collisions[0].reason), default=0.0
+        )
+        excess = max((joint.excess for joint in self.violations), default=0.0)
+        return (-self.reason, -self.retreat, deepest, excess, -(self.clearance or 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What becomes of all candidates of a cell.
+
+    Attributes:
+        cell: the cell.
+        reason: what Algorithm 1 says of it.
+        verdicts: its candidates, best first: the furthest stage, then the closest to being free.
+            Empty where the hand rules the cell out, and out of reach.
+        phi: (K,) redundancy samples (rad), with candidates or without.
+        opening: opening of the hand (m).
+        T_world_tool: tool pose (4, 4).
+    """
+
+    cell: Cell
+    reason: Reason
+    candidates: tuple[CandidateResult, ...]
+    phi: Array
+    opening: float
+    T_world_tool: Array
+
+    @property
+    def best(self) -> CandidateResult | None:
+        """The candidate that came furthest."""
+        return self.candidates[0] if self.candidates else None
+
+    @property
+    def unreachable(self) -> int:
+        """Number of redundancy samples at which no configuration reaches the tool pose."""
+        if self.reason < Reason.UNREACHABLE:
+            return 0
+        return len(self.phi) - len({furthest.sample for furthest in self.candidates})
+
+    def counts(self) -> dict[Reason, int]:
+        """Return how many candidates each reason has, the furthest first."""
+        reasons = [furthest.reason for furthest in self.candidates]  # already in that order
+        return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
+
+
+def explain(
+    world: BulletWorld,
+    arm: Arm,
+    ik: ClosedFormIK,
+    task: Task,
+    manifold: Manifold,
+    cell: Cell,
+    progress: Progress | None = None,
+) -> Explanation:
+    """Judge every candidate of one cell, past the first that is feasible.
+
+    Args:
+        world: a world of the scene's robots, obstacles and object; it stays as it is.
+        arm: the arm.
+        ik: its inverse kinematics.
+        task: the task.
+        manifold: the grid.
+        cell: the cell.
+        progress: told the finished share; may raise `Cancelled`.
+    """
+    settings = world.scene.settings
+    tools = manifold.tool_poses(task.T_world_object, arm.hand.finger_depth)
+    h = manifold.h[cell.row]
+    opening = arm.hand.opening(float(manifold.profile.radius(h)))
+    stage, candidates = fit(arm.hand, manifold.profile, h), []
+    if stage is None:
+        with world.kept():
+            world.margin = settings.margin
+            world.set_arms(())
+            world.set_object(task.T_world_object)
+            checker = CandidateChecker(world, arm, ik, settings.approach)
+            T_base_tool = inverse(arm.robot.T_world_base) @ tools
+            candidates = list(_verdicts(checker, T_base_tool[cell], opening, progress))
+        candidates.sort(key=CandidateResult._rank)
+        stage = candidates[0].reason if candidates else Reason.UNREACHABLE
+    if progress and not candidates:
+        progress(1.0)
+    return Explanation(cell, stage, tuple(candidates), ik.phi, opening, tools[cell])
+
+
+def _verdicts(
+    checker: CandidateChecker, T_base_tool: Array, opening: float, progress: Progress | None
+) -> Iterator[CandidateResult]:
+    solutions = checker.ik.solve(T_base_tool)
+    for k, q in enumerate(solutions.q):
+        sample, branch = int(solutions.sample[k]), int(solutions.branch[k])
+        phi = float(checker.ik.phi[sample])
+        violations, collisions, failure, clearance = (), (), None, None
+        fate = CheckResult(Reason.JOINT_LIMITS, None, 0.0, q)
+        if not solutions.inside[k]:
+            violations = _violations(checker.arm, q)
+        else:
+            fate = checker.fate(T_base_tool, q, sample, opening)
+            if fate.collision:
+                checker.world.set_arm(checker.arm, fate.q, opening)
+                collisions = tuple(checker.world.arm_collisions(checker.arm))
+            elif fate.reason == Reason.APPROACH_BLOCKED:
+                failure = _failure(checker.ik, retreated(T_base_tool, fate.retreat), sample)
+            else:
+                checker.world.set_arm(checker.arm, q, opening)
+                clearance = checker.world.clearance(checker.arm, CLEARANCE_LIMIT)
+        yield CandidateResult(
+            fate.reason,
+            q,
+            phi,
+            sample,
+            branch,
+            violations,
+            collisions,
+            fate.retreat,
+            failure,
+            fate.q,
+            clearance,
+        )
+        if progress:
+            progress((k + 1) / len(solutions.q))
+
+
+def _violations(arm: Arm, q: Array) -> tuple[LimitViolation, ...]:
+    """Return the joints of a configuration (n,) that are outside their limits, furthest first."""
+    limits = np.where(q < arm.lower, arm.lower, arm.upper)
+    outside = np.flatnonzero((q < arm.lower) | (q > arm.upper))
+    found = [LimitViolation(arm.joint_names[j], float(q[j]), float(limits[j])) for j in outside]
+    return tuple(sorted(found, key=lambda joint: -joint.excess))
+
+
+def _failure(ik: ClosedFormIK, T_base_tool: Array, sample: int) -> RetreatFailure:
+    """Return why no configuration at a tool pose (4, 4) continues the one before."""
+    solutions = ik.solve_sample(T_base_tool, sample)
+    if not len(solutions.q):
+        return RetreatFailure.REACH
+    return RetreatFailure.BRANCH if solutions.inside.any() else RetreatFailure.LIMITS

@@ -1,0 +1,275 @@
+"""Feasibility maps: where on an object an arm can hold it for a task, and why not elsewhere."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symgrasp.errors import MapError, ProfileError
+from symgrasp.feasibility import pictures
+from symgrasp.feasibility.cell import Cell, Margin, Witness
+from symgrasp.feasibility.color_by import ColorBy, color_map
+from symgrasp.feasibility.margins import cells_to_infeasible
+from symgrasp.files import write_atomically
+from symgrasp.object.manifold import ROLLS, Manifold
+from symgrasp.object.profile import Profile
+from symgrasp.poses import Array, rotation_z
+from symgrasp.reason import Reason
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["FeasibilityMap"]
+
+FORMAT_VERSION = 2
+
+
+@dataclass(frozen=True, eq=False)
+class FeasibilityMap:
+    """The map m(x, T) of one arm and one task, by roll, height and angle.
+
+    All arrays are read-only. R = 2 rolls, H heights, A angles, n joints.
+
+    Attributes:
+        scene: name of the scene.
+        arm: name of the arm.
+        task: name of the task.
+        T_world_object: object pose (4, 4).
+        manifold: the grid.
+        reason: (R, H, A) uint8 of `Reason`.
+        q: (R, H, A, n) joint values of the witnesses, NaN where infeasible.
+        sample: (R, H, A) int16 redundancy sample of the witness, -1 where infeasible.
+        branch: (R, H, A) int16 branch of the witness, -1 where infeasible.
+        clearance: (R, H, A) distance (m) that all bodies which must not touch have at the witness at
+            least, at most `CLEARANCE_LIMIT`; NaN where infeasible. The reference, which only asks
+            whether bodies touch, has 0.
+        phi: (K,) redundancy samples (rad).
+        opening: (H,) opening of the hand (m).
+        bodies: names of bodies.
+        pair: (R, H, A, 2) int16 into ``bodies``: what hits what, for a cell whose reason is a
+            collision, of the candidate that came closest to being free; -1 elsewhere.
+        depth: (R, H, A) how much closer (m) than allowed that pair is, NaN elsewhere.
+    """
+
+    scene: str
+    arm: str
+    task: str
+    T_world_object: Array
+    manifold: Manifold
+    reason: np.ndarray
+    q: Array
+    sample: np.ndarray
+    branch: np.ndarray
+    clearance: Array
+    phi: Array
+    opening: Array
+    bodies: tuple[str, ...]
+    pair: np.ndarray
+    depth: Array
+
+    def __post_init__(self) -> None:
+        for name in _ARRAYS:
+            array = np.array(getattr(self, name))
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @cached_property
+    def feasible(self) -> np.ndarray:
+        """(R, H, A) bool."""
+        return self.reason == Reason.FEASIBLE
+
+    def witness(self, cell: Cell | tuple[int, int, int]) -> Witness | None:
+        """Return the configuration that proves a cell feasible, or None where it is not."""
+        cell = Cell(*cell)
+        if not self.feasible[cell]:
+            return None
+        sample = int(self.sample[cell])
+        return Witness(
+            self.q[cell],
+            float(self.phi[sample]),
+            sample,
+            int(self.branch[cell]),
+            float(self.opening[cell.row]),
+            float(self.clearance[cell]),
+        )
+
+    def why(self, cell: Cell | tuple[int, int, int]) -> str:
+        """Say in one line whether a cell is feasible, and if not, why."""
+        cell = Cell(*cell)
+        text = Reason(int(self.reason[cell])).label
+        first, second = self.pair[cell]
+        if first < 0:
+            return text
+        depth = 1e3 * self.depth[cell]
+        return f"{text}: {self.bodies[first]} and {self.bodies[second]}, {depth:.1f} mm too close"
+
+    def counts(self) -> dict[Reason, int]:
+        """Return how many cells each reason has, most frequent first."""
+        values, counts = np.unique(self.reason, return_counts=True)
+        order = np.argsort(-counts, kind="stable")
+        return {Reason(int(values[k])): int(counts[k]) for k in order}
+
+    @cached_property
+    def margins(self) -> Array:
+        """(R, H, A, 2) distance along the axis (m) and angle around it (rad) to the nearest infeasible cell.
+
+        Zero where infeasible. Both ends of the object count as infeasible; around the object
+        half a turn is the most there is.
+        """
+        along, around = cells_to_infeasible(self.feasible)
+        margins = np.empty((*self.feasible.shape, 2))
+        margins[..., 0], margins[..., 1] = along * self.manifold.dh, around * self.manifold.dtheta
+        margins.setflags(write=False)
+        return margins
+
+    def margin(self, cell: Cell | tuple[int, int, int]) -> Margin:
+        """Return how far a cell may be off along and around the object and still be feasible."""
+        return Margin(*self.margins[Cell(*cell)].tolist())
+
+    def shift(self, delta: float) -> FeasibilityMap:
+        """Return the map for the object turned by ``delta`` (rad) about its axis, without recomputing it.
+
+        Equation 3: ``m((h, θ), T·Rz(δ)) = m((h, θ + δ), T)``. Exact for every angle: whole cells
+        roll the map, the rest moves the start of the grid.
+        """
+        manifold, k = self.manifold.shift(delta)
+        rolled = {
+            name: np.roll(getattr(self, name), -k, axis=2)
+            for name in ("reason", "q", "sample", "branch", "clearance", "pair", "depth")
+        }
+        turned = self.T_world_object @ rotation_z(delta)
+        return replace(self, T_world_object=turned, manifold=manifold, **rolled)
+
+    def masked(self, keep: np.ndarray) -> FeasibilityMap:
+        """Return the map with every feasible cell outside ``keep`` (R, H, A) taken for out of reach."""
+        drop = self.feasible & ~keep
+        return replace(
+            self,
+            reason=np.where(drop, Reason.UNREACHABLE, self.reason).astype(np.uint8),
+            q=np.where(drop[..., None], np.nan, self.q),
+            sample=np.where(drop, -1, self.sample),
+            branch=np.where(drop, -1, self.branch),
+            clearance=np.where(drop, np.nan, self.clearance),
+        )
+
+    def values(self, view: ColorBy) -> Array:
+        """(R, H, A) what a view shows, in its unit; NaN where infeasible, and where it has no unit."""
+        if view is ColorBy.CLEARANCE:
+            return 1e3 * self.clearance
+        if view is ColorBy.ALONG:
+            found = 1e3 * self.margins[..., 0]
+        elif view is ColorBy.AROUND:
+            found = np.rad2deg(self.margins[..., 1])
+        elif view is ColorBy.OPENING:
+            found = 1e3 * self.opening[:, None]
+        else:
+            found = np.nan
+        return np.where(self.feasible, found, np.nan)
+
+    def plot(self, view: ColorBy = ColorBy.REASON) -> Figure:
+        """Draw both rolls of the map with axes, a legend and counts, or the scale of the values."""
+        m = self.manifold
+        title = f"{self.scene} · {self.task} · {self.arm}"
+        coloured = color_map(view, self.reason, self.values(view))
+        heights = (m.profile.h_min, m.profile.h_max)
+        return pictures.draw_map(coloured, heights, m.theta_start, title, ("roll 0°", "roll 180°"))
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows."""
+        return pictures.to_png(self.plot())
+
+    def _meta(self) -> dict[str, Any]:
+        return {
+            "format": "symgrasp feasibility map",
+            "version": FORMAT_VERSION,
+            "units": "m, rad",
+            "scene": self.scene,
+            "arm": self.arm,
+            "task": self.task,
+            "heights": self.manifold.heights,
+            "angles": self.manifold.angles,
+            "theta_start": self.manifold.theta_start,
+            "bodies": list(self.bodies),
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the map as plain data for JSON.
+
+        The grid, and by roll, height and angle: the reason, and in m and rad the clearance (null where
+        infeasible) and the margins.
+        """
+        return {
+            **self._meta(),
+            "T_world_object": self.T_world_object.tolist(),
+            "profile": self.manifold.profile.points.tolist(),
+            "rolls": list(ROLLS),
+            "h": self.manifold.h.tolist(),
+            "theta": self.manifold.theta.tolist(),
+            "opening": self.opening.tolist(),
+            "reasons": [r.name for r in Reason],
+            "reason": self.reason.tolist(),
+            "clearance": _listed(self.clearance),
+            "margin_along": self.margins[..., 0].tolist(),
+            "margin_around": self.margins[..., 1].tolist(),
+        }
+
+    def to_npz(self) -> bytes:
+        """Return the map as the content of an npz file."""
+        buffer = io.BytesIO()
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        meta = np.array(json.dumps(self._meta()))
+        np.savez_compressed(buffer, meta=meta, profile=self.manifold.profile.points, **arrays)
+        return buffer.getvalue()
+
+    def save(self, path: str | Path) -> None:
+        """Write the map as npz, in one piece."""
+        with write_atomically(Path(path)) as file:
+            file.write(self.to_npz())
+
+    @staticmethod
+    def load(path: str | Path) -> FeasibilityMap:
+        """Read a map written by `save`.
+
+        Raises:
+            MapError: the file is missing or is not such a map.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                data = {name: file[name] for name in (*_ARRAYS, "profile", "meta")}
+            meta = json.loads(str(data.pop("meta")))
+        except FileNotFoundError:
+            raise MapError(path, "file", str(path), "an existing map file") from None
+        except Exception as error:  # zipfile, zlib, numpy and json each raise their own
+            raise MapError(path, "file", str(error), "a map written by symgrasp") from error
+        if meta.get("version") != FORMAT_VERSION:
+            raise MapError(path, "version", meta.get("version"), str(FORMAT_VERSION))
+        try:
+            manifold = Manifold(
+                Profile(data.pop("profile"), str(path)), meta["heights"], meta["angles"], meta["theta_start"]
+            )
+            shape = (len(ROLLS), manifold.heights, manifold.angles)
+            for name in ("reason", "sample", "branch", "clearance", "depth"):
+                if data[name].shape != shape:
+                    raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
+            names = {key: meta[key] for key in ("scene", "arm", "task")}
+            return FeasibilityMap(**names, manifold=manifold, bodies=tuple(meta["bodies"]), **data)
+        except (KeyError, ProfileError) as error:
+            raise MapError(path, "meta", str(error), "a map written by symgrasp") from error
+
+
+def _listed(values: Array) -> list[Any]:
+    """Return an array as lists with None for NaN, which JSON does not have."""
+    listed = values.astype(object)
+    listed[np.isnan(values)] = None
+    return listed.tolist()
+
+
+_ARRAYS = (
+    "T_world_object", "reason", "q", "sample", "branch", "clearance", "phi", "opening", "pair", "depth",
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""Measures objects of revolution in meshes: axis, radii, symmetry."""

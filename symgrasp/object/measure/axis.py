@@ -1,0 +1,223 @@
+"""Finding the axis of revolution of a mesh.
+
+Every normal of a surface of revolution meets its axis. In Plücker coordinates that is linear in
+the axis, so an eigenvector problem gives it without a first guess (Pottmann and Randrup,
+"Rotational and helical surface approximation", 1998). Normals of a noisy mesh are rough, so the
+result is then refined on positions: the first harmonic of the deviation from the mean profile
+tells how far the axis is off.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+
+from symgrasp.object.measure.meridian import column_angles, cut, envelope
+from symgrasp.poses import Array, from_rotation, inverse, rotation_about, translation
+
+__all__ = ["find_axis", "frame_along"]
+
+COLUMNS, FINE_COLUMNS = 48, 240
+"""Half-planes at which a candidate axis is judged, and at which the best one is refined."""
+
+ROWS, RINGS = 128, 32
+"""Heights at which the wall is sampled, and radii at which the ends are."""
+
+STEPS = 20
+"""Most steps of the refinement; it usually converges in five."""
+
+CONVERGED = 1e-6
+"""A step that moves no part of the object further than this share of its size is the last."""
+
+WORSE = 1.1
+"""A refinement that raises the score by more than this factor has lost its way."""
+
+REFINED, HOPELESS = 3, 4.0
+"""How many of the candidates are refined at most; none whose score is this many times the best."""
+
+ALIKE = np.cos(np.deg2rad(2.0))
+"""Candidates whose directions are this close are one."""
+
+EVEN = 1.02
+"""Candidates whose deviations are within this factor are equally good: a ball has many axes."""
+
+
+class _Samples(NamedTuple):
+    """Points of the outer surface beside their mean over the angle, in a candidate's frame."""
+
+    rho: Array
+    h: Array
+    theta: Array
+    normal: Array
+    """(n, 2) outward normal of the mean surface as (ρ, h)"""
+    deviation: Array
+    """(n,) signed distance outwards from the mean surface (m)"""
+    weight: Array
+    """(n,) area that the point stands for, on any common scale"""
+
+
+def find_axis(mesh: trimesh.Trimesh) -> Array:
+    """Return a pose ``T_mesh_object`` (4, 4) whose z axis is the axis of revolution.
+
+    Its origin lies on the axis at half height; which end is up is left open. A mesh that is no
+    surface of revolution gets the axis that fits most of its surface.
+    """
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    size = float(np.linalg.norm(mesh.extents))
+    # Candidates are judged around the origin, so that nothing is lost far away from it.
+    local = vertices - centre
+    candidates = _candidates(mesh, centre)
+    judged = [(_score(_sample(local, faces, pose, COLUMNS)), k, pose) for k, pose in enumerate(candidates)]
+    refined = [(*_refine(local, faces, pose, size, COLUMNS), k) for k, pose in _promising(judged)]
+    limit = EVEN * min(score for score, _, _ in refined)
+    # Equally good ones keep the order of the candidates, which begins with the file's own axes.
+    _, best = min((k, n) for n, (score, _, k) in enumerate(refined) if score <= limit)
+    _, pose = _refine(local, faces, refined[best][1], size, FINE_COLUMNS)
+    return translation(centre) @ pose
+
+
+def _promising(judged: list[tuple[float, int, Array]]) -> list[tuple[int, Array]]:
+    """Return the number and frame of the best candidates, each direction once."""
+    ordered = sorted(judged, key=lambda entry: entry[:2])
+    chosen: list[tuple[int, Array]] = []
+    for score, k, pose in ordered:
+        new = all(abs(pose[:3, 2] @ other[:3, 2]) < ALIKE for _, other in chosen)
+        if new and len(chosen) < REFINED and score <= HOPELESS * ordered[0][0] + 1e-9:
+            chosen.append((k, pose))
+    return chosen
+
+
+def frame_along(axis: Array, origin: Array) -> Array:
+    """Return the pose (4, 4) with that origin and z axis, its x axis as near as may be to x."""
+    z = axis / np.linalg.norm(axis)
+    across = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    x = across - (across @ z) * z
+    x /= np.linalg.norm(x)
+    return from_rotation(np.column_stack([x, np.cross(z, x), z]), origin)
+
+
+def _candidates(mesh: trimesh.Trimesh, centre: Array) -> list[Array]:
+    """Return possible axis frames (4, 4), as seen from ``centre``."""
+    points, normals = mesh.triangles_center - centre, np.asarray(mesh.face_normals)
+    areas = mesh.area_faces
+    middle = np.average(points, axis=0, weights=areas)
+    _, principal = np.linalg.eigh(np.cov((points - middle).T, aweights=areas))
+    file_axes = [(axis, middle) for axis in np.eye(3)[::-1]]
+    inertia = [(axis, middle) for axis in principal.T]
+    return [frame_along(axis, p) for axis, p in file_axes + inertia + _met_by_normals(points, normals, areas)]
+
+
+def _met_by_normals(points: Array, normals: Array, areas: Array) -> list[tuple[Array, Array]]:
+    """Return (direction, point) of the lines that the normals come closest to meeting.
+
+    The line through q along a has the moment m = q × a; it meets the normal n through p when
+    ``n·m + (p × n)·a = 0``. Least squares over m leave an eigenvector problem for a. It is
+    solved again with the normals that do not fit weighted down, so a handle does not pull.
+    """
+    middle = np.average(points, axis=0, weights=areas)
+    scale = float(np.abs(points - middle).max())
+    moments = np.cross((points - middle) / scale, normals)
+    weights, lines = areas, []
+    for _ in range(10):
+        A = (normals * weights[:, None]).T @ normals
+        B = (normals * weights[:, None]).T @ moments
+        D = (moments * weights[:, None]).T @ moments
+        to_moment = -np.linalg.pinv(A, rcond=1e-6, hermitian=True) @ B
+        _, vectors = np.linalg.eigh(D + B.T @ to_moment)
+        lines = [(a, middle + scale * np.cross(a, to_moment @ a)) for a in vectors.T]
+        residual = normals @ (to_moment @ vectors[:, 0]) + moments @ vectors[:, 0]
+        spread = np.median(np.abs(residual)) + 1e-9
+        weights = areas / (1.0 + (residual / (2.0 * spread)) ** 2)
+    return lines
+
+
+def _refine(
+    vertices: Array, faces: np.ndarray, pose: Array, size: float, columns: int
+) -> tuple[float, Array]:
+    """Move an axis frame to where the deviations have no first harmonic; return its score too."""
+    samples = _sample(vertices, faces, pose, columns)
+    start = (_score(samples), pose)
+    for _ in range(STEPS):
+        turn, shift = _correction(samples)
+        angle = float(np.linalg.norm(turn))
+        pose = pose @ from_rotation(rotation_about(turn / (angle or 1.0), angle), shift)
+        samples = _sample(vertices, faces, pose, columns)
+        if angle * size + np.linalg.norm(shift) < CONVERGED * size:
+            break
+    score = _score(samples)
+    return (score, pose) if score < WORSE * start[0] else start
+
+
+def _correction(samples: _Samples) -> tuple[Array, Array]:
+    """Return the turn (3,) (rad) and shift (3,) (m) of the frame that explain the deviations.
+
+    A rigid motion moves the surface along its normal by ``n · (t + ω × p)``; this is fitted by
+    weighted least squares with Tukey's weights, which leave handles and inner walls out.
+    """
+    rho, h, theta = samples.rho, samples.h, samples.theta
+    radial, axial = samples.normal.T
+    length = max(float(rho.max()), float(np.ptp(h)))
+    lever = (axial * rho - radial * h) / length
+    columns = np.column_stack(
+        [radial * np.cos(theta), radial * np.sin(theta), lever * np.sin(theta), -lever * np.cos(theta)]
+    )
+    spread = 1.4826 * np.median(np.abs(samples.deviation)) + 1e-7
+    inside = np.clip(1.0 - (samples.deviation / (4.685 * spread)) ** 2, 0.0, None)
+    root = np.sqrt(samples.weight) * inside
+    # Small singular values belong to turns that hardly show, as those of a ball: leave them alone.
+    solution, *_ = np.linalg.lstsq(columns * root[:, None], samples.deviation * root, rcond=1e-3)
+    return np.array([*solution[2:] / length, 0.0]), np.array([*solution[:2], 0.0])
+
+
+def _score(samples: _Samples) -> float:
+    """Return how far a surface is from symmetric (m), with little say for single large bumps."""
+    return float(np.average(np.sqrt(np.abs(samples.deviation)), weights=samples.weight) ** 2)
+
+
+def _sample(vertices: Array, faces: np.ndarray, pose: Array, columns: int) -> _Samples:
+    """Sample the wall and both ends of a mesh in a candidate's frame."""
+    to_frame = inverse(pose)
+    local = vertices @ to_frame[:3, :3].T + to_frame[:3, 3]
+    theta, cuts = column_angles(columns), cut(local, faces, columns)
+    bottom, top = local[:, 2].min(), local[:, 2].max()
+    heights = bottom + (np.arange(ROWS) + 0.5) * ((top - bottom) / ROWS)
+    radii = (np.arange(RINGS) + 0.5) * (np.hypot(local[:, 0], local[:, 1]).max() / RINGS)
+    wall, _ = envelope(cuts.column, cuts.h, cuts.r, heights, columns)
+    # An angle without a surface counts as radius zero, or a wrong axis would look symmetric.
+    parts = [_beside_mean(heights, np.maximum(wall, 0.0), theta, "wall")]
+    for sign in (-1.0, 1.0):
+        end, _ = envelope(cuts.column, cuts.r, sign * cuts.h, radii, columns)
+        whole = np.isfinite(end).all(axis=1)
+        if whole.sum() >= 2:
+            parts.append(_beside_mean(radii[whole], end[whole], theta, "end", sign))
+    return _Samples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _beside_mean(x: Array, y: Array, theta: Array, kind: str, sign: float = 1.0) -> _Samples:
+    """Compare one envelope y (rows, columns) over x (rows,) with its median over the angle.
+
+    The wall is a radius over heights. An end is a height, times the sign that makes it grow
+    outwards, over radii.
+    """
+    mean = np.median(y, axis=1)
+    slope = np.gradient(mean, x)
+    across = 1.0 / np.sqrt(1.0 + slope**2)
+    along = -slope * across
+    spread = np.broadcast_to(x[:, None], y.shape)
+    if kind == "wall":
+        rho, h, normal, step = y, spread, (across, along), x[1] - x[0]
+        weight = np.broadcast_to(y.mean(axis=1, keepdims=True) * step, y.shape)
+    else:
+        rho, h, normal, step = spread, sign * y, (along, sign * across), x[1] - x[0]
+        weight = spread * step
+    return _Samples(
+        rho.ravel(),
+        h.ravel(),
+        np.broadcast_to(theta, y.shape).ravel(),
+        np.column_stack([np.repeat(n, y.shape[1]) for n in normal]),
+        ((y - mean[:, None]) * across[:, None]).ravel(),
+        weight.ravel(),
+    )

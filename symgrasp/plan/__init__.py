@@ -1,0 +1,1 @@
+"""The plan file: writing, verifying, exporting and describing plans."""

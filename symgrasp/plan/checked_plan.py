@@ -1,0 +1,48 @@
+"""A plan file, checked, with what is needed to show it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from symgrasp.plan.plan import Plan
+from symgrasp.plan.verify import Report, verify
+from symgrasp.progress import Progress
+from symgrasp.scene.scene import Scene
+
+__all__ = ["CheckedPlan", "check_plan"]
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedPlan:
+    """A plan that came from a file.
+
+    Attributes:
+        plan: the plan.
+        report: what was checked, and what does not hold.
+        scene: the plan's own scene; None where the plan does not hold.
+    """
+
+    plan: Plan
+    report: Report
+    scene: Scene | None
+
+    def is_for(self, scene: Scene) -> bool:
+        """Whether the plan was made for exactly this scene."""
+        return self.plan.scene.sha256 == scene.sha256
+
+
+def check_plan(content: str | bytes, source: str, progress: Progress | None = None) -> CheckedPlan:
+    """Read a plan and verify it, before anything of it is shown.
+
+    Args:
+        content: of the file.
+        source: its name, for errors.
+        progress: told the finished share; may raise `Cancelled`.
+
+    Raises:
+        PlanError: the content is not a plan.
+    """
+    plan = Plan.parse(content, source)
+    report = verify(plan, progress)
+    scene = Scene.from_content(plan.scene.content, source) if report.holds else None
+    return CheckedPlan(plan, report, scene)

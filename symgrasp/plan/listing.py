@@ -1,0 +1,26 @@
+"""Plans in words: one line a plan, to choose from a list."""
+
+from __future__ import annotations
+
+import math
+
+from symgrasp.plan.plan import Grasp, Plan
+
+__all__ = ["place_in_words", "plan_in_words"]
+
+
+def plan_in_words(plan: Plan) -> str:
+    """Say where each arm holds, and what is the least of the margins and clearances."""
+    holds = [hold for task in plan.tasks for hold in task.holds]
+    grasps = dict.fromkeys((hold.arm, place_in_words(hold.grasp)) for hold in holds)
+    along = 1e3 * min(hold.margin_along for hold in holds)
+    around = math.degrees(min(hold.margin_around for hold in holds))
+    clear = 1e3 * min(hold.clearance for hold in holds)
+    where = "; ".join(f"{arm} at {place}" for arm, place in grasps)
+    return f"{where}: margins {along:.1f} mm, {around:.1f}°; {clear:.1f} mm clear"
+
+
+def place_in_words(grasp: Grasp) -> str:
+    """Say where on the object a grasp is."""
+    turn = f"θ = {math.degrees(grasp.theta):.1f}°, roll {math.degrees(grasp.roll):.0f}°"
+    return f"h = {100 * grasp.h:.1f} cm, {turn}"

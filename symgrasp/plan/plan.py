@@ -1,0 +1,169 @@
+"""The plan file: what a planner decided, with everything needed to check it, as versioned JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from symgrasp.errors import PlanError
+from symgrasp.files import write_atomically
+from symgrasp.poses import Array, quat_wxyz
+from symgrasp.scene.format import describe
+
+__all__ = [
+    "CLEARANCE_LIMIT",
+    "Grasp",
+    "Hold",
+    "Plan",
+    "PlanTask",
+    "Planner",
+    "Pose",
+    "SceneRecord",
+    "plan_schema",
+]
+
+CLEARANCE_LIMIT = 0.1
+"""Clearances are measured up to this distance (m)."""
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Row = tuple[Finite, Finite, Finite, Finite]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Pose(_Part):
+    """A pose, written twice: as a matrix and as position (m) and wxyz quaternion."""
+
+    matrix: tuple[Row, Row, Row, Row]
+    position: tuple[Finite, Finite, Finite]
+    quat_wxyz: Row
+
+    @staticmethod
+    def of(pose: ArrayLike) -> Pose:
+        """Write a pose (4, 4)."""
+        pose = np.asarray(pose, dtype=float)
+        return Pose(matrix=pose.tolist(), position=pose[:3, 3].tolist(), quat_wxyz=quat_wxyz(pose).tolist())
+
+    def array(self) -> Array:
+        """Return the matrix (4, 4)."""
+        return np.array(self.matrix)
+
+
+class Grasp(_Part):
+    """A grasp on the object's surface."""
+
+    h: Finite = Field(description="height along the axis (m)")
+    theta: Finite = Field(description="angle about the axis (rad), in the object's frame")
+    roll: Finite = Field(description="turn about the approach (rad): 0 or π")
+
+
+class Hold(_Part):
+    """How one arm holds the object in one task."""
+
+    arm: str
+    robot: str
+    grasp: Grasp
+    tool_pose: Pose = Field(description="T_world_tool")
+    joints: dict[str, Finite] = Field(description="joint name → value (rad), base to tool")
+    hand_joints: dict[str, Finite] = Field(description="hand joint name → value (m or rad)")
+    opening: Finite = Field(description="distance between the finger pads (m)")
+    clearance: Finite = Field(
+        description=f"smallest distance (m) of bodies that may not touch; {CLEARANCE_LIMIT} stands for more"
+    )
+    margin_along: Finite = Field(description="distance along the axis to an infeasible cell (m)")
+    margin_around: Finite = Field(description="angle about the axis to an infeasible cell (rad)")
+
+
+class PlanTask(_Part):
+    """The object pose of a task, the turn about its axis, and the hands on it."""
+
+    name: str
+    object_pose: Pose = Field(description="T_world_object as the scene gives it")
+    delta: Finite = Field(description="turn of the object about its own axis (rad)")
+    object_pose_turned: Pose = Field(description="object_pose · Rz(delta)")
+    holds: tuple[Hold, ...]
+
+
+class Planner(_Part):
+    """What made the plan."""
+
+    algorithm: str
+    seed: int | None = None
+    settings: dict[str, int] = {}
+    statistics: dict[str, int] = {}
+
+
+class SceneRecord(_Part):
+    """The scene the plan is for."""
+
+    name: str
+    sha256: str
+    content: dict[str, Any]
+
+
+class Plan(_Part):
+    """A plan, format version 1."""
+
+    schema_version: Literal[1] = 1
+    kind: Literal["sequential", "bimanual", "handover"]
+    scene: SceneRecord
+    versions: dict[str, str]
+    planner: Planner
+    units: dict[str, str] = {"length": "m", "angle": "rad", "quaternion": "wxyz"}
+    frames: dict[str, str] = {
+        "world": "the scene's frame, z up",
+        "object": "origin on the axis at the bottom, z along the axis of symmetry",
+        "tool": "between the finger tips, z = approach, y = closing direction",
+    }
+    robots: dict[str, tuple[str, ...]] = Field(description="robot → names of all its joints")
+    tasks: tuple[PlanTask, ...]
+
+    def to_json(self) -> str:
+        """Return the plan as JSON text; floats read back exactly."""
+        return json.dumps(self.model_dump(mode="json"), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def save(self, path: str | Path) -> None:
+        """Write the plan, in one piece."""
+        with write_atomically(Path(path)) as file:
+            file.write(self.to_json().encode())
+
+    @staticmethod
+    def load(path: str | Path) -> Plan:
+        """Read a plan.
+
+        Raises:
+            PlanError: the file is missing or is not such a plan.
+        """
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise PlanError(path, "file", str(error), "a readable JSON file") from error
+        return Plan.parse(content, str(path))
+
+    @staticmethod
+    def parse(content: str | bytes, source: str) -> Plan:
+        """Read the content of a plan file; ``source`` names it in errors.
+
+        Raises:
+            PlanError: it is not such a plan.
+        """
+        try:
+            data = json.loads(content)
+        except (ValueError, RecursionError) as error:
+            raise PlanError(source, "file", str(error), "a readable JSON file") from error
+        try:
+            return Plan.model_validate(data)
+        except ValidationError as error:
+            raise PlanError(source, *describe(error, data)) from None
+
+
+def plan_schema() -> dict[str, Any]:
+    """Return the JSON Schema of plan files."""
+    return Plan.model_json_schema()

@@ -1,0 +1,88 @@
+"""Writes down what a planner decided: grasps become poses, joint values, clearances and margins."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Literal, NamedTuple
+
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.manifold import ROLLS, grasp_to_tool
+from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold, Plan, Planner, PlanTask, Pose, SceneRecord
+from symgrasp.poses import rotation_z
+from symgrasp.robot.configuration import ArmConfiguration
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+from symgrasp.world import BulletWorld
+
+__all__ = ["Held", "write_plan", "write_task"]
+
+
+class Held(NamedTuple):
+    """An arm that holds the object in a task.
+
+    Attributes:
+        posture: its configuration.
+        map: its map of the task.
+        cell: where on that map it holds.
+        grasp: the same on the turned object, so the grasp itself.
+    """
+
+    configuration: ArmConfiguration
+    map: FeasibilityMap
+    cell: Cell
+    grasp: Cell
+
+
+def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held]) -> PlanTask:
+    """Write one task with the object turned by ``delta`` (rad) about its axis."""
+    turned = task.T_world_object @ rotation_z(delta)
+    world.set_object(turned)
+    world.set_arms(h.configuration for h in held)
+    entries = []
+    for (arm, q, opening), m, cell, grasp in held:
+        margin = m.margin(cell)
+        h, theta = float(m.manifold.h[grasp.row]), float(m.manifold.theta[grasp.column])
+        roll = ROLLS[grasp.roll]
+        standoff = arm.hand.standoff(float(m.manifold.profile.radius(h)))
+        entries.append(
+            Hold(
+                arm=arm.name,
+                robot=arm.robot.name,
+                grasp=Grasp(h=h, theta=theta, roll=roll),
+                tool_pose=Pose.of(grasp_to_tool(turned, h, theta, roll, standoff)),
+                joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
+                hand_joints=arm.hand.joint_values(opening),
+                opening=opening,
+                clearance=world.clearance(arm, CLEARANCE_LIMIT),
+                margin_along=margin.along,
+                margin_around=margin.around,
+            )
+        )
+    return PlanTask(
+        name=task.name,
+        object_pose=Pose.of(task.T_world_object),
+        delta=delta,
+        object_pose_turned=Pose.of(turned),
+        holds=tuple(entries),
+    )
+
+
+def write_plan(
+    scene: Scene,
+    kind: Literal["sequential", "bimanual", "handover"],
+    planner: Planner,
+    tasks: Sequence[PlanTask],
+) -> Plan:
+    """Write the plan of a scene."""
+    packages = ("symgrasp", "numpy", "pybullet", "eaik")
+    return Plan(
+        kind=kind,
+        scene=SceneRecord(name=scene.name, sha256=scene.sha256, content=scene.content),
+        versions={"python": platform.python_version(), **{name: version(name) for name in packages}},
+        planner=planner,
+        robots={robot.name: robot.model.joint_names for robot in scene.robots.values()},
+        tasks=tuple(tasks),
+    )

@@ -1,0 +1,261 @@
+"""From a scene to plans: maps, a planner, and what it decided written down.
+
+Every exact planner lists all its solutions, best first and lazily; the best plan is the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from symgrasp.errors import SceneError
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.plan.plan import Plan, Planner
+from symgrasp.plan.writing import write_plan
+from symgrasp.planners.bimanual import Climb, ClimbStep
+from symgrasp.planners.solving import Maps, climb, first_grasp, holdings, with_regrasps
+from symgrasp.progress import Progress
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+from symgrasp.world import BulletWorld
+
+__all__ = [
+    "Plans",
+    "bimanual_plans",
+    "handover_plans",
+    "plan_bimanual",
+    "plan_handover",
+    "plan_sequential",
+    "sequential_maps",
+    "sequential_plans",
+]
+
+BimanualMethod = Literal["exact", "hill_climb"]
+SequentialMethod = Literal["best", "first", "regrasp"]
+
+Plans = Generator[Plan]
+"""Plans, made when asked for, best first; `close` it when no more are wanted."""
+
+
+def plan_sequential(
+    scene: Scene,
+    arm: str | None = None,
+    maps: Mapping[str, FeasibilityMap] | None = None,
+    method: SequentialMethod = "best",
+    progress: Progress | None = None,
+) -> Plan:
+    """Find one grasp for all tasks that an arm does alone.
+
+    Args:
+        scene: the scene.
+        arm: the arm; the first task's if None.
+        maps: task → map of that arm; computed where missing.
+        method: ``best`` is the grasp with the largest margin in its worst task, ``first`` is
+            Algorithm 2 as printed, ``regrasp`` the fewest grasps that serve the whole sequence,
+            with the object set down in between.
+        progress: told the finished share; may raise `Cancelled`.
+
+    Raises:
+        ConflictError: no grasp serves all tasks; says which exclude each other.
+        SceneError: no task is done by that arm alone.
+    """
+    if method == "best":
+        return _best(sequential_plans(scene, arm, maps, progress))
+    name, tasks = _tasks_alone(scene, arm)
+    with BulletWorld(scene) as world:
+        all_maps = _maps_by_task(world, tasks, name, maps, progress)
+        if method == "first":
+            entries = first_grasp(world, tasks, all_maps, name)
+        else:
+            entries = with_regrasps(world, tasks, all_maps, name)
+    return write_plan(scene, "sequential", Planner(algorithm=method), entries)
+
+
+def sequential_plans(
+    scene: Scene,
+    arm: str | None = None,
+    maps: Mapping[str, FeasibilityMap] | None = None,
+    progress: Progress | None = None,
+) -> Plans:
+    """List the plans with one grasp for all tasks that an arm does alone, best first.
+
+    One for every height and roll that serves all tasks, each with its best turns: in the order of
+    `common_grasps`. Arguments and errors are those of `plan_sequential`.
+    """
+    name, tasks = _tasks_alone(scene, arm)
+    with BulletWorld(scene) as world:
+        all_maps = _maps_by_task(world, tasks, name, maps, progress)
+        for entries, _ in holdings(world, tasks, all_maps, progress):
+            yield write_plan(scene, "sequential", Planner(algorithm="best"), entries)
+
+
+def sequential_maps(
+    scene: Scene, arm: str | None = None, progress: Progress | None = None
+) -> dict[str, FeasibilityMap]:
+    """Return task → map for all tasks that an arm does alone, as `sequential_plans` takes them."""
+    name, tasks = _tasks_alone(scene, arm)
+    with BulletWorld(scene) as world:
+        maps = _maps_by_task(world, tasks, name, None, progress)
+    return {task.name: maps[k, name] for k, task in enumerate(tasks)}
+
+
+def plan_bimanual(
+    scene: Scene,
+    task: str | None = None,
+    maps: Mapping[str, FeasibilityMap] | None = None,
+    method: BimanualMethod = "exact",
+    seed: int = 0,
+    limits: Climb | None = None,
+    progress: Progress | None = None,
+    trace: list[ClimbStep] | None = None,
+) -> Plan:
+    """Place all arms of a task on the object so that they do not meet.
+
+    Args:
+        scene: the scene.
+        task: a task that several arms do together; the first such task if None.
+        maps: arm → map of that task; computed where missing.
+        method: ``exact`` finds the placement with the largest gap and margins for which the whole
+            robots are free, or proves that there is none on this grid; ``hill_climb`` is
+            Algorithm 3.
+        seed: of the random choices of the hill climbing.
+        limits: how long to climb.
+        progress: told the finished share; may raise `Cancelled`.
+        trace: receives every position of the hill climbing, whether it finds something or not.
+
+    Raises:
+        NoPlanError: no placement exists, or the hill climbing found none.
+        SceneError: no task needs several arms.
+    """
+    if method == "exact":
+        return _best(bimanual_plans(scene, task, maps, progress))
+    the_task = _task_together(scene, task)
+    with BulletWorld(scene) as world:
+        all_maps = _maps_by_arm(world, the_task, maps, progress)
+        entry, planner = climb(world, the_task, all_maps, seed, limits or Climb(), progress, trace)
+    return write_plan(scene, "bimanual", planner, [entry])
+
+
+def bimanual_plans(
+    scene: Scene,
+    task: str | None = None,
+    maps: Mapping[str, FeasibilityMap] | None = None,
+    progress: Progress | None = None,
+) -> Plans:
+    """List the placements of all arms of a task, best first; neighbouring cells count as one.
+
+    Arguments and errors are those of `plan_bimanual`.
+    """
+    the_task = _task_together(scene, task)
+    with BulletWorld(scene) as world:
+        all_maps = _maps_by_arm(world, the_task, maps, progress)
+        for entries, planner in holdings(world, [the_task], all_maps, progress):
+            yield write_plan(scene, "bimanual", planner, entries)
+
+
+def plan_handover(
+    scene: Scene,
+    maps: Mapping[tuple[str, str], FeasibilityMap] | None = None,
+    progress: Progress | None = None,
+) -> Plan:
+    """Find grasps for all tasks of a scene in order, whichever arms hold the object in each.
+
+    An arm keeps its grasp as long as it holds on; where one arm takes over from another, both
+    hold the object together in some task.
+
+    Args:
+        scene: the scene.
+        maps: (task, arm) → map; computed where missing.
+        progress: told the finished share; may raise `Cancelled`.
+
+    Raises:
+        NoPlanError: no grasps exist on this grid.
+        SceneError: the object moves between two tasks that share no arm.
+    """
+    return _best(handover_plans(scene, maps, progress))
+
+
+def handover_plans(
+    scene: Scene,
+    maps: Mapping[tuple[str, str], FeasibilityMap] | None = None,
+    progress: Progress | None = None,
+) -> Plans:
+    """List the plans for all tasks of a scene in order, best first; neighbouring cells count as one.
+
+    Arguments and errors are those of `plan_handover`.
+    """
+    tasks = list(scene.tasks.values())
+    for before, after in pairwise(tasks):
+        still = np.array_equal(before.T_world_object, after.T_world_object)
+        if not still and not set(before.arms) & set(after.arms):
+            expected = f"an arm that carries the object there from task {before.name!r}"
+            raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
+    index = {task.name: k for k, task in enumerate(tasks)}
+    known = {(index[task], arm): m for (task, arm), m in (maps or {}).items()}
+    with BulletWorld(scene) as world:
+        for before, after in pairwise(tasks):
+            if not set(before.arms) & set(after.arms) and not world.rests(before.T_world_object):
+                expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
+                raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
+        all_maps = _all_maps(world, tasks, known, progress)
+        for entries, planner in holdings(world, tasks, all_maps, progress):
+            yield write_plan(scene, "handover", planner, entries)
+
+
+def _best(plans: Plans) -> Plan:
+    with closing(plans):
+        return next(plans)
+
+
+def _tasks_alone(scene: Scene, arm: str | None) -> tuple[str, list[Task]]:
+    """Return an arm and the tasks that it does alone."""
+    name = scene.arm(arm or scene.task().arms[0]).name
+    tasks = [task for task in scene.tasks.values() if task.arms == (name,)]
+    if not tasks:
+        names = [task.name for task in scene.tasks.values()]
+        expected = f"a task that {name} does alone; several arms are for the other planners"
+        raise SceneError(scene.source, "tasks", names, expected)
+    return name, tasks
+
+
+def _task_together(scene: Scene, task: str | None) -> Task:
+    """Return a task that several arms do together."""
+    together = [t for t in scene.tasks.values() if len(t.arms) > 1]
+    found = scene.task(task) if task or not together else together[0]
+    if len(found.arms) < 2:
+        expected = "two or more arms; one arm alone is for the sequential planner"
+        raise SceneError(scene.source, f"task {found.name}: arms", list(found.arms), expected)
+    return found
+
+
+def _maps_by_task(
+    world: BulletWorld,
+    tasks: Sequence[Task],
+    arm: str,
+    known: Mapping[str, FeasibilityMap] | None,
+    progress: Progress | None,
+) -> Maps:
+    have = {(k, arm): known[task.name] for k, task in enumerate(tasks) if known and task.name in known}
+    return _all_maps(world, tasks, have, progress)
+
+
+def _maps_by_arm(
+    world: BulletWorld, task: Task, known: Mapping[str, FeasibilityMap] | None, progress: Progress | None
+) -> Maps:
+    return _all_maps(world, [task], {(0, arm): m for arm, m in (known or {}).items()}, progress)
+
+
+def _all_maps(world: BulletWorld, tasks: Sequence[Task], known: Maps, progress: Progress | None) -> Maps:
+    """Return the maps of all arms in all tasks, computing those that are not known."""
+    keys = [(k, arm) for k, task in enumerate(tasks) for arm in task.arms]
+    maker = MapMaker(world, world.scene)
+    maps: dict[tuple[int, str], FeasibilityMap] = {}
+    for done, (k, arm) in enumerate(keys):
+        step = (lambda share, done=done: progress((done + share) / len(keys))) if progress else None
+        maps[k, arm] = known.get((k, arm)) or maker.map(arm, tasks[k], progress=step)
+    return maps

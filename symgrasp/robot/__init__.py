@@ -1,0 +1,1 @@
+"""Robots from URDFs: kinematic trees, arms, hands and their prints."""

@@ -1,0 +1,132 @@
+"""Handprints: the cells of the manifold that a hand covers (figure 7 of the paper).
+
+**Theorem.** Two hands whose prints share no cell do not touch.
+
+*Proof.* Suppose that they share a point, at height h. Off the axis, f maps it to one (h, θ), and
+a print holds every cell that the image of any point of its hand lies in: both prints hold that
+cell. On the axis θ is undefined, and a body with a point there covers all angles of its row:
+both prints hold the whole row. Rows go on beyond both ends of the object, so no point lacks one.
+
+The converse does not hold: the print forgets the distance from the axis, so hands whose prints
+overlap may still pass each other, one behind the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from symgrasp.object.manifold import ROLLS, Manifold, grasp_to_tool, wrap
+from symgrasp.poses import Array
+
+__all__ = ["Handprint", "handprint", "hull_edges", "slab_corners"]
+
+HAIR = 1e-9
+"""Added on every side (m, rad), so that rounding never loses a touched cell."""
+
+ON_AXIS = 1e-6
+"""Distance (m) from the axis within which a point counts as on it: its angle is rounding noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Handprint:
+    """The cells that a hand covers when it grasps row ``row`` at column 0.
+
+    Rows go on with the same height beyond both ends of the object, so that hands that reach past
+    an end are told apart as well.
+
+    Attributes:
+        cells: (rows, angles) bool, read-only; true where any point of the hand projects to.
+        first_row: the manifold's row (possibly negative) that ``cells[0]`` lies on.
+    """
+
+    cells: np.ndarray
+    first_row: int
+
+    def overlap(self, other: Handprint, columns: int) -> int:
+        """Return how many cells this print at column 0 shares with another at ``columns``."""
+        first = max(self.first_row, other.first_row)
+        last = min(self.first_row + len(self.cells), other.first_row + len(other.cells))
+        if first >= last:
+            return 0
+        mine = self.cells[first - self.first_row : last - self.first_row]
+        theirs = other.cells[first - other.first_row : last - other.first_row]
+        return int(np.count_nonzero(mine & np.roll(theirs, columns, axis=1)))
+
+    def on(self, manifold: Manifold, column: int) -> np.ndarray:
+        """Return the covered cells (heights, angles) of the object itself, at a column."""
+        covered = np.zeros((manifold.heights, manifold.angles), dtype=bool)
+        first, last = max(self.first_row, 0), min(self.first_row + len(self.cells), manifold.heights)
+        if first < last:
+            covered[first:last] = self.cells[first - self.first_row : last - self.first_row]
+        return np.roll(covered, column, axis=1)
+
+
+def handprint(bodies: Sequence[Array], manifold: Manifold, row: int, roll: int, standoff: float) -> Handprint:
+    """Project the bodies of a hand that grasps ``row`` at column 0 onto the manifold.
+
+    Exact for each convex body and row, then rounded up to whole cells: the slice of a convex
+    body between two heights is convex, so seen from the axis it covers one interval of angles,
+    which its corners bound, or every angle where the slice holds a point of the axis.
+
+    Args:
+        bodies: vertices (n, 3) of each convex body in the tool frame, at the right opening.
+        manifold: the grid.
+        row: height index of the grasp.
+        roll: index into `ROLLS`.
+        standoff: distance (m) of the tool frame from the axis.
+    """
+    T_object_tool = grasp_to_tool(np.eye(4), manifold.h[row], 0.0, ROLLS[roll], standoff)
+    placed = [points @ T_object_tool[:3, :3].T + T_object_tool[:3, 3] for points in bodies]
+    lowest = min(points[:, 2].min() for points in placed)
+    highest = max(points[:, 2].max() for points in placed)
+    to_row = lambda h: int(np.floor((h - manifold.profile.h_min) / manifold.dh))  # noqa: E731
+    first, last = to_row(lowest - HAIR), to_row(highest + HAIR)
+    cells = np.zeros((last - first + 1, manifold.angles), dtype=bool)
+    for points in placed:
+        edges = hull_edges(points)
+        for k in range(len(cells)):
+            bottom = manifold.profile.h_min + (first + k) * manifold.dh
+            corners = slab_corners(points, edges, bottom - HAIR, bottom + manifold.dh + HAIR)
+            if len(corners):
+                cells[k] |= _covered_columns(corners, manifold)
+    cells.setflags(write=False)
+    return Handprint(cells, first)
+
+
+def hull_edges(points: Array) -> np.ndarray:
+    """Return the index pairs (m, 2) of the edges of the triangles around the hull of points (n, 3)."""
+    triangles = ConvexHull(points).simplices
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+def slab_corners(points: Array, edges: np.ndarray, bottom: float, top: float) -> Array:
+    """Return the xy corners (n, 2) of a convex body cut to ``bottom <= z <= top``."""
+    inside = (points[:, 2] >= bottom) & (points[:, 2] <= top)
+    corners = [points[inside, :2]]
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    for level in (bottom, top):
+        crosses = (a[:, 2] - level) * (b[:, 2] - level) < 0
+        s = (level - a[crosses, 2]) / (b[crosses, 2] - a[crosses, 2])
+        corners.append(a[crosses, :2] + s[:, None] * (b[crosses, :2] - a[crosses, :2]))
+    return np.concatenate(corners)
+
+
+def _covered_columns(corners: Array, manifold: Manifold) -> np.ndarray:
+    """Return the columns (angles,) covered by the convex hull of xy points, grasp at column 0."""
+    distance = np.hypot(corners[:, 0], corners[:, 1])
+    angles = np.arctan2(corners[:, 1], corners[:, 0])
+    relative = wrap(angles - angles[0])
+    low, high = relative.min() - HAIR, relative.max() + HAIR
+    # A convex region spans half a turn or more exactly when it holds the axis.
+    if distance.min() < ON_AXIS or high - low >= np.pi:
+        return np.ones(manifold.angles, dtype=bool)
+    columns = np.zeros(manifold.angles, dtype=bool)
+    first = int(np.floor((angles[0] + low) / manifold.dtheta + 0.5))
+    last = int(np.floor((angles[0] + high) / manifold.dtheta + 0.5))
+    columns[np.arange(first, last + 1) % manifold.angles] = True
+    return columns

@@ -1,0 +1,226 @@
+"""Measuring a parallel hand in its URDF: its fingers, how they open, its tool frame and its palm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import yaml
+from scipy.spatial import ConvexHull
+
+from symgrasp.errors import UrdfError
+from symgrasp.object.measure.outline import simplify
+from symgrasp.poses import Array, from_rotation, inverse, quat_wxyz, rpy
+from symgrasp.robot.assembly import Frame
+from symgrasp.robot.gripper import Gripper, find_anatomy, find_gripper, snap, solid_links
+from symgrasp.robot.hand import Hand, JointTable
+from symgrasp.robot.handprint import hull_edges, slab_corners
+from symgrasp.robot.model import RobotModel
+
+__all__ = ["hand_yaml", "measure_hand"]
+
+STEPS = 65
+"""Postures from closed to open at which the fingers are measured."""
+
+TIP = 0.010
+"""Where the tool frame is put (m) behind the ends of the fingers, half a usual pad, if no link says."""
+
+PALM_ROOM = 0.004
+"""Room to leave (m) between an object and the palm."""
+
+PALM_SKIN = 0.005
+"""The palm is measured this far (m) behind its foremost point, because fronts are rounded."""
+
+THIN = 1e-6
+"""Thickness (m) of what stands for a plane cut."""
+
+WIDE = 0.8
+"""Objects may reach as deep as the open fingers keep this share of their opening; what is narrower
+behind is the root of the fingers."""
+
+TABLE_ERROR = 2.5e-4
+"""By how much (m) the opening may differ from what the table of a joint says."""
+
+
+def measure_hand(model: RobotModel, tool: str | None = None) -> Hand:
+    """Measure a parallel hand.
+
+    Args:
+        model: the hand's URDF, or that of a robot with the hand on it.
+        tool: a link fixed to the palm, needed where a robot has several hands. Where it lies
+            before the palm, its origin becomes that of the tool frame; the axes are measured.
+
+    Raises:
+        UrdfError: there is no such link, or nothing that opens and closes like a parallel hand.
+    """
+    anatomy = find_anatomy(model, tool)
+    gripper = find_gripper(model, anatomy)
+    palm, fingers = solid_links(model, anatomy.palm), solid_links(model, *gripper.sides)
+    T = _tool_pose(gripper, palm, tool)
+    width, face, front = _palm_face(gripper.motion.bodies(palm, 1.0, T)) if palm else (0.0, 0.0, np.inf)
+    depth = _finger_depth(gripper, T, front)
+    steps, openings = _openings(gripper, T, depth)
+    return Hand(
+        name=model.path.stem,
+        links=(*palm, *fingers),
+        touch_links=fingers,
+        joints=_tables(gripper, steps, openings),
+        min_opening=_round(openings[0]),
+        max_opening=_round(openings[-1]),
+        finger_depth=_round(depth),
+        pad_width=_round(min(gripper.pad(side, steps[0], T)[1] for side in (0, 1))),
+        palm_width=_round(width),
+        palm_depth=_round(face),
+        tool=_tool_frame(model, T, anatomy.base, tool),
+        urdf=str(model.path.resolve()) if anatomy.alone else None,
+    )
+
+
+def hand_yaml(hand: Hand) -> str:
+    """Return a hand in the notation of the scene file, and in words as comments."""
+    mm = {key: f"{1e3 * value:.1f} mm" for key, value in vars(hand).items() if isinstance(value, float)}
+    words = [
+        f"# fingers: {', '.join(hand.touch_links)}, moved by {', '.join(hand.joints)}",
+        f"# they open from {mm['min_opening']} to {mm['max_opening']}; their pads are {mm['pad_width']} wide",
+        f"# objects may reach {mm['finger_depth']} behind the tool frame; the palm is {mm['palm_depth']}"
+        f" behind it, {mm['palm_width']} wide there",
+    ]
+    if hand.urdf is not None:
+        words.append("# a hand of its own: the robot also needs mount: {link: LINK, pose: {…}}")
+    content = {
+        "name": hand.name,
+        "urdf": hand.urdf,
+        "tool": hand.tool and _frame_content(hand.tool),
+        "links": list(hand.links),
+        "touch_links": list(hand.touch_links),
+        "joints": {
+            name: table if isinstance(table, float | int) else [list(knot) for knot in table]
+            for name, table in hand.joints.items()
+        },
+    }
+    for key in ("min_opening", "max_opening", "finger_depth", "pad_width", "palm_width", "palm_depth"):
+        content[key] = getattr(hand, key)
+    content = {key: value for key, value in content.items() if value is not None}
+    text = yaml.safe_dump({"hand": content}, sort_keys=False, default_flow_style=None, width=100)
+    return "\n".join([*words, text])
+
+
+def _frame_content(frame: Frame) -> dict[str, Any]:
+    if frame.is_link:
+        return {"link": frame.link}
+    turn = np.rad2deg(rpy(frame.matrix())).round(4) + 0.0
+    return {"link": frame.link, "pose": {"position": list(frame.position), "rpy_deg": turn.tolist()}}
+
+
+def _tool_pose(gripper: Gripper, palm: Sequence[str], tool: str | None) -> Array:
+    """Return the pose (4, 4) of the tool frame in the base: z approach, y closing direction."""
+    motion, y = gripper.motion, gripper.closing
+    fingers = [link for side in gripper.sides for link in side]
+    behind = motion.centre(palm, 1.0) if palm else np.zeros(3)
+    z = 0.5 * (motion.centre(fingers, 0.0) + motion.centre(fingers, 1.0)) - behind
+    z = snap(z - (z @ y) * y)
+    z = z - (z @ y) * y
+    z /= np.linalg.norm(z)
+    if tool is not None:
+        model = motion.model
+        links = model.forward(model.default_values())
+        T = inverse(links[model.link_index(motion.base)]) @ links[model.link_index(tool)]
+        y = -y if y @ T[:3, 1] < 0 else y
+        T = from_rotation(np.column_stack([np.cross(y, z), y, z]), T[:3, 3])
+        if all(points[:, 2].max() < 0 for points in motion.bodies(palm, 1.0, T)):
+            return T
+    T = from_rotation(np.column_stack([np.cross(y, z), y, z]))
+    reach = min(np.concatenate(motion.bodies(fingers, t, T))[:, 2].max() for t in (0.0, 1.0))
+    T[:3, 3] = (reach - TIP) * z
+    (x0, _, out0), (x1, _, out1) = (gripper.pad(side, 1.0, T) for side in (0, 1))
+    T[:3, 3] += T[:3, :3] @ [0.5 * (x0 + x1), 0.5 * (out0 - out1), 0.0]
+    T[:3, 3] = T[:3, 3].round(4)
+    return T
+
+
+def _palm_face(bodies: Sequence[Array]) -> tuple[float, float, float]:
+    """Return the palm's width along x, its distance behind the tool, and that of its foremost point.
+
+    The width is taken where y = 0, between the fingers, so that an object that reaches
+    behind that face within it surely meets the palm.
+    """
+    front = max(float(points[:, 2].max()) for points in bodies)
+    face = front - PALM_SKIN
+    width = 0.0
+    for points in bodies:
+        corners = slab_corners(points, hull_edges(points), face, face + THIN)
+        width = max(width, _width_at_middle(corners))
+    return width, -face, -front
+
+
+def _width_at_middle(corners: Array) -> float:
+    """Return the width (m) about the origin of the hull of xy corners (n, 2) along the line y = 0."""
+    if len(corners) < 3:
+        return 0.0
+    a, b = corners[ConvexHull(corners).simplices].transpose(1, 0, 2)
+    crosses = a[:, 1] * b[:, 1] < 0
+    a, b = a[crosses], b[crosses]
+    x = a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return max(0.0, 2 * float(min(x.max(), -x.min()))) if len(x) else 0.0
+
+
+def _finger_depth(gripper: Gripper, T_base_tool: Array, palm: float) -> float:
+    """Return how deep (m) objects may reach: to the palm, or to where the open fingers narrow."""
+    fingers = [link for side in gripper.sides for link in side]
+    length = -min(float(p[:, 2].min()) for p in gripper.motion.bodies(fingers, 1.0, T_base_tool))
+    deepest = max(0.0, min(palm - PALM_ROOM, length))
+    wide = WIDE * gripper.gap(1.0, T_base_tool, 0.0)
+    depths = np.linspace(deepest, 0.0, STEPS)
+    return next((float(d) for d in depths if gripper.gap(1.0, T_base_tool, d) >= wide), 0.0)
+
+
+def _openings(gripper: Gripper, T_base_tool: Array, depth: float) -> tuple[Array, Array]:
+    """Return postures (m,) from where the fingers touch to fully open, and the openings (m,) there."""
+    steps = np.linspace(0.0, 1.0, STEPS)
+    gaps = np.array([gripper.gap(t, T_base_tool, depth) for t in steps])
+    first = int(np.argmax(gaps > 0))
+    if gaps[-1] <= 0 or (np.diff(gaps[first:]) <= 0).any():
+        shown = (1e3 * gaps[[0, -1]]).round(1).tolist()
+        raise UrdfError(
+            gripper.motion.model.path, "hand: opening (mm)", shown, "fingers that part as their joints move"
+        )
+    if first:
+        touch = np.interp(0.0, gaps[first - 1 : first + 1], steps[first - 1 : first + 1])
+        return np.append(touch, steps[first:]), np.append(0.0, gaps[first:])
+    if gaps[0] < TABLE_ERROR:
+        gaps[0] = 0.0
+    return steps, gaps
+
+
+def _tables(gripper: Gripper, steps: Array, openings: Array) -> dict[str, JointTable]:
+    """Return how each joint follows the opening."""
+    motion = gripper.motion
+    values = np.array([motion.joint_values(t) for t in steps])
+    tables: dict[str, JointTable] = {}
+    for k, source in enumerate(motion.sources):
+        at = values[:, k]
+        error = TABLE_ERROR * np.ptp(at) / np.ptp(openings)
+        ratio = float(openings @ at / (openings @ openings))
+        if np.abs(ratio * openings - at).max() <= error:
+            tables[motion.model.joint_names[source]] = float(f"{ratio:.4g}")
+        else:
+            knots = simplify(np.column_stack([openings, at]), error)
+            table = tuple((_round(opening), round(float(value), 5)) for opening, value in knots)
+            tables[motion.model.joint_names[source]] = table
+    return tables
+
+
+def _tool_frame(model: RobotModel, T_base_tool: Array, base: str, tool: str | None) -> Frame:
+    """Return the tool frame on the given link, or else on the base."""
+    link = tool or base
+    links = model.forward(model.default_values())
+    pose = inverse(links[model.link_index(link)]) @ links[model.link_index(base)] @ T_base_tool
+    if np.allclose(pose, np.eye(4), atol=1e-3):
+        return Frame(link)
+    position = tuple((_round(v) + 0.0) for v in pose[:3, 3])
+    return Frame(link, (position[0], position[1], position[2]), tuple(quat_wxyz(pose).tolist()))
+
+
+def _round(length: float) -> float:
+    return round(float(length), 4)

@@ -1,0 +1,316 @@
+"""The kinematic tree of a URDF: joints, forward kinematics, limits, and the shapes of links."""
+
+from __future__ import annotations
+
+import io
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+import yourdfpy
+from numpy.typing import ArrayLike
+
+from symgrasp.errors import UrdfError, one_of
+from symgrasp.files import resolve
+from symgrasp.meshes import read_mesh
+from symgrasp.poses import Array, from_rotation, rotation_about
+from symgrasp.robot.assembly import Mount, assemble
+
+__all__ = ["Joint", "RobotModel"]
+
+LARGEST_LIMIT = 1e4
+"""No joint turns or slides further than this (rad or m)."""
+
+MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One joint of the tree.
+
+    Attributes:
+        origin: pose (4, 4) of the joint in its parent link at zero.
+        axis: unit axis (3,) in the joint frame.
+        lower: lower limit (rad or m); -inf for a continuous joint.
+        upper: upper limit.
+        source: index into the robot's joint values, or -1 for a fixed joint.
+        ratio: value of this joint for each unit of the source (1 unless it mimics).
+        offset: value of this joint where the source is zero.
+    """
+
+    name: str
+    kind: str
+    parent: int
+    child: int
+    origin: Array
+    axis: Array
+    lower: float
+    upper: float
+    source: int
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
+class RobotModel:
+    """The kinematic tree of a URDF and the shapes of its links.
+
+    Args:
+        path: the URDF file.
+        mounts: hands and frames that the file does not have.
+
+    Raises:
+        UrdfError: a file is missing, not a URDF, uses an unknown joint type, or refers to a
+            mesh that does not exist; or a mount does not fit.
+
+    Attributes:
+        path: the URDF file.
+        urdf: the URDF with all that is mounted, every mesh as an absolute path.
+        name: the robot's name in it.
+        link_names: all links; the first is the root.
+        joints: all joints, parents before children.
+        joint_names: the joints that take a value: neither fixed nor mimic.
+        lower: their lower limits (n,).
+        upper: their upper limits (n,).
+    """
+
+    def __init__(self, path: Path, mounts: Sequence[Mount] = ()) -> None:
+        self.path = Path(path)
+        self.urdf = assemble(self.path, mounts)
+        try:
+            urdf = yourdfpy.URDF.load(io.BytesIO(self.urdf), build_scene_graph=False, load_meshes=False)
+            self.name = str(urdf.robot.name)
+            root = _root_link(urdf)
+        except Exception as error:  # the parser raises whatever its XML library raises
+            raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
+        self._collisions = {link.name: list(link.collisions) for link in urdf.robot.links}
+        for link, shapes in self._collisions.items():
+            for shape in shapes:
+                _check_shape(self.path, link, shape)
+        self._hulls: dict[str, tuple[Array, ...]] = {}
+        self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
+        self.joints, self.link_names = self._build_tree(urdf, root)
+        by_name = {joint.name: joint for joint in self.joints}
+        self.lower = np.array([by_name[name].lower for name in self.joint_names])
+        self.upper = np.array([by_name[name].upper for name in self.joint_names])
+
+    def mesh_path(self, reference: str, link: str = "mesh") -> Path:
+        """Return the file behind a mesh reference of this URDF.
+
+        Raises:
+            UrdfError: there is no such file.
+        """
+        path = resolve(reference, self.path.parent)
+        if path is None:
+            raise UrdfError(self.path, f"link {link}", reference, "an existing mesh file")
+        return path
+
+    def _build_tree(self, urdf: yourdfpy.URDF, root: str) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
+        links = [root]
+        joints: list[Joint] = []
+        index = {name: i for i, name in enumerate(self.joint_names)}
+        remaining = list(urdf.robot.joints)
+        while remaining:
+            ready = [j for j in remaining if j.parent in links]
+            if not ready:
+                raise UrdfError(self.path, "joint", remaining[0].name, "a parent link that hangs on the root")
+            for j in ready:
+                if j.type != "fixed" and j.type not in MOVING:
+                    raise UrdfError(self.path, f"joint {j.name}", j.type, one_of((*MOVING, "fixed")))
+                links.append(j.child)
+                joints.append(self._joint(j, index, links))
+            remaining = [j for j in remaining if j not in ready]
+        return tuple(joints), tuple(links)
+
+    def _joint(self, j: yourdfpy.Joint, index: Mapping[str, int], links: list[str]) -> Joint:
+        origin = np.eye(4) if j.origin is None else np.asarray(j.origin, dtype=float)
+        axis = np.array([1.0, 0.0, 0.0] if j.axis is None else j.axis, dtype=float)
+        source, ratio, offset = -1, 1.0, 0.0
+        lower, upper = -np.inf, np.inf
+        if j.type in MOVING:
+            length = np.linalg.norm(axis)
+            if length < 1e-9:
+                raise UrdfError(self.path, f"joint {j.name}: axis", axis.tolist(), "a direction")
+            axis = axis / length
+            if j.mimic is not None:
+                if j.mimic.joint not in index:
+                    raise UrdfError(self.path, f"joint {j.name}: mimic", j.mimic.joint, one_of(index))
+                source = index[j.mimic.joint]
+                ratio = 1.0 if j.mimic.multiplier is None else float(j.mimic.multiplier)
+                offset = 0.0 if j.mimic.offset is None else float(j.mimic.offset)
+            else:
+                source = index[j.name]
+            if j.type != "continuous":
+                if j.limit is None or j.limit.lower is None or j.limit.upper is None:
+                    raise UrdfError(self.path, f"joint {j.name}: limit", None, "a lower and an upper limit")
+                lower, upper = float(j.limit.lower), float(j.limit.upper)
+                if not -LARGEST_LIMIT <= lower <= upper <= LARGEST_LIMIT:
+                    raise UrdfError(self.path, f"joint {j.name}: limit", [lower, upper], "lower <= upper")
+        return Joint(
+            j.name, j.type, links.index(j.parent), links.index(j.child), origin, axis, lower, upper,
+            source, ratio, offset,
+        )  # fmt: skip
+
+    @property
+    def root(self) -> str:
+        """The link that everything hangs on."""
+        return self.link_names[0]
+
+    def link_index(self, link: str) -> int:
+        """Return the index of a link.
+
+        Raises:
+            UrdfError: there is no such link.
+        """
+        if link not in self.link_names:
+            raise UrdfError(self.path, "link", link, one_of(self.link_names, link))
+        return self.link_names.index(link)
+
+    def default_values(self) -> Array:
+        """Return joint values (n,): zero, or the nearest limit where zero is outside."""
+        return np.clip(np.zeros(len(self.joint_names)), self.lower, self.upper)
+
+    def forward(self, q: ArrayLike) -> Array:
+        """Return the poses (..., links, 4, 4) of all links in the root frame.
+
+        Args:
+            q: values (..., n) of `joint_names`.
+        """
+        q = np.asarray(q, dtype=float)
+        poses = np.zeros((*q.shape[:-1], len(self.link_names), 4, 4))
+        poses[..., 0, :, :] = np.eye(4)
+        for joint in self.joints:
+            pose = poses[..., joint.parent, :, :] @ joint.origin
+            if joint.source >= 0:
+                pose = pose @ _motion(joint, joint.ratio * q[..., joint.source] + joint.offset)
+            poses[..., joint.child, :, :] = pose
+        return poses
+
+    def chain(self, link: str) -> list[Joint]:
+        """Return the joints from the root to a link."""
+        by_child = {joint.child: joint for joint in self.joints}
+        joints: list[Joint] = []
+        at = self.link_index(link)
+        while at:
+            joints.insert(0, by_child[at])
+            at = by_child[at].parent
+        return joints
+
+    def mount_links(self) -> frozenset[str]:
+        """Return the links that no joint moves."""
+        return frozenset(name for name in self.link_names if not any(j.source >= 0 for j in self.chain(name)))
+
+    def colliding_links(self) -> tuple[str, ...]:
+        """Return the links that have a collision shape."""
+        return tuple(filter(self.has_shape, self.link_names))
+
+    def neighbours(self) -> frozenset[frozenset[str]]:
+        """Return the pairs of links with shapes that a joint, or only shapeless links, connect."""
+        solid = set(self.colliding_links())
+        anchor: dict[str, str | None] = {self.root: self.root if self.root in solid else None}
+        pairs = set()
+        for joint in self.joints:
+            parent, child = self.link_names[joint.parent], self.link_names[joint.child]
+            above = anchor[parent]
+            if child in solid and above is not None:
+                pairs.add(frozenset((above, child)))
+            anchor[child] = child if child in solid else above
+        return frozenset(pairs)
+
+    def hulls(self, link: str) -> tuple[Array, ...]:
+        """Return the vertices (n, 3) of the convex hull of each collision shape, in the link frame."""
+        if link not in self._hulls:
+            hulls = []
+            for shape in self._collisions[link]:
+                origin = np.eye(4) if shape.origin is None else np.asarray(shape.origin, dtype=float)
+                hulls.append(_hull(shape, self.mesh_path, link) @ origin[:3, :3].T + origin[:3, 3])
+            self._hulls[link] = tuple(hulls)
+        return self._hulls[link]
+
+    def has_shape(self, link: str) -> bool:
+        """Whether a link has a collision shape."""
+        return bool(self._collisions[link])
+
+    def __eq__(self, other: object) -> bool:
+        """Models of the same URDF are equal, so what is found out about one serves the other."""
+        return isinstance(other, RobotModel) and self.urdf == other.urdf
+
+    def __hash__(self) -> int:
+        return hash(self.urdf)
+
+    def collision_urdf(self) -> bytes:
+        """Return the URDF without what is only seen; every link has a mass, or PyBullet complains."""
+        root = ET.fromstring(self.urdf)
+        for link in root.iter("link"):
+            for visual in link.findall("visual"):
+                link.remove(visual)
+            if link.find("inertial") is None:
+                inertial = ET.SubElement(link, "inertial")
+                ET.SubElement(inertial, "mass", value="1")
+                moments = {"ixx": "1", "ixy": "0", "ixz": "0", "iyy": "1", "iyz": "0", "izz": "1"}
+                ET.SubElement(inertial, "inertia", moments)
+        return ET.tostring(root)
+
+
+def _check_shape(path: Path, link: str, shape: yourdfpy.Collision) -> None:
+    """Check the sizes of a collision shape; a mesh may be mirrored by a negative scale.
+
+    Raises:
+        UrdfError: a size is not a positive number, or a scale is zero or none.
+    """
+    geometry = shape.geometry
+    if geometry is None:
+        raise UrdfError(path, f"link {link}: collision", None, "a geometry")
+    sizes: list[float] = []
+    if geometry.box is not None:
+        sizes = list(np.ravel(geometry.box.size))
+    elif geometry.cylinder is not None:
+        sizes = [geometry.cylinder.radius, geometry.cylinder.length]
+    elif geometry.sphere is not None:
+        sizes = [geometry.sphere.radius]
+    elif geometry.mesh is not None and geometry.mesh.scale is not None:
+        sizes = list(np.abs(np.ravel(geometry.mesh.scale)))
+    if not all(0 < size < LARGEST_LIMIT for size in sizes):
+        shown = [float(size) for size in sizes]
+        raise UrdfError(path, f"link {link}: collision", shown, "sizes that are positive numbers")
+
+
+def _root_link(urdf: yourdfpy.URDF) -> str:
+    children = {joint.child for joint in urdf.robot.joints}
+    roots = [link.name for link in urdf.robot.links if link.name not in children]
+    if len(roots) != 1:
+        raise ValueError(f"{len(roots)} root links {roots}")
+    return roots[0]
+
+
+def _motion(joint: Joint, value: Array) -> Array:
+    if joint.kind == "prismatic":
+        return from_rotation(np.eye(3), value[..., None] * joint.axis)
+    return from_rotation(rotation_about(joint.axis, value))
+
+
+def _hull(shape: yourdfpy.Collision, find: Callable[[str, str], Path], link: str) -> Array:
+    geometry = shape.geometry
+    assert geometry is not None  # the parser requires it
+    if geometry.box is not None:
+        mesh = trimesh.creation.box(extents=geometry.box.size)
+    elif geometry.cylinder is not None:
+        # Circumscribed, so that the hull contains the round shape.
+        sides = 48
+        mesh = trimesh.creation.cylinder(
+            radius=geometry.cylinder.radius / np.cos(np.pi / sides),
+            height=geometry.cylinder.length,
+            sections=sides,
+        )
+    elif geometry.sphere is not None:
+        ball = trimesh.creation.icosphere(subdivisions=3)
+        inradius = np.einsum("ij,ij->i", ball.face_normals, ball.triangles_center).min()
+        mesh = ball.apply_scale(geometry.sphere.radius / inradius)
+    else:
+        assert geometry.mesh is not None  # the parser knows no other shape
+        mesh = read_mesh(find(geometry.mesh.filename, link), f"link {link}")
+        scale = geometry.mesh.scale
+        mesh.apply_scale(1.0 if scale is None else scale)
+    return np.asarray(mesh.convex_hull.vertices)

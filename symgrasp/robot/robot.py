@@ -1,0 +1,177 @@
+"""Robots in the world, and their arms: the chains of joints that grasp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symgrasp.errors import InputError, UrdfError, one_of
+from symgrasp.object.manifold import Manifold
+from symgrasp.poses import Array, from_rotation, inverse, rotation_about
+from symgrasp.robot.hand import Hand
+from symgrasp.robot.handprint import Handprint, handprint
+from symgrasp.robot.model import Joint, RobotModel
+
+__all__ = ["Arm", "Robot"]
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot placed in the world.
+
+    Attributes:
+        name: its name in the scene.
+        model: its URDF.
+        T_world_base: pose (4, 4) of the root link.
+        home: parked joint values (n,) of ``model.joint_names``.
+    """
+
+    name: str
+    model: RobotModel
+    T_world_base: Array
+    home: Array
+
+
+class Arm:
+    """The chain of joints from a robot's base to a tool with a hand: what grasps.
+
+    All other joints of the robot rest at home, prismatic ones and those that another arm of the
+    robot shares among them. Kinematics is a product of exponentials read off the URDF:
+    ``T_base_tool(q) = Trans(P0)·Rot(H0, q0)·Trans(P1)· … ·Rot(Hn-1, qn-1)·Trans(Pn)·R0``.
+
+    Args:
+        name: its name in the scene.
+        robot: whose arm it is.
+        tool: the tool link.
+        hand: the hand at the tool.
+        shared: joints of the chain that belong to another arm as well.
+
+    Raises:
+        UrdfError: the tool, a hand link or a hand joint is not in the URDF, or the chain has
+            neither 6 nor 7 revolute joints.
+
+    Attributes:
+        joint_names: its n joints, from base to tool.
+        lower: joint limits (n,), -inf for a continuous joint.
+        upper: joint limits (n,), inf for a continuous joint.
+        H: unit axes (n, 3) in the base frame at zero.
+        P: offsets (n + 1, 3) between points on successive axes, at zero.
+        R0: orientation (3, 3) of the tool at zero.
+    """
+
+    def __init__(
+        self, name: str, robot: Robot, tool: str, hand: Hand, shared: frozenset[str] = frozenset()
+    ) -> None:
+        model = robot.model
+        if tool not in model.link_names:
+            raise UrdfError(model.path, "tool", tool, one_of(model.link_names, tool))
+        for link in (*hand.links, *hand.touch_links):
+            if link not in model.link_names:
+                raise UrdfError(model.path, f"hand {hand.name}: link", link, one_of(model.link_names, link))
+        for joint in hand.joints:
+            if joint not in model.joint_names:
+                raise UrdfError(
+                    model.path, f"hand {hand.name}: joint", joint, one_of(model.joint_names, joint)
+                )
+        self.name, self.robot, self.tool, self.hand = name, robot, tool, hand
+        joints = [
+            j
+            for j in model.chain(tool)
+            if j.source >= 0 and j.kind != "prismatic" and j.name not in shared and j.name not in hand.joints
+        ]
+        if len(joints) not in (6, 7):
+            names = [j.name for j in joints]
+            raise UrdfError(model.path, f"arm {name}", names, f"6 or 7 revolute joints, not {len(joints)}")
+        self.joint_names = tuple(j.name for j in joints)
+        self.indices = np.array([model.joint_names.index(n) for n in self.joint_names])
+        self.lower, self.upper = model.lower[self.indices], model.upper[self.indices]
+        self.H, self.P, self.R0 = self._screws(joints)
+
+    def _screws(self, joints: list[Joint]) -> tuple[Array, Array, Array]:
+        q = self.robot.home.copy()
+        q[self.indices] = 0.0
+        links = self.robot.model.forward(q)
+        frames = [links[j.child] for j in joints]
+        points = [np.zeros(3), *(frame[:3, 3] for frame in frames), links[self._tool_index][:3, 3]]
+        H = np.array([frame[:3, :3] @ joint.axis for frame, joint in zip(frames, joints, strict=True)])
+        return H, np.diff(points, axis=0), links[self._tool_index][:3, :3]
+
+    @cached_property
+    def _tool_index(self) -> int:
+        return self.robot.model.link_index(self.tool)
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    @property
+    def home(self) -> Array:
+        """Parked joint values (n,) of the arm."""
+        return self.robot.home[self.indices]
+
+    def tool_pose(self, q: ArrayLike) -> Array:
+        """Return ``T_base_tool`` (..., 4, 4) for joint values (..., n)."""
+        q = np.asarray(q, dtype=float)
+        rotation = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
+        position = np.broadcast_to(self.P[0], (*q.shape[:-1], 3))
+        for k, axis in enumerate(self.H):
+            rotation = rotation @ rotation_about(axis, q[..., k])
+            position = position + rotation @ self.P[k + 1]
+        return from_rotation(rotation @ self.R0, position)
+
+    def world_tool_pose(self, q: ArrayLike) -> Array:
+        """Return ``T_world_tool`` (..., 4, 4) for joint values (..., n)."""
+        return self.robot.T_world_base @ self.tool_pose(q)
+
+    def within_limits(self, q: ArrayLike) -> tuple[Array, np.ndarray]:
+        """Take the full turns that bring joint values (..., n) inside the limits, if any do.
+
+        The turn nearest to the middle of the range fits whenever any turn does.
+
+        Returns:
+            The turned joint values (..., n), and whether all of them are inside (...).
+        """
+        q = np.asarray(q, dtype=float)
+        bounded = np.isfinite(self.lower) & np.isfinite(self.upper)
+        middle = np.where(
+            bounded, 0.5 * (np.where(bounded, self.lower, 0) + np.where(bounded, self.upper, 0)), 0
+        )
+        q = q + 2 * np.pi * np.round((middle - q) / (2 * np.pi))
+        return q, np.all((q >= self.lower) & (q <= self.upper), axis=-1)
+
+    def robot_values(self, q: ArrayLike, opening: float | None = None) -> Array:
+        """Return values (N,) of all the robot's joints: this arm at ``q`` (n,), the rest at home.
+
+        Args:
+            q: joint values of the arm.
+            opening: opening (m) of the hand; None leaves the hand at home.
+        """
+        values = self.robot.home.copy()
+        values[self.indices] = q
+        if opening is not None:
+            for joint, value in self.hand.joint_values(opening).items():
+                values[self.robot.model.joint_names.index(joint)] = value
+        return values
+
+    def hand_bodies(self, opening: float) -> list[Array]:
+        """Return the vertices (n, 3) of the hand's convex bodies in the tool frame at an opening (m)."""
+        model = self.robot.model
+        links = model.forward(self.robot_values(self.home, opening))
+        T_tool_base = inverse(links[self._tool_index])
+        bodies = []
+        for link in self.hand.links:
+            pose = T_tool_base @ links[model.link_index(link)]
+            bodies += [points @ pose[:3, :3].T + pose[:3, 3] for points in model.hulls(link)]
+        if not bodies:
+            raise InputError(model.path, f"hand {self.hand.name}", list(self.hand.links), "links with bodies")
+        return bodies
+
+    def handprint(self, manifold: Manifold, row: int, roll: int) -> Handprint:
+        """Return the print of the hand that grasps a row at column 0, open as it is at that height."""
+        radius = float(manifold.profile.radius(manifold.h[row]))
+        bodies = self.hand_bodies(self.hand.opening(radius))
+        return handprint(bodies, manifold, row, roll, self.hand.standoff(radius))

@@ -1,0 +1,1 @@
+"""Scenes: the file format, and robots, object, obstacles and tasks built from it."""

@@ -1,0 +1,258 @@
+"""From the content of a scene file to robots, arms, obstacles and tasks: every name and file resolved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from symgrasp.errors import InputError, SceneError, one_of
+from symgrasp.files import resolve
+from symgrasp.object.library import library_objects, load_object
+from symgrasp.object.profile import Profile
+from symgrasp.poses import Array
+from symgrasp.robot.assembly import Mount
+from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.model import RobotModel
+from symgrasp.robot.robot import Arm, Robot
+from symgrasp.scene.format import (
+    SHAPES,
+    ArmFile,
+    HandFile,
+    ObjectFile,
+    ObstacleFile,
+    RobotFile,
+    SceneFile,
+    TaskFile,
+)
+from symgrasp.scene.parts import Obstacle, SceneParts, Task
+
+__all__ = ["SceneBuilder"]
+
+
+class SceneBuilder:
+    """Resolves the names and files of a scene file."""
+
+    def __init__(self, file: SceneFile, source: str, folder: Path) -> None:
+        self.file, self.source, self.folder = file, source, folder
+        self._models: dict[tuple[Path, tuple[Mount, ...]], RobotModel] = {}
+
+    def build(self) -> SceneParts:
+        """Check everything that the format alone cannot, and load robots and object.
+
+        Raises:
+            SceneError, UrdfError, ProfileError, MeshError: something is missing or unusable.
+        """
+        profile = self._profile(self.file.object)
+        self.file = file = self._absolute(profile)
+        self._unique("robots", (r.name for r in file.robots))
+        self._unique("obstacles", (o.name for o in file.obstacles))
+        self._unique("tasks", (t.name for t in file.tasks))
+        bodies = [r.name for r in file.robots] + [o.name for o in file.obstacles] + [file.object.name]
+        self._unique("robots, obstacles and object", bodies)
+        robots: dict[str, Robot] = {}
+        arms: dict[str, Arm] = {}
+        for i, entry in enumerate(file.robots):
+            robot, own = self._robot(i, entry)
+            robots[robot.name] = robot
+            self._unique("arms", [*arms, *(arm.name for arm in own)])
+            arms |= {arm.name: arm for arm in own}
+        return SceneParts(
+            file,
+            robots,
+            arms,
+            profile,
+            tuple(self._obstacle(i, o) for i, o in enumerate(file.obstacles)),
+            {t.name: self._task(i, t, arms) for i, t in enumerate(file.tasks)},
+        )
+
+    def _unique(self, field: str, names: Iterable[str]) -> None:
+        seen: set[str] = set()
+        for name in names:
+            if name in seen:
+                raise SceneError(self.source, f"{field}: name", name, "a name that is not used twice")
+            seen.add(name)
+
+    def _profile(self, entry: ObjectFile) -> Profile:
+        if entry.profile is not None:
+            return Profile(entry.profile, self.source + ": object")
+        if entry.library is not None:
+            library = library_objects()
+            if entry.library not in library:
+                expected = one_of(library, entry.library)
+                raise SceneError(self.source, "object.library", entry.library, expected)
+            return load_object(entry.library)[1]
+        path = self._path(self._reference("object.mesh", entry.mesh or "", "mesh"))
+        return Profile.from_mesh(path, entry.scale)
+
+    def _absolute(self, profile: Profile) -> SceneFile:
+        """Check every file reference; make the relative ones absolute so the content can travel.
+
+        The object's profile is written out, whatever it came from.
+        """
+        robots = tuple(self._absolute_robot(f"robots[{i}]", r) for i, r in enumerate(self.file.robots))
+        obstacles = []
+        for i, o in enumerate(self.file.obstacles):
+            kind = "mesh" if o.mesh is not None else "urdf"
+            reference = getattr(o, kind)
+            if reference is not None:
+                reference = self._reference(f"obstacles[{i}].{kind}", reference, kind)
+                o = o.model_copy(update={kind: reference})
+            obstacles.append(o)
+        thing = ObjectFile(name=self.file.object.name, profile=[tuple(p) for p in profile.points.tolist()])
+        update = {"robots": robots, "obstacles": tuple(obstacles), "object": thing}
+        return self.file.model_copy(update=update)
+
+    def _absolute_robot(self, field: str, robot: RobotFile) -> RobotFile:
+        update: dict[str, Any] = {"urdf": self._reference(f"{field}.urdf", robot.urdf, "URDF")}
+        if robot.hand is not None:
+            update["hand"] = self._absolute_hand(f"{field}.hand", robot.hand)
+        if robot.arms is not None:
+            hands = [self._absolute_hand(f"{field}.arms[{k}].hand", a.hand) for k, a in enumerate(robot.arms)]
+            arms = zip(robot.arms, hands, strict=True)
+            update["arms"] = tuple(a.model_copy(update={"hand": hand}) for a, hand in arms)
+        return robot.model_copy(update=update)
+
+    def _absolute_hand(self, field: str, hand: str | HandFile) -> str | HandFile:
+        if isinstance(hand, str) or hand.urdf is None:
+            return hand
+        return hand.model_copy(update={"urdf": self._reference(f"{field}.urdf", hand.urdf, "URDF")})
+
+    def _reference(self, field: str, reference: str, kind: str) -> str:
+        path = resolve(reference, self.folder)
+        if path is None:
+            expected = "package://<python package>/<path>, or a path relative to the scene"
+            raise SceneError(self.source, field, reference, f"an existing {kind} file: {expected}")
+        return reference if reference.startswith("package://") else str(path.resolve())
+
+    def _path(self, reference: str) -> Path:
+        path = resolve(reference, self.folder)
+        assert path is not None  # _absolute has checked it
+        return path
+
+    def _robot(self, i: int, entry: RobotFile) -> tuple[Robot, list[Arm]]:
+        field = f"robots[{i}]"
+        fields = [field] if entry.arms is None else [f"{field}.arms[{k}]" for k in range(len(entry.arms))]
+        files = entry.arm_files()
+        hands = [self._hand(f, a) for f, a in zip(fields, files, strict=True)]
+        mounts, tools = [], []
+        for f, a, hand in zip(fields, files, hands, strict=True):
+            mounts += self._mount(f, a, hand, entry)
+            tools.append(self._tool(f, a, hand))
+            if a.tool is None and hand.tool is not None and not hand.tool.is_link:
+                mounts.append(Mount(hand.tool, None, tools[-1]))
+        model = self._model(self._path(entry.urdf), tuple(mounts))
+        chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
+        shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
+        home = self._home(i, entry, model, chains, shared, hands)
+        robot = Robot(entry.name, model, entry.base.matrix(), home)
+        parts = zip(files, tools, hands, strict=True)
+        return robot, [Arm(a.name, robot, tool, hand, shared) for a, tool, hand in parts]
+
+    def _model(self, path: Path, mounts: tuple[Mount, ...]) -> RobotModel:
+        if (path, mounts) not in self._models:
+            self._models[path, mounts] = RobotModel(path, mounts)
+        return self._models[path, mounts]
+
+    def _mount(self, field: str, arm: ArmFile, hand: Hand, robot: RobotFile) -> list[Mount]:
+        """Return what puts the arm's hand on the robot: nothing where the robot comes with it."""
+        if arm.mount is None:
+            return []
+        if hand.urdf is None:
+            raise SceneError(self.source, f"{field}.mount", hand.name, "a hand with a urdf of its own")
+        bare = self._model(self._path(robot.urdf), ())
+        if arm.mount.link not in bare.link_names:
+            expected = f"a link of {bare.path.name}: " + one_of(bare.link_names, arm.mount.link)
+            raise SceneError(self.source, f"{field}.mount.link", arm.mount.link, expected)
+        return [Mount(arm.mount.frame(), self._path(hand.urdf), arm.mount.prefix)]
+
+    def _tool(self, field: str, arm: ArmFile, hand: Hand) -> str:
+        """Return the name of the link that is the arm's tool frame."""
+        if arm.tool is not None:
+            return arm.tool
+        if hand.tool is None:
+            raise SceneError(
+                self.source, f"{field}.tool", None, f"a link; hand {hand.name} names none itself"
+            )
+        return hand.tool.link if hand.tool.is_link else f"{arm.name}_tool"
+
+    def _chain(self, field: str, tool: str, model: RobotModel) -> list[str]:
+        if tool not in model.link_names:
+            expected = f"a link of {model.path.name}: " + one_of(model.link_names, tool)
+            raise SceneError(self.source, f"{field}.tool", tool, expected)
+        return [j.name for j in model.chain(tool) if j.source >= 0 and j.kind != "prismatic"]
+
+    def _hand(self, field: str, arm: ArmFile) -> Hand:
+        if isinstance(arm.hand, str):
+            if arm.hand not in HANDS:
+                raise SceneError(self.source, f"{field}.hand", arm.hand, one_of(HANDS, arm.hand))
+            hand = HANDS[arm.hand]
+        else:
+            tool = arm.hand.tool
+            fields = {**dict(arm.hand), "tool": tool and tool.frame()}
+            try:
+                hand = Hand(**fields)
+            except InputError as error:
+                where = f"{field}.hand.{error.field}"
+                raise SceneError(self.source, where, error.value, error.expected) from None
+        return hand.prefixed(arm.mount.prefix) if arm.mount else hand
+
+    def _home(
+        self,
+        i: int,
+        entry: RobotFile,
+        model: RobotModel,
+        chains: list[list[str]],
+        shared: frozenset[str],
+        hands: list[Hand],
+    ) -> Array:
+        field = f"robots[{i}].home"
+        values = model.default_values()
+        for hand in hands:  # parked hands stand open, unless the scene says otherwise
+            for name, value in hand.joint_values(hand.max_opening).items():
+                if name in model.joint_names:
+                    values[model.joint_names.index(name)] = value
+        order = [n for chain in chains for n in chain if n not in shared]
+        given: Mapping[str, float]
+        if entry.home is None:
+            given = {}
+        elif isinstance(entry.home, dict):
+            given = entry.home
+        elif len(entry.home) != len(order):
+            raise SceneError(
+                self.source, field, list(entry.home), f"{len(order)} values, for " + ", ".join(order)
+            )
+        else:
+            given = dict(zip(order, entry.home, strict=True))
+        for name, value in given.items():
+            if name not in model.joint_names:
+                raise SceneError(self.source, field, name, one_of(model.joint_names, name))
+            k = model.joint_names.index(name)
+            if not model.lower[k] <= value <= model.upper[k]:
+                limits = f"{name} within [{model.lower[k]:g}, {model.upper[k]:g}]"
+                raise SceneError(self.source, field, value, limits)
+            values[k] = value
+        values.setflags(write=False)
+        return values
+
+    def _obstacle(self, i: int, o: ObstacleFile) -> Obstacle:
+        kind = next(k for k in SHAPES if getattr(o, k) is not None)
+        size: tuple[float, ...] = ()
+        path = None
+        if o.box is not None:
+            size = o.box
+        elif o.cylinder is not None:
+            size = (o.cylinder.radius, o.cylinder.height)
+        elif o.sphere is not None:
+            size = (o.sphere.radius,)
+        else:
+            path = self._path(o.mesh or o.urdf or "")
+        return Obstacle(o.name, kind, size, path, o.pose.matrix())
+
+    def _task(self, i: int, t: TaskFile, arms: Mapping[str, Arm]) -> Task:
+        names = t.arms or (next(iter(arms)),)
+        for name in names:
+            if name not in arms:
+                raise SceneError(self.source, f"tasks[{i}].arms", name, one_of(arms, name))
+        self._unique(f"tasks[{i}].arms", names)
+        return Task(t.name, names, t.pose.matrix())

@@ -1,0 +1,263 @@
+"""The YAML format of scenes. The classes mirror the file and produce its JSON Schema."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
+
+from symgrasp.poses import Array, from_position_quat, from_position_rpy, quat_wxyz
+from symgrasp.robot.assembly import Frame
+
+__all__ = [
+    "SHAPES",
+    "ArmFile",
+    "HandFile",
+    "MapSettings",
+    "ObstacleFile",
+    "PoseFile",
+    "RobotFile",
+    "SceneFile",
+    "TaskFile",
+    "describe",
+    "scene_schema",
+]
+
+LARGEST = 1e4
+"""No number in a scene is larger: metres, degrees and factors stay far below."""
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
+Name = Annotated[str, Field(min_length=1, max_length=100)]
+Vector = tuple[Number, Number, Number]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PoseFile(_Strict):
+    """A pose: position (m) and either roll-pitch-yaw (degrees) or a wxyz quaternion."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    rpy_deg: Vector | None = None
+    quat_wxyz: tuple[Number, Number, Number, Number] | None = None
+
+    @model_validator(mode="after")
+    def _one_rotation(self) -> PoseFile:
+        if self.rpy_deg is not None and self.quat_wxyz is not None:
+            raise ValueError("either rpy_deg or quat_wxyz, not both")
+        if self.quat_wxyz is not None and np.linalg.norm(self.quat_wxyz) < 1e-6:
+            raise ValueError("a quaternion with a length above zero")
+        return self
+
+    def matrix(self) -> Array:
+        """Return the pose as a matrix (4, 4)."""
+        if self.quat_wxyz is not None:
+            return from_position_quat(self.position, self.quat_wxyz)
+        return from_position_rpy(self.position, np.deg2rad(self.rpy_deg or (0.0, 0.0, 0.0)))
+
+    @staticmethod
+    def of(pose: ArrayLike) -> PoseFile:
+        """Write a matrix (4, 4) as position and quaternion."""
+        pose = np.asarray(pose, dtype=float)
+        return PoseFile(position=tuple(pose[:3, 3].tolist()), quat_wxyz=tuple(quat_wxyz(pose).tolist()))
+
+
+class FrameFile(_Strict):
+    """A frame fixed to a link."""
+
+    link: str
+    pose: PoseFile = PoseFile()
+
+    def frame(self) -> Frame:
+        """Return it as the library has it."""
+        pose = self.pose.matrix()
+        return Frame(self.link, tuple(pose[:3, 3].tolist()), tuple(quat_wxyz(pose).tolist()))
+
+
+class HandFile(_Strict):
+    """A hand described inline; the fields of `symgrasp.robot.hand.Hand`."""
+
+    name: Name
+    links: Annotated[tuple[str, ...], Field(min_length=1)]
+    touch_links: tuple[str, ...]
+    joints: dict[str, Number | list[tuple[NotNegative, Number]]]
+    min_opening: NotNegative
+    max_opening: Positive
+    finger_depth: NotNegative
+    pad_width: NotNegative
+    clearance: NotNegative = 0.005
+    radius_tolerance: NotNegative = 0.003
+    palm_width: NotNegative = 0.0
+    palm_depth: NotNegative = 0.0
+    tool: FrameFile | None = None
+    urdf: str | None = None
+
+
+NamedOrInline = Annotated[
+    Annotated[str, Tag("named hand")] | Annotated[HandFile, Tag("inline hand")],
+    Discriminator(lambda hand: "named hand" if isinstance(hand, str) else "inline hand"),
+]
+
+
+class MountFile(FrameFile):
+    """Where a hand with a URDF of its own is fixed on the robot."""
+
+    prefix: str = ""
+    """put before the names of the hand's links and joints, to tell two equal hands apart"""
+
+
+class ArmFile(_Strict):
+    """An arm of a robot that has several; the tool is the hand's own unless given."""
+
+    name: Name
+    tool: str | None = None
+    hand: NamedOrInline
+    mount: MountFile | None = None
+
+
+class RobotFile(_Strict):
+    """A robot: one arm (hand, and tool where the hand has none) or several (arms)."""
+
+    name: Name
+    urdf: str
+    base: PoseFile = PoseFile()
+    tool: str | None = None
+    hand: NamedOrInline | None = None
+    mount: MountFile | None = None
+    arms: Annotated[tuple[ArmFile, ...], Field(min_length=1)] | None = None
+    home: tuple[Number, ...] | dict[str, Number] | None = None
+
+    @model_validator(mode="after")
+    def _tool_or_arms(self) -> RobotFile:
+        single = self.hand is not None
+        if single == (self.arms is not None) or (not single and (self.tool or self.mount)):
+            raise ValueError("either tool and hand, or arms")
+        return self
+
+    def arm_files(self) -> tuple[ArmFile, ...]:
+        """Return the arms; a single arm bears the robot's name."""
+        if self.arms is not None:
+            return self.arms
+        assert self.hand is not None
+        return (ArmFile(name=self.name, tool=self.tool, hand=self.hand, mount=self.mount),)
+
+
+class ObjectFile(_Strict):
+    """The object of revolution: exactly one of a profile, a name of the library, and a mesh.
+
+    A profile is a list of knots [height, radius] in metres, bottom to top. A mesh is measured;
+    ``scale`` is metres in one of its units.
+    """
+
+    name: Name
+    profile: list[tuple[Number, Number]] | None = None
+    library: str | None = None
+    mesh: str | None = None
+    scale: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _one_source(self) -> ObjectFile:
+        if sum(source is not None for source in (self.profile, self.library, self.mesh)) != 1:
+            raise ValueError("exactly one of profile, library, mesh")
+        return self
+
+
+class CylinderFile(_Strict):
+    """A cylinder along z, centred."""
+
+    radius: Positive
+    height: Positive
+
+
+class SphereFile(_Strict):
+    """A ball."""
+
+    radius: Positive
+
+
+class ObstacleFile(_Strict):
+    """A fixed body: exactly one shape, at a pose. Boxes give full sizes and are centred."""
+
+    name: Name
+    box: tuple[Positive, Positive, Positive] | None = None
+    cylinder: CylinderFile | None = None
+    sphere: SphereFile | None = None
+    mesh: str | None = None
+    urdf: str | None = None
+    pose: PoseFile = PoseFile()
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> ObstacleFile:
+        if sum(getattr(self, kind) is not None for kind in SHAPES) != 1:
+            raise ValueError("exactly one of " + ", ".join(SHAPES))
+        return self
+
+
+SHAPES = ("box", "cylinder", "sphere", "mesh", "urdf")
+
+
+class TaskFile(_Strict):
+    """A pose of the object; its rotation about its own axis is free."""
+
+    name: Name
+    arms: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    pose: PoseFile
+
+
+class MapSettings(_Strict):
+    """How finely maps are computed."""
+
+    heights: Annotated[int, Field(ge=1, le=1024)] = 48
+    angles: Annotated[int, Field(ge=1, le=1024)] = 96
+    redundancy: Annotated[int, Field(ge=1, le=1024)] = 32
+    approach: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
+    """length (m) of the straight radial retreat that must be free as well"""
+    margin: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
+    """distance (m) to keep from obstacles and other robots"""
+
+
+class SceneFile(_Strict):
+    """A scene file, version 1."""
+
+    schema_version: Literal[1]
+    name: Name
+    description: str = ""
+    robots: Annotated[tuple[RobotFile, ...], Field(min_length=1)]
+    object: ObjectFile
+    obstacles: tuple[ObstacleFile, ...] = ()
+    tasks: Annotated[tuple[TaskFile, ...], Field(min_length=1)]
+    map: MapSettings = MapSettings()
+
+
+def scene_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scene files."""
+    return SceneFile.model_json_schema()
+
+
+def describe(error: ValidationError, content: Any) -> tuple[str, object, str]:
+    """Turn the first problem of a validation into field, value and what was expected."""
+    first = error.errors(include_url=False)[0]
+    # Union members add their class name to the location; a path into the content has none.
+    path: list[str | int] = []
+    at = content
+    for step in first["loc"]:
+        try:
+            at = at[step]
+        except (KeyError, IndexError, TypeError):
+            if not (first["type"] == "missing" and step == first["loc"][-1]):
+                continue
+        path.append(step)
+    field = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path).lstrip(".")
+    if first["type"] == "extra_forbidden":
+        return field, first["input"], "a key of the file format; check its spelling"
+    if first["type"] == "missing":
+        return field, None, "a value; this key is required"
+    if first["type"] == "too_short":
+        return field, first["input"], f"at least {first.get('ctx', {})['min_length']} of them"
+    expected = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    return field or "file", first["input"], expected

@@ -1,0 +1,62 @@
+"""What a scene is made of besides robots: obstacles and tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from symgrasp.object.profile import Profile
+from symgrasp.poses import Array
+from symgrasp.robot.robot import Arm, Robot
+from symgrasp.scene.format import (
+    SceneFile,
+)
+
+__all__ = ["Obstacle", "SceneParts", "Task"]
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """A fixed body.
+
+    Attributes:
+        name: its name.
+        kind: box, cylinder, sphere, mesh or urdf.
+        size: box: full sizes (3,); cylinder: radius, height; sphere: radius; otherwise empty.
+        path: the mesh or URDF file, otherwise None.
+        T_world_obstacle: its pose (4, 4).
+    """
+
+    name: str
+    kind: str
+    size: tuple[float, ...]
+    path: Path | None
+    T_world_obstacle: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A pose of the object, and the arms that hold it there.
+
+    Attributes:
+        name: its name.
+        arms: names of the arms.
+        T_world_object: object pose (4, 4); turning it about its own z changes nothing.
+    """
+
+    name: str
+    arms: tuple[str, ...]
+    T_world_object: Array
+
+
+class SceneParts(NamedTuple):
+    """What a scene is made of; see `symgrasp.scene.scene.Scene`."""
+
+    file: SceneFile
+    robots: Mapping[str, Robot]
+    arms: Mapping[str, Arm]
+    profile: Profile
+    obstacles: tuple[Obstacle, ...]
+    tasks: Mapping[str, Task]

@@ -1,0 +1,231 @@
+"""Scenes: robots, an object of revolution, obstacles and tasks; validated, immutable, every name resolved."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from symgrasp.errors import SceneError, one_of
+from symgrasp.files import parse_yaml
+from symgrasp.object.manifold import Manifold
+from symgrasp.object.profile import Profile
+from symgrasp.robot.robot import Arm, Robot
+from symgrasp.scene.building import SceneBuilder
+from symgrasp.scene.format import MapSettings, ObjectFile, PoseFile, SceneFile, TaskFile, describe
+from symgrasp.scene.parts import Obstacle, Task
+from symgrasp.scene.shipped import shipped_scenes
+
+__all__ = ["Scene"]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Robots, an object of revolution, obstacles and tasks.
+
+    Attributes:
+        source: the file it came from, for messages.
+        file: the validated content with every file reference made absolute.
+        robots: name → robot.
+        arms: name → arm, over all robots.
+        profile: the object's r(h).
+        obstacles: the fixed bodies.
+        tasks: name → task, in order.
+    """
+
+    source: str
+    file: SceneFile
+    robots: Mapping[str, Robot]
+    arms: Mapping[str, Arm]
+    profile: Profile
+    obstacles: tuple[Obstacle, ...]
+    tasks: Mapping[str, Task]
+
+    @staticmethod
+    def load(scene: str | Path) -> Scene:
+        """Load a shipped scene by name, or any scene by path.
+
+        Raises:
+            SceneError: no such scene, not YAML, or a field is wrong.
+            UrdfError: a robot's URDF is unusable.
+            ProfileError: the object's profile is unusable.
+        """
+        path = Path(scene)
+        if path.suffix not in (".yaml", ".yml"):
+            shipped = shipped_scenes()
+            if str(scene) not in shipped:
+                raise SceneError("scene", "name", str(scene), one_of(shipped, scene) + ", or a .yaml file")
+            path = shipped[str(scene)]
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, ValueError) as error:
+            raise SceneError(path, "file", str(path), f"a readable text file ({error})") from error
+        return Scene.parse(text, source=str(path), folder=path.parent)
+
+    @staticmethod
+    def parse(text: str, source: str = "scene", folder: Path = Path()) -> Scene:
+        """Build a scene from YAML text; relative files are sought in ``folder``.
+
+        Raises:
+            SceneError, UrdfError, ProfileError: as `load`.
+        """
+        try:
+            content = parse_yaml(text)
+        except ValueError as error:
+            raise SceneError(source, "file", str(error), "a YAML document") from error
+        if not isinstance(content, dict):
+            raise SceneError(source, "file", content, "a YAML mapping with schema_version, name, robots, …")
+        return Scene.from_content(content, source, folder)
+
+    @staticmethod
+    def from_content(content: Mapping[str, Any], source: str = "scene", folder: Path = Path()) -> Scene:
+        """Build a scene from the content of a file.
+
+        Raises:
+            SceneError, UrdfError, ProfileError: as `load`.
+        """
+        try:
+            file = SceneFile.model_validate(content)
+        except ValidationError as error:
+            raise SceneError(source, *describe(error, content)) from None
+        return Scene(source, *SceneBuilder(file, source, folder).build())
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The full content as plain data, enough to build the same scene again."""
+        return self.file.model_dump(mode="json", exclude_none=True)
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the content as canonical JSON."""
+        return hashlib.sha256(json.dumps(self.content, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return self.file.name
+
+    @property
+    def settings(self) -> MapSettings:
+        """How finely maps are computed."""
+        return self.file.map
+
+    @cached_property
+    def manifold(self) -> Manifold:
+        """The grid over the object's surface."""
+        return Manifold(self.profile, self.settings.heights, self.settings.angles)
+
+    def arm(self, name: str | None = None) -> Arm:
+        """Return an arm by name, or the first.
+
+        Raises:
+            SceneError: there is no such arm.
+        """
+        if name is None:
+            return next(iter(self.arms.values()))
+        if name not in self.arms:
+            raise SceneError(self.source, "arm", name, one_of(self.arms, name))
+        return self.arms[name]
+
+    def task(self, name: str | None = None) -> Task:
+        """Return a task by name, or the first.
+
+        Raises:
+            SceneError: there is no such task.
+        """
+        if name is None:
+            return next(iter(self.tasks.values()))
+        if name not in self.tasks:
+            raise SceneError(self.source, "task", name, one_of(self.tasks, name))
+        return self.tasks[name]
+
+    def with_task(self, task: Task) -> Scene:
+        """Return the scene with the task of that name replaced; robots and object are shared."""
+        self.task(task.name)
+        file = TaskFile(name=task.name, arms=task.arms, pose=PoseFile.of(task.T_world_object))
+        files = tuple(file if t.name == task.name else t for t in self.file.tasks)
+        return replace(
+            self,
+            file=self.file.model_copy(update={"tasks": files}),
+            tasks={**self.tasks, task.name: task},
+        )
+
+    def with_tasks(self, tasks: Iterable[Task]) -> Scene:
+        """Return the scene with these tasks in this order; robots and object are shared.
+
+        Raises:
+            SceneError: there is none, a name is taken or no name, or an arm is unknown.
+        """
+        tasks = tuple(tasks)
+        names = [task.name for task in tasks]
+        if not names:
+            raise SceneError(self.source, "tasks", names, "at least one task")
+        files = []
+        for i, task in enumerate(tasks):
+            if task.name in names[:i]:
+                raise SceneError(self.source, "tasks: name", task.name, "a name that is not used twice")
+            for arm in task.arms:
+                self.arm(arm)
+            try:
+                files.append(TaskFile(name=task.name, arms=task.arms, pose=PoseFile.of(task.T_world_object)))
+            except ValidationError as error:
+                raise SceneError(f"tasks[{i}]", *describe(error, {"name": task.name})) from None
+        return replace(
+            self,
+            file=self.file.model_copy(update={"tasks": tuple(files)}),
+            tasks={task.name: task for task in tasks},
+        )
+
+    def with_object(self, name: str, profile: Profile) -> Scene:
+        """Return the scene with another object in place of its own; robots and obstacles are shared.
+
+        Raises:
+            SceneError: the name is no name, or that of a robot or obstacle.
+        """
+        try:
+            thing = ObjectFile(name=name, profile=[tuple(p) for p in profile.points.tolist()])
+        except ValidationError as error:
+            raise SceneError("object", *describe(error, {"name": name})) from None
+        if name in (*self.robots, *(o.name for o in self.obstacles)):
+            raise SceneError("object", "name", name, "a name that no robot or obstacle of the scene has")
+        return replace(self, file=self.file.model_copy(update={"object": thing}), profile=profile)
+
+    @property
+    def mounted(self) -> dict[str, str]:
+        """Return arm → hand, by their names, of the arms whose hand another may replace."""
+        arms = [arm for robot in self.file.robots for arm in robot.arm_files()]
+        return {a.name: a.hand for a in arms if a.mount and a.tool is None and isinstance(a.hand, str)}
+
+    def with_hand(self, arm: str, hand: str) -> Scene:
+        """Return the scene with another hand on an arm, where the scene mounts one.
+
+        Raises:
+            SceneError: the arm's hand cannot be replaced, or there is no such hand that can be mounted.
+            UrdfError: the hand does not go with the robot.
+        """
+        if arm not in self.mounted:
+            raise SceneError(self.source, "arm", arm, one_of(self.mounted, arm))
+        content = self.file.model_dump(mode="json", exclude_none=True)
+        for robot in content["robots"]:
+            for entry in robot.get("arms", [robot]):
+                if entry["name"] == arm:
+                    entry["hand"] = hand
+        return Scene.from_content(content, self.source)
+
+    def with_settings(self, **changes: float) -> Scene:
+        """Return the scene with other map settings; robots and object are shared.
+
+        Raises:
+            SceneError: a setting is unknown or out of range.
+        """
+        try:
+            settings = MapSettings.model_validate({**self.settings.model_dump(), **changes})
+        except ValidationError as error:
+            raise SceneError("map settings", *describe(error, changes)) from None
+        return replace(self, file=self.file.model_copy(update={"map": settings}))

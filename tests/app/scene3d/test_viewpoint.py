@@ -1,0 +1,109 @@
+"""Where things stand in the 3D view, and how it is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import viser
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from app.panels.object_panel import span
+from app.scene3d.flat_map import ASIDE
+from app.scene3d.scene_view import SceneView
+from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
+from app.server.viser_server import quiet_server
+from symgrasp.scene.scene import Scene
+from tests.app.state.test_state import opened
+from tests.conftest import SHIPPED
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    server = quiet_server()
+    yield server
+    server.stop()
+
+
+def view_of(server: viser.ViserServer, camera: tuple[float, ...] | None) -> SceneView:
+    looker = SimpleNamespace(image_width=1280, image_height=800)
+    client = SimpleNamespace(scene=server.scene, atomic=server.atomic, camera=looker)
+    view = SceneView(client, 0, lambda *_: None, lambda *_: None, lambda _: None)  # pyright: ignore[reportArgumentType]
+    view.camera = camera
+    view.show(opened("soda_can"), move_gizmo=True)
+    return view
+
+
+@pytest.fixture(scope="module")
+def view(server) -> SceneView:
+    return view_of(server, None)
+
+
+def front_towards(view: SceneView, eye: np.ndarray) -> float:
+    """Cosine of the horizontal angle between the front of the flat map and a point."""
+    assert view.flat_map
+    w, x, y, z = view.flat_map.frame.wxyz
+    towards = (eye - view.flat_map.frame.position)[:2]
+    front = Rotation.from_quat([x, y, z, w]).apply([0.0, 0.0, 1.0])[:2]
+    return float(front @ towards / np.linalg.norm(towards))
+
+
+ANGLES = st.floats(-np.pi, np.pi)
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(ANGLES, min_size=1, max_size=6))
+def test_the_flat_map_is_seen_from_the_front_however_the_camera_goes_round(view, angles):
+    for angle in angles:
+        eye = np.array([0.5 + 1.5 * np.cos(angle), 1.5 * np.sin(angle), 0.8])
+        view.seen_from((*eye, 0.5, 0.0, 0.1))
+        assert front_towards(view, eye) >= ASIDE - 1e-9
+
+
+def test_a_camera_right_above_leaves_the_flat_map_as_it_is(view):
+    before = view.flat_map.frame.wxyz.copy()
+    x, y, z = view.flat_map.frame.position
+    view.seen_from((x, y, z + 2.0, 0.5, 0.0, 0.1))
+    assert np.array_equal(view.flat_map.frame.wxyz, before)
+
+
+@pytest.mark.parametrize("angle", [0.0, 2.0, 4.0])
+def test_a_view_that_begins_with_a_camera_has_the_flat_map_towards_it(server, angle):
+    """So it is in a picture that was saved, from wherever, with the object anywhere."""
+    eye = np.array([0.5 + 2 * np.cos(angle), 2 * np.sin(angle), 0.8])
+    assert front_towards(view_of(server, (*eye, 0.5, 0.0, 0.1)), eye) > 0.9
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("aspect", [472 / 800, 840 / 800])
+def test_every_robot_and_every_task_is_in_the_picture(name, aspect):
+    scene = Scene.load(name)
+    pose = scene.task().T_world_object
+    seen = viewpoint(scene, pose)
+    eye = seen.camera(aspect)
+    forward = (seen.look_at - eye) / np.linalg.norm(seen.look_at - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    middle = [0.0, 0.0, (scene.profile.h_min + scene.profile.h_max) / 2, 1.0]
+    points = [robot.T_world_base[:3, 3] for robot in scene.robots.values()]
+    points += [(task.T_world_object @ middle)[:3] for task in scene.tasks.values()]
+    edge = aspect * np.tan(FIELD_OF_VIEW / 2)
+    for point in points:
+        assert abs((point - eye) @ right) < edge * ((point - eye) @ forward)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_object_can_be_moved_a_metre_beyond_everything(name):
+    scene = Scene.load(name)
+    poses = [robot.T_world_base for robot in scene.robots.values()]
+    poses += [task.T_world_object for task in scene.tasks.values()]
+    for axis in range(3):
+        low, high = span(scene, axis)
+        places = [100 * pose[axis, 3] for pose in poses]
+        assert low % 10 == high % 10 == 0
+        assert 100 <= min(places) - low < 110
+        assert 100 <= high - max(places) < 110

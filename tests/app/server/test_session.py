@@ -1,0 +1,469 @@
+"""Many sessions on one server, without browsers: what they share and leave, what breaks and is mended."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import logging
+import multiprocessing
+import os
+import random
+import re
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape, unescape
+from pathlib import Path
+
+import pytest
+
+from app.compute import compute_process as process
+from app.compute.cache import SharedCache
+from app.compute.job_queue import JobQueue
+from app.panels.status_panel import StatusPanel
+from app.scene3d.scene_view import SceneView
+from app.server.lobby import Lobby, open_lobby
+from app.server.session import Session
+from app.server.viser_server import any_port
+from symgrasp.world import BulletWorld
+from tests.app import failures
+from tests.app.wire import Wire
+from tests.conftest import write_scene
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+
+@dataclass
+class House:
+    """A server, the port of its door, and what it keeps."""
+
+    store: SharedCache
+    reception: Lobby
+    port: int
+
+    def visit(self, query: str = "") -> Wire:
+        return Wire(self.port, query)
+
+    def wait_until_empty(self) -> None:
+        """Wait until every session has been closed, with its threads."""
+        for thread in threading.enumerate():
+            if thread.name.startswith(("worker", "painter")):
+                thread.join(30)
+        deadline = time.monotonic() + 30
+        while self.reception.open and time.monotonic() < deadline:
+            threading.Event().wait(0.01)
+        assert self.reception.open == 0
+
+
+@contextmanager
+def open_house_on_a_table() -> Iterator[House]:
+    store = SharedCache("bottle_on_table")
+    store.warm()
+    port = any_port()
+    with open_lobby(store, "127.0.0.1", port) as reception:
+        yield House(store, reception, port)
+
+
+@pytest.fixture(scope="module")
+def house() -> Iterator[House]:
+    with open_house_on_a_table() as house:
+        yield house
+
+
+def picture(html: str) -> str:
+    """The map that is shown, as it is sent."""
+    found = re.search(r'<img alt="map" src="([^"]+)"', html)
+    return found[1] if found else ""
+
+
+def ready(html: str) -> bool:
+    """Whether the newest map is shown and nothing is being done."""
+    return bool(picture(html)) and "Ready." in html and "earlier pose" not in html
+
+
+def alive(*kinds: type) -> list[int]:
+    gc.collect()
+    return [sum(isinstance(object_choice, kind) for object_choice in gc.get_objects()) for kind in kinds]
+
+
+def megabytes() -> float:
+    """Memory of this process, without what the C library keeps for later."""
+    if sys.platform != "linux":
+        return 0.0
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
+
+
+@dataclass(frozen=True)
+class Left:
+    """What there is in a process of a server that nobody visits.
+
+    Attributes:
+        things: how many sessions, views and physics worlds.
+        threads: how many threads.
+        processes: how many processes that compute.
+        memory: of it (MB).
+    """
+
+    things: list[int]
+    threads: int
+    processes: int
+    memory: float
+
+    @classmethod
+    def now(cls) -> Left:
+        things = alive(Session, SceneView, BulletWorld)
+        return cls(things, threading.active_count(), len(workshops()), megabytes())
+
+
+def before_and_after_a_hundred_sessions() -> tuple[Left, Left]:
+    """Run in a process of its own: what other tests leave would blur the memory."""
+    with open_house_on_a_table() as house, ThreadPoolExecutor(10) as people:
+
+        def come_and_go(k: int) -> None:
+            with house.visit() as visitor:
+                first = picture(visitor.wait_for(ready))
+                if k % 5 == 0:  # needs a physics world
+                    visitor.set("x (cm)", 40 + 0.1 * k)
+                    visitor.wait_for(lambda html: picture(html) != first and ready(html))
+
+        def ten_at_once(round_: int) -> None:
+            list(people.map(come_and_go, range(10 * round_, 10 * round_ + 10)))
+            house.wait_until_empty()
+
+        ten_at_once(0)
+        before = Left.now()
+        for round_ in range(1, 11):
+            ten_at_once(round_)
+        return before, Left.now()
+
+
+def test_a_hundred_sessions_come_and_go_and_leave_nothing():
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as alone:
+        before, after = alone.submit(before_and_after_a_hundred_sessions).result()
+    assert after.things == before.things == [0, 0, 0]
+    assert after.threads <= before.threads + 32  # viser's pool grows up to this many
+    assert after.processes == 1  # the one that is kept for the next
+    assert after.memory - before.memory < 60  # maps that the store keeps; a world alone takes some 10
+
+
+def test_nobody_sees_the_drags_of_others(house):
+    with house.visit() as one, house.visit("scene=soda_can") as other:
+        first = picture(one.wait_for(ready))
+        can = other.wait_for(lambda html: ready(html) and "soda_can" in html)
+        for degrees in range(0, 90, 3):
+            one.set("Rotation (°)", float(degrees))
+        turned = one.wait_for(lambda html: picture(html) != first and ready(html))
+        other.set("Flat map", False)
+        other.trigger("Next roll")
+        seen = other.wait_for(lambda html: picture(html) != picture(can) and ready(html))
+        assert "soda_can" in seen
+        assert "soda_can" not in turned
+        rotations = [w["value"] for w in other.widgets.values() if w.get("label") == "Rotation (°)"]
+        assert rotations == [0.0]
+
+
+def test_whoever_has_not_come_through_the_door_gets_no_session(house):
+    class Stranger(Wire):
+        def _greet(self, path: str) -> None:
+            self.met = path
+
+    house.wait_until_empty()
+    with Stranger(house.port) as stranger:
+        assert "Loading" in stranger.wait_for("Loading")
+        assert house.reception.open == 0
+        assert [w for w in stranger.widgets.values() if w.get("label")] == []
+
+
+def workshops() -> list[int]:
+    """The processes that compute for somebody, or are kept for it, oldest first."""
+    return sorted(process.pid or 0 for process in multiprocessing.active_children())
+
+
+def signal_workshops(number: int) -> None:
+    for pid in workshops():
+        os.kill(pid, number)
+
+
+@pytest.mark.parametrize("restart", ["Restart", "the next change"])
+def test_a_killed_process_is_told_loses_nothing_and_can_be_restarted(house, restart):
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("y (cm)", 1.0 if restart == "Restart" else 2.0)
+        visitor.wait_for("Computing the map of pick")
+        visitor.wait_for(ready)
+        visitor.set("Rotation (°)", 20.0)
+        signal_workshops(signal.SIGSTOP)  # so that it cannot be done before it is killed
+        visitor.set("x (cm)", 51.5 if restart == "Restart" else 51.0)
+        visitor.wait_for("Computing the map of pick")
+        signal_workshops(signal.SIGKILL)
+        visitor.wait_for("the process that computes ended unexpectedly (SIGKILL); what you set is kept")
+        visitor.wait_for(lambda _: any(w.get("label") == "Restart" for w in visitor.widgets.values()))
+        if restart == "Restart":
+            visitor.set("Restart", True)
+            query = "at.pick=51.5,1,0,0,0,0&turn=20"
+        else:
+            visitor.set("x (cm)", 53.0)
+            query = "at.pick=53,2,0,0,0,0&turn=20"
+        with house.visit(query) as fresh:
+            right = picture(fresh.wait_for(ready))
+        html = visitor.wait_for(lambda html: picture(html) == right)
+        assert "SIGKILL" not in html
+
+
+def test_cancelling_takes_effect_though_the_process_hears_nothing(house, monkeypatch):
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("y (cm)", 3.0)
+        visitor.wait_for("Computing the map of pick")
+        visitor.wait_for(ready)
+        signal_workshops(signal.SIGSTOP)
+        visitor.set("x (cm)", 52.5)
+        visitor.wait_for("Computing the map of pick … 0 %")
+        visitor.set("Rotation (°)", 10.0)  # the page lives meanwhile
+        visitor.set("Cancel", True)
+        visitor.wait_for("Stopped: no map for this pose yet.")
+        monkeypatch.setattr(process, "PATIENCE", 0.0)
+        os.kill(workshops()[-1], signal.SIGCONT)  # the one that is kept; the other one never answers
+        visitor.set("Compute the map", True)
+        visitor.wait_for(ready)
+
+
+def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(house, monkeypatch):
+    begun, pause = threading.Event(), threading.Event()
+    show = StatusPanel.show
+
+    def slow(panel, state):
+        """Draw the object that was put back only when it has been moved once more."""
+        if state.base.x == 0.55:
+            begun.set()
+            while panel.actions.state.base.x == 0.55:
+                pause.wait(0.001)
+        show(panel, state)
+
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("x (cm)", 51.0)
+        visitor.wait_for_quiet()
+        monkeypatch.setattr(StatusPanel, "show", slow)
+        visitor.trigger("Put the object back")
+        assert begun.wait(30)
+        visitor.set("x (cm)", 53.0)
+        visitor.wait_for_quiet()
+        visitor.wait_for(ready)
+        assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [53.0]
+
+
+def test_what_a_person_asks_for_in_two_ways_at_once_leaves_nothing_half_begun(house, monkeypatch):
+    """A button is heard in a thread of viser's pool, a slider on its loop."""
+    submit, told, overtaken = JobQueue.submit, threading.Event(), threading.Event()
+
+    def slow(worker, job):
+        """Give the plan to the worker only when the map has overtaken it, if it can."""
+        in_pool = threading.current_thread().name.startswith("ThreadPool")
+        if in_pool and not told.is_set():
+            told.set()
+            overtaken.wait(1)
+        submit(worker, job)
+        if not in_pool:
+            overtaken.set()
+
+    with house.visit() as visitor:
+        first = picture(visitor.wait_for(ready))
+        monkeypatch.setattr(JobQueue, "submit", slow)
+        visitor.trigger("Plan one grasp for all tasks")
+        assert told.wait(30)
+        visitor.set("x (cm)", 47.5)
+        visitor.wait_for(lambda html: picture(html) != first and ready(html))
+
+
+def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(house, monkeypatch):
+    linked, open_scene, asked = SharedCache.linked, Session.open_scene, threading.Event()
+
+    def slow(store, link):
+        """Load the first scene only when another has been asked for."""
+        assert asked.wait(30)
+        return linked(store, link)
+
+    def told(session, name):
+        open_scene(session, name)
+        asked.set()
+
+    monkeypatch.setattr(SharedCache, "linked", slow)
+    monkeypatch.setattr(Session, "open_scene", told)
+    with house.visit("scene=soda_can") as visitor:
+        visitor.trigger("Next scene")
+        assert "soda_can" in title(visitor.wait_for(ready))
+
+
+def test_a_first_scene_that_breaks_in_an_unexpected_way_leaves_no_empty_page(house, monkeypatch):
+    def broken(store, link):
+        raise RuntimeError("of this test")
+
+    monkeypatch.setattr(SharedCache, "linked", broken)
+    with house.visit("scene=soda_can") as visitor:
+        visitor.wait_for("unexpected RuntimeError: of this test")
+        assert "bottle_on_table" in title(visitor.wait_for(ready))
+
+
+def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(house, monkeypatch):
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("of <this> test")
+
+    house.wait_until_empty()
+    before = set(threading.enumerate())
+    monkeypatch.setattr(SceneView, "__init__", broken)
+    with house.visit() as visitor:
+        html = visitor.wait_for("This page could not be opened (RuntimeError: of &lt;this&gt; test)")
+        assert "Loading" not in html
+        for thread in set(threading.enumerate()) - before:
+            if thread.name.startswith(("worker", "painter")):
+                thread.join(30)
+                assert not thread.is_alive()
+        assert house.reception.open == 0
+
+
+def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(house, monkeypatch):
+    show, broke = StatusPanel.show, threading.Event()
+
+    def breaks_once(panel, state):
+        if state.base.x == 0.55 and not broke.is_set():
+            broke.set()
+            raise RuntimeError("of this test")
+        show(panel, state)
+
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("x (cm)", 51.0)
+        visitor.wait_for_quiet()
+        monkeypatch.setattr(StatusPanel, "show", breaks_once)
+        visitor.trigger("Put the object back")
+        visitor.wait_for("the picture could not be drawn: RuntimeError: of this test")
+        visitor.wait_for_quiet()
+        assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [55.0]
+
+
+def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
+    monkeypatch.setattr(process, "serve", failures.serve_compiling)
+    port = any_port()
+    with open_lobby(house.store, "127.0.0.1", port), Wire(port) as visitor:
+        visitor.wait_for(ready)
+        visitor.set("x (cm)", 54.5)
+        visitor.wait_for(lambda _: any(w.get("value") == 50.0 for w in visitor.widgets.values()))
+        assert "Compiling, once on this machine: a minute …" in visitor.wait_for_quiet()
+        visitor.set("Cancel", True)
+        assert "Compiling" not in visitor.wait_for("Stopped: no map for this pose yet.")
+
+
+CHOICES = {
+    "Rotation (°)": [-120.0, 0.0, 15.25, 90.0],
+    "x (cm)": [40.0, 50.0, 55.0],
+    "z (cm)": [0.0, 10.0],
+    "Lean (°)": [0.0, 20.0],
+    "h (cm)": [2.0, 10.0, 99.0],
+    "θ (°)": [-170.0, 0.0, 60.0],
+    "Roll": ["either", "0°", "180°"],
+    "Flat map": [True, False],
+    "Drag handles": [True, False],
+    "Colours show": ["reason", "feasible", "clearance"],
+    "Dark": [True, False],
+    "Object": ["the scene's own", "wine_bottle"],
+    "Task": ["pick", "pour", "place"],
+    "Undo": None,
+    "Redo": None,
+    "Put it back": [True],
+    "Let go": [True],
+    "Cancel": [True],
+    "One grasp for all tasks": [True],
+    "Scene": ["bottle_on_table", "pick_pour_place"],
+}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hundreds_of_random_actions_end_in_the_picture_that_a_fresh_page_shows(house, caplog, seed):
+    caplog.set_level(logging.ERROR)
+    chance = random.Random(seed)
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        for _ in range(150):
+            label = chance.choice(list(CHOICES))
+            if CHOICES[label] is None:
+                visitor.trigger(label)
+            elif any(w.get("label") == label for w in visitor.widgets.values()):
+                visitor.set(label, chance.choice(CHOICES[label]))
+            if chance.random() < 0.2:
+                visitor.wait_for(lambda html: bool(picture(html)))
+        visitor.wait_for_quiet()
+        visitor.set("x (cm)", 53.0)  # also ends whatever is being planned or was cancelled
+        visitor.wait_for_quiet()
+        visitor.set("h (cm)", 10.0)
+        visitor.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
+        visitor.trigger("Make a link")
+        made = visitor.wait_for('class="sg-link"')
+        with house.visit(link_in(made)) as fresh:
+            again = fresh.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
+        # The page may show the last map for a moment yet; it must end up with the fresh page's.
+        html = visitor.wait_for(lambda html: picture(html) == picture(again))
+        for part in (title, legend):
+            assert part(again) == part(html)
+    assert caplog.records == []
+
+
+def test_a_link_opens_the_tasks_that_a_person_made(house):
+    name = "<b>tilt</b>, pour & ✓"
+    with house.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.set("Rotation (°)", 20.0)
+        visitor.trigger("Add a task with the object here")
+        visitor.wait_for(lambda _: any(w.get("value") == "task 2" for w in visitor.widgets.values()))
+        visitor.set("Task name", name)
+        visitor.set("Chosen task", "Rename")
+        visitor.wait_for(escape(name))
+        visitor.set("Chosen task", "Earlier")
+        visitor.wait_for(f"1 · {escape(name)}")
+        visitor.set("x (cm)", 52.0)
+        visitor.set("Object", "wine_bottle")  # the tasks stay
+        visitor.wait_for(lambda html: ready(html) and "the wine" in html)
+        visitor.trigger("Make a link")
+        made = visitor.wait_for('class="sg-link"')
+        assert "has changed since" not in made
+        with house.visit(link_in(made)) as fresh:
+            again = fresh.wait_for(ready)
+            for part in (tasks, title, picture):
+                assert part(again) == part(made)
+        assert escape(name) in tasks(made)
+        visitor.look_from(2.0, 1.5, 1.0)
+        visitor.wait_for("The page has changed since")
+
+
+def link_in(html: str) -> str:
+    """What stands behind the ? of the link that was made."""
+    return unescape(re.findall(r'class="sg-link" href="[^"?]*\?([^"]*)"', html)[-1])
+
+
+def tasks(html: str) -> str:
+    return re.findall(r'<div class="sg sg-tasks">(.*?)</div></div>', html)[0]
+
+
+def title(html: str) -> str:
+    return re.findall(r'<div class="sg sg-title"[^>]*>(.*?)</div>', html)[0]
+
+
+def legend(html: str) -> str:
+    return re.findall(r'<div class="sg-legend">(.*?)</div></div>', html)[0]
+
+
+def test_a_scene_from_a_file_may_be_hostile_in_every_name(house, content, tmp_path):
+    content["name"] = "<script>"
+    port = any_port()
+    with (
+        open_lobby(SharedCache(str(write_scene(tmp_path, content))), "127.0.0.1", port),
+        Wire(port) as visitor,
+    ):
+        assert "<script>" not in visitor.wait_for(ready)

@@ -1,0 +1,325 @@
+"""Leafing through plans, playing them and changing tasks, with no page."""
+
+# A plan or a climb may be None in general, but not where these tests look.
+# pyright: reportOptionalMemberAccess=false, reportArgumentType=false, reportOptionalSubscript=false
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.compute import plan_service as plan_bench
+from app.compute.cache import SharedCache
+from app.compute.map_service import MapService
+from app.compute.plan_service import PLAN_LIMIT, PlanRequest, PlanService
+from app.html.readout import joint_values
+from app.render.prints import shown_prints
+from app.state.plan_results import PlanResults
+from app.state.state import State
+from app.state.task_list import TaskList
+from symgrasp.errors import InputError, PlanError, SceneError, SymgraspError
+from symgrasp.planners.gaps import PrintGaps
+from symgrasp.poses import pose_error
+from symgrasp.scene.scene import Scene
+from tests.app.state.test_state import opened, planned, small_map, with_plan
+from tests.conftest import load_small
+
+
+def quiet(share: float) -> None:
+    """Progress that nobody watches."""
+
+
+@pytest.fixture
+def plans():
+    bench = MapService(SharedCache("bottle_on_table"))
+    plans = PlanService(bench)
+    yield plans
+    plans.close()
+    bench.close()
+
+
+# -- the tasks ------------------------------------------------------------------------------
+
+
+def test_the_objects_pose_becomes_a_task_whose_map_is_known():
+    state = opened().move(x=0.5).turn(0.3)
+    state = state.map_arrived(0, small_map("bottle_on_table", "pick", "panda", state.request.pose))
+    added = state.add_task()
+    assert list(added.scene.tasks) == ["pick", "task 2"]
+    assert (added.task, added.arm, added.delta) == ("task 2", "panda", 0.3)
+    assert np.allclose(added.T_world_object, state.T_world_object)
+    assert added.scene.task("task 2").arms == ("panda",)
+    store = SharedCache("bottle_on_table")
+    store.keep(state.result)
+    known = store.map(added.request)
+    assert np.array_equal(known.map.reason, state.result.map.reason)
+    assert (known.map.task, known.request) == ("task 2", added.request)
+    assert added.map_arrived(0, known).is_current
+
+
+def test_a_move_that_was_for_a_new_task_leaves_the_chosen_one_as_it_was_chosen():
+    """Also where it had been moved to before."""
+    state = opened("pick_pour_place").choose_task("place").move(x=0.45).choose_task("pick")
+    state = state.choose_task("place").move(x=0.4).add_task()
+    assert state.poses["place"].x == 0.45
+    assert state.T_world_object[0, 3] == pytest.approx(0.4)
+    fresh = opened("pick_pour_place").move(x=0.4).add_task()
+    assert "pick" not in fresh.poses
+    assert fresh.T_world_object[0, 3] == pytest.approx(0.4)
+
+
+def test_a_wrong_name_is_told_without_the_file_that_the_tasks_came_from():
+    with pytest.raises(InputError, match=r"^tasks: .*'pour': expected"):
+        opened("pick_pour_place").change_tasks(lambda tasks: tasks.renamed("pour"))
+
+
+def test_the_maps_of_the_other_tasks_outlive_a_change_of_the_list():
+    state = opened("pick_pour_place")
+    changed = state.change_tasks(lambda tasks: tasks.shifted(1))
+    assert list(changed.scene.tasks) == ["pour", "pick", "place"]
+    assert changed.scene is not state.scene
+    assert changed.is_current
+    assert changed.result is state.result
+
+
+NAMES = st.sampled_from(["pick", "pour", "a", " b ", "", "x" * 101])
+EDITS = st.one_of(
+    st.builds(lambda by: lambda s: s.change_tasks(lambda t: t.shifted(by)), st.integers(-4, 4)),
+    st.builds(lambda name: lambda s: s.change_tasks(lambda t: t.renamed(name)), NAMES),
+    st.builds(
+        lambda k: lambda s: s.choose_task(list(s.scene.tasks)[k % len(s.scene.tasks)]), st.integers(0, 9)
+    ),
+    st.builds(lambda x: lambda s: s.move(x=x), st.sampled_from([0.4, 0.5])),
+    st.sampled_from([State.add_task, lambda s: s.change_tasks(TaskList.removed)]),
+)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(EDITS, max_size=12))
+def test_tasks_changed_in_any_order_keep_their_poses_and_can_be_written_down(edits):
+    state, where = opened("pick_pour_place"), {}
+    found = at(state, state.task)  # where the chosen task's object was when it was chosen
+    for edit in edits:
+        chosen = state.task
+        before = {name: at(state, name) for name in state.scene.tasks}
+        try:
+            state = edit(state)
+        except SymgraspError:
+            continue
+        where = {name: at(state, name) for name in state.scene.tasks}
+        if len(where) > len(before):
+            before[chosen] = found
+        is_renamed = chosen not in where and len(where) == len(before)
+        if state.task != chosen and not is_renamed:
+            found = where[state.task]
+        kept = set(before) & set(where) - {state.task}
+        assert all(np.array_equal(before[name], where[name]) for name in kept)
+    assert state.task in state.scene.tasks
+    assert set(state.poses) <= set(state.scene.tasks)
+    assert state.plan is None
+    again = Scene.from_content(state.moved_scene().content)
+    assert list(again.tasks) == list(state.scene.tasks)
+    for name, pose in where.items():
+        distance, turn = pose_error(again.task(name).T_world_object, pose)
+        assert distance < 1e-9
+        assert turn < 1e-6
+
+
+def at(state: State, task: str) -> np.ndarray:
+    pose = state.poses.get(task)
+    return pose.matrix() if pose else state.scene.task(task).T_world_object
+
+
+def test_a_plan_for_other_tasks_is_dropped():
+    state = with_plan("pick_pour_place", "sequential")
+    for change in (TaskList.removed, lambda t: t.shifted(-1) if t.task != "pick" else t.shifted(1)):
+        changed = state.change_tasks(change)
+        assert changed.plan is None
+        assert changed.step is None
+        assert changed.started(2, "Planning").change_tasks(TaskList.removed).busy is None
+    assert state.change_tasks(lambda t: t.renamed(t.task)) is state
+    with pytest.raises(SymgraspError, match="another task that stays"):
+        opened().change_tasks(TaskList.removed)
+
+
+# -- the play -------------------------------------------------------------------------------
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(0, 2))
+def test_while_the_arms_are_played_the_object_stays_in_the_hand(position):
+    state = with_plan("pick_pour_place", "sequential").show_position(position)
+    step = min(int(position + 0.5), 2)
+    assert (state.step, state.task) == (step, ["pick", "pour", "place"][step])
+    hold = state.shown.holds[0]
+    arm = state.scene.arm("panda")
+    names = arm.robot.model.joint_names
+    values = joint_values(state)["panda"]
+    q = np.array([values[names.index(name)] for name in arm.joint_names])
+    assert np.all(arm.lower <= q)
+    assert np.all(q <= arm.upper)
+    in_hand = np.linalg.inv(arm.world_tool_pose(q)) @ state.T_world_seen
+    held = np.linalg.inv(hold.tool_pose.array()) @ state.shown.object_pose_turned.array()
+    assert np.allclose(in_hand, held, atol=1e-5)
+
+
+def test_the_play_passes_the_tasks_in_order_and_stops_at_the_end():
+    state = with_plan("pick_pour_place", "sequential").play_arms()
+    seen, positions = [], []
+    while state.plan_results.moving:
+        state = state.played(0.1)
+        seen.append(state.task)
+        positions.append(state.plan_results.position)
+    assert list(dict.fromkeys(seen)) == ["pick", "pour", "place"]
+    assert np.all(np.diff(positions) > 0)
+    assert positions[-1] == 2
+    assert not state.motion
+    assert np.allclose(state.T_world_seen, state.T_world_object)
+    again = state.play_arms()
+    assert (again.plan_results.moving, again.plan_results.position, again.step) == ("arms", 0.0, 0)
+    assert not again.play_arms().plan_results.moving
+
+
+def test_whoever_moves_on_stops_the_play():
+    playing = with_plan("pick_pour_place", "sequential").play_arms().played(0.3)
+    assert playing.motion
+    for move_on in (lambda s: s.turn(0.1), lambda s: s.choose(0.1, 0.0), lambda s: s.choose_task("place")):
+        state = move_on(playing)
+        assert state.motion is None
+        stopped = state.played(0.1)
+        assert not stopped.plan_results.moving
+        assert (stopped.task, stopped.delta, stopped.pick) == (state.task, state.delta, state.pick)
+
+
+def test_a_plan_of_one_task_has_nothing_to_play():
+    state = with_plan("bottle_on_table", "sequential")
+    assert state.play_arms().plan_results.moving == ""
+    assert state.show_position(math.nan).step == 0
+
+
+# -- the list of plans ----------------------------------------------------------------------
+
+
+def test_all_solutions_are_listed_part_by_part_each_once(plans, monkeypatch):
+    monkeypatch.setattr(plan_bench, "LISTED", 3)
+    scene = load_small("pick_pour_place", heights=24)
+    plan_results = plans.run(PlanRequest(scene, "sequential", "best", "panda"), PlanResults(), quiet)
+    assert (len(plan_results.plans), plan_results.more) == (3, True)
+    state = State.of(scene, "").started(1, "").booked(1, plan_results)
+    while state.plan_results.more:
+        count = len(state.plan_results.plans)
+        state = state.started(2, "").listed(2, *plans.more(state.plan_results.maps, quiet))
+        assert state.plan_results.page in (count, count - 1)
+    grasps = [
+        (p.plan.tasks[0].holds[0].grasp.h, p.plan.tasks[0].holds[0].grasp.roll)
+        for p in state.plan_results.plans
+    ]
+    allowed = np.logical_and.reduce([r.map.feasible.any(axis=2) for r in state.plan_results.maps.values()])
+    assert len(grasps) == len(set(grasps)) == allowed.sum()
+    first = state.choose_plan(0)
+    assert first.plan is plan_results.plans[0]
+    assert (first.pick.h, first.step) == (grasps[0][0], 0)
+
+
+def test_no_common_grasp_is_told_with_what_would_help(plans):
+    scene = load_small("pick_pour_place")
+    state = State.of(scene, "").choose_task("pour").move(z=1.2)
+    order = PlanRequest(scene, "sequential", "best", "panda", state.poses)
+    plan_results = plans.run(order, PlanResults(), quiet)
+    assert plan_results.plan is None
+    assert plan_results.refusal.conflict.exclusions[0].tasks == ("pour",)
+    assert set(plan_results.maps) == {(task, "panda") for task in scene.tasks}
+    shown = state.started(1, "").booked(1, plan_results)
+    assert shown.task == "pour"
+    assert shown.problem == ""
+    assert shown.move(x=0.5).plan_results.refusal is None
+
+
+# -- climbing -------------------------------------------------------------------------------
+
+
+def test_a_climb_is_replayed_with_both_hands_on_the_maps():
+    state = with_plan("log_two_robots", "bimanual", "hill_climb")
+    climb = state.plan_results.climb
+    assert climb.found is state.plan
+    exact, climbed = climb.exact.gaps[0], climb.found.gaps[0]
+    assert exact is not None and climbed is not None
+    assert exact >= climbed
+    state = state.play_climb()
+    frames = [state.plan_results.frame]
+    while state.plan_results.moving:
+        state = state.played(0.1)
+        frames.append(state.plan_results.frame)
+    assert frames == sorted(set(frames)) or len(climb.steps) == 1
+    assert frames[-1] == len(climb.steps) - 1
+    assert climb.steps[-1].collisions == 0
+    for frame, step in enumerate(climb.steps):
+        shown = state.show_frame(frame)
+        left, right = shown_prints(shown)
+        assert (left & right).sum() <= step.collisions  # prints go on beyond the object's ends
+        values = joint_values(shown)
+        for name, cell in zip(climb.arms, step.cells, strict=True):
+            arm = shown.scene.arm(name)
+            witness = shown.plan_results.maps["lift", name].map.witness(cell)
+            assert np.array_equal(values[arm.robot.name], arm.robot_values(witness.q, witness.opening))
+    assert state.turn(0.1).climbed is None
+    assert state.show_step(0).climbed is None
+
+
+def test_the_gap_that_is_shown_is_that_of_the_planner():
+    plan_results = planned("log_two_robots", "bimanual")
+    scene = load_small("log_two_robots")
+    grid = scene.manifold
+    gaps = PrintGaps([scene.arm("left"), scene.arm("right")], grid)
+    assert len(plan_results.plans) == 10
+    for plan in plan_results.plans:
+        a, b = (
+            (int(np.cos(h.grasp.roll) < 0), *grid.cell(h.grasp.h, h.grasp.theta))
+            for h in plan.plan.tasks[0].holds
+        )
+        between = gaps.around(0, a[0], a[1], 1)[b[0], b[1], (b[2] - a[2]) % grid.angles]
+        assert plan.gaps[0] == pytest.approx(between)
+
+
+# -- files ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("pick_pour_place", "sequential"), ("log_two_robots", "bimanual")]
+)
+def test_a_plan_from_a_file_brings_its_scene(plans, name, kind):
+    plan = planned(name, kind).plan.plan
+    found = plans.open(plan.to_json().encode(), "a.json", quiet)
+    assert found.report.failures == ()
+    assert found.report.checks > 10
+    state = opened("soda_can").opened(found.report, found.scene, found.plan)
+    assert (state.scene_name, state.scene.name) == ("a.json (upload)", name)
+    assert state.plan.plan == plan
+    assert state.is_current
+    assert state.shown == plan.tasks[0]
+    assert np.allclose(state.T_world_object, plan.tasks[0].object_pose_turned.array())
+
+
+def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans):
+    text = planned("pick_pour_place", "sequential").plan.plan.to_json()
+    h = planned("pick_pour_place", "sequential").plan.plan.tasks[0].holds[0].grasp.h
+    found = plans.open(text.replace(f'"h": {h!r}', f'"h": {h + 0.01!r}').encode(), "a.json", quiet)
+    assert found.plan is None
+    assert any("10.0" in failure or "0.01" in failure for failure in found.report.failures)
+    before = with_plan("soda_can", "sequential")
+    state = before.opened(found.report, found.scene, found.plan)
+    assert state.scene is before.scene
+    assert state.plan is before.plan
+    assert state.plan_results.opened is found.report
+    with pytest.raises(SceneError, match=r"obstacles\[1\].mesh.*expected a file that a Python package ships"):
+        plans.open(text.replace("package://static_scenes/bowl.obj", "/etc/passwd").encode(), "a.json", quiet)
+    with pytest.raises(SceneError, match="or an absolute path"):
+        plans.open(text.replace("package://static_scenes/bowl.obj", "bowl.obj").encode(), "a.json", quiet)
+    with pytest.raises(PlanError, match="size of the file"):
+        plans.open(b" " * (PLAN_LIMIT + 1), "a.json", quiet)
+    with pytest.raises(PlanError, match="JSON"):
+        plans.open(b"{", "a.json", quiet)

@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+from functools import partial
+from importlib import resources
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from symgrasp.cli import main
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.plan.plan import Plan, plan_schema
+from symgrasp.scene.scene import Scene
+from tests.conftest import SHIPPED, write_scene
+
+
+@pytest.fixture
+def small(content, tmp_path) -> Path:
+    content["map"] = {"heights": 6, "angles": 8, "redundancy": 4}
+    return write_scene(tmp_path, content)
+
+
+def test_scenes_lists_what_ships(capsys):
+    assert main(["scenes"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == SHIPPED
+
+
+@pytest.mark.parametrize("ending", ["npz", "png", "svg", "json"])
+def test_map_writes_every_format(small, tmp_path, capsys, ending):
+    out = tmp_path / f"map.{ending}"
+    assert main(["map", str(small), "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert "feasible" in text
+    assert "96 cells" in text
+    if ending == "npz":
+        assert FeasibilityMap.load(out).reason.shape == (2, 6, 8)
+    elif ending == "json":
+        content = json.loads(out.read_text())
+        assert len(content["reason"][1]) == len(content["h"]) == 6
+        assert "FEASIBLE" in content["reasons"]
+    else:
+        assert out.read_bytes().startswith({"png": b"\x89PNG", "svg": b"<?xml"}[ending])
+
+
+def test_plan_sequential_and_bimanual(tmp_path, capsys):
+    for kind, scene in (("sequential", "soda_can"), ("bimanual", "log_two_robots")):
+        out = tmp_path / f"{kind}.json"
+        assert main(["plan", kind, scene, "--out", str(out)]) == 0
+        plan = Plan.load(out)
+        assert plan.kind == kind
+        assert "holds at h =" in capsys.readouterr().out
+        jsonschema.validate(json.loads(out.read_text()), plan_schema())
+
+
+def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):
+    assert (
+        main(["object", "wine_bottle", "--out", str(tmp_path / "a.png"), "--fit", str(tmp_path / "b.png")])
+        == 0
+    )
+    text = capsys.readouterr().out
+    assert "wine_bottle: 30.00 cm tall" in text
+    assert "franka holds it" in text
+    assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in ("a.png", "b.png"))
+    mesh = tmp_path / "bottle.stl"
+    Scene.load("soda_can").profile.mesh().apply_scale(1000).export(mesh)
+    assert main(["object", str(mesh)]) == 2
+    assert "--scale 0.001" in capsys.readouterr().err
+    assert main(["object", str(mesh), "--scale", "0.001"]) == 0
+    text = capsys.readouterr().out
+    assert "11.50 cm tall" in text
+    assert "symmetry error" in text
+    assert main(["object", "wine_bottel"]) == 2
+    assert "did you mean 'wine_bottle'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["scene", "plan"])
+def test_schemas_are_schemas(name, capsys):
+    assert main(["schema", name]) == 0
+    printed = capsys.readouterr().out
+    schema = json.loads(printed)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["properties"]["schema_version"]["const"] == 1
+    shipped = resources.files("symgrasp") / "schemas" / f"{name}.schema.json"
+    assert shipped.read_text(encoding="utf-8") == printed, f"symgrasp schema {name} > {shipped}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["map", "no_such_scene"], "expected one of 'bottle_on_table'"),
+        (["map", "missing.yaml"], "missing.yaml"),
+        (["map", "soda_can", "--task", "pikc"], "did you mean 'pick'"),
+        (["map", "soda_can", "--arm", "left"], "expected one of 'panda'"),
+        (["map", "soda_can", "--out", "map.gif"], "'.npz'"),
+        (["map", "soda_can", "--out", "no/such/folder/map.npz"], "existing folder"),
+        (
+            ["plan", "sequential", "soda_can", "--out", "p.json", "--method", "exact"],
+            "'best', 'first', 'regrasp'",
+        ),
+        (["plan", "bimanual", "soda_can", "--out", "p.json"], "two or more arms"),
+        (["plan", "sequential", "log_two_robots", "--out", "p.json"], "does alone"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_object_inside_an_obstacle(content, tmp_path, capsys):
+    content["tasks"][0]["pose"]["position"] = [0.55, 0, -0.02]
+    path = write_scene(tmp_path, content)
+    assert main(["map", str(path), "--out", str(tmp_path / "map.npz")]) == 2
+    assert "bottle is 20.0 mm inside table" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_no_plan_is_status_1_and_leaves_no_file(content, tmp_path, capsys):
+    content["map"] = {"heights": 2, "angles": 2, "redundancy": 1, "margin": 0.2}
+    path = write_scene(tmp_path, content)
+    assert main(["plan", "sequential", str(path), "--out", str(tmp_path / "plan.json")]) == 1
+    assert "no grasp" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_existing_file_survives_a_failure(content, tmp_path):
+    out = tmp_path / "plan.json"
+    out.write_text("precious")
+    assert main(["plan", "bimanual", "soda_can", "--out", str(out)]) == 2
+    assert out.read_text() == "precious"
+
+
+def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "symgrasp", *arguments], cwd=cwd, capture_output=True, text=True, check=False
+    )
+
+
+def test_as_a_process_from_another_folder(tmp_path):
+    done = run("map", "soda_can", "--out", "can.json", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [p.name for p in tmp_path.iterdir()] == ["can.json"]
+
+
+def test_a_bad_file_leaves_no_traceback(tmp_path):
+    (tmp_path / "bad.yaml").write_text("a: [")
+    done = run("map", "bad.yaml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("symgrasp: bad.yaml: file: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_progress_on_a_terminal_and_cancel_with_ctrl_c(content, tmp_path):
+    """On a terminal the share runs up; Ctrl-C ends it with one word and no file."""
+    content["map"] = {"heights": 200, "angles": 360, "redundancy": 64}
+    path = write_scene(tmp_path, content)
+    master, slave = pty.openpty()
+    arguments = [sys.executable, "-m", "symgrasp", "map", str(path), "--out", str(tmp_path / "map.npz")]
+    # A shell's background job hands down that Ctrl-C is ignored; a person's terminal does not.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    process = subprocess.Popen(arguments, stdout=slave, stderr=slave, preexec_fn=heed)
+    os.close(slave)
+    seen = b""
+    while b"map of pick:" not in seen:
+        seen += os.read(master, 1024)
+    process.send_signal(signal.SIGINT)
+    try:
+        while chunk := os.read(master, 1024):
+            seen += chunk
+    except OSError:  # the terminal closes with the process
+        pass
+    os.close(master)
+    assert process.wait() == 130
+    assert b"cancelled" in seen
+    assert b"Traceback" not in seen
+    assert list(tmp_path.iterdir()) == [path]

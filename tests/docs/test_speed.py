@@ -1,0 +1,84 @@
+"""The README's table of times says what the benchmark measured."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from docs.speed import BEGIN, BENCH, END, ROWS, keyed, table, write
+from symgrasp import bench
+
+README = Path(__file__).parent.parent.parent / "README.md"
+
+
+def patterns() -> list[str]:
+    """Return what the benchmark's figures may be called, as regular expressions."""
+    found = []
+    for path in Path(bench.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Figure":
+                name = node.args[0]
+                if isinstance(name, ast.Constant):
+                    found.append(re.escape(str(name.value)))
+                elif isinstance(name, ast.JoinedStr):
+                    parts = [
+                        re.escape(str(p.value)) if isinstance(p, ast.Constant) else ".+" for p in name.values
+                    ]
+                    found.append("".join(parts))
+    return found
+
+
+def content(names) -> dict:
+    figures = [{"name": name, "unit": "ms", "values": [3.0, 1.0, 1234.5]} for name in names]
+    return {"machine": {"python": "3.11.2", "machine": "x86_64", "cpus": 2}, "figures": figures}
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_the_benchmark_measures_every_row(row):
+    *above, name = row.rsplit(": ", 1) if not any(re.fullmatch(p, row) for p in patterns()) else [row]
+    wanted = [*above, "  " + name] if above else [name]
+    for part in wanted:
+        assert any(re.fullmatch(p, part) for p in patterns()), part
+
+
+def test_a_table_has_median_and_spread():
+    lines = table(content(ROWS)).splitlines()
+    assert "2 cores (x86_64)" in lines[0]
+    assert len(lines) == 4 + len(ROWS)
+    assert all(line.endswith("| 3 ms | 1 | 1,230 |") for line in lines[4:])
+    with pytest.raises(KeyError):
+        table(content(["something else"]))
+
+
+def test_figures_that_belong_to_another_are_told_apart():
+    found = keyed(content(["a", "  takes", "b", "  takes"])["figures"])
+    assert list(found) == ["a", "a: takes", "b", "b: takes"]
+
+
+def test_only_the_table_of_a_page_is_written(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
+    for _ in range(2):
+        write(content(ROWS), page)
+        assert page.read_text() == f"before\n{BEGIN}\n{table(content(ROWS))}{END}\nafter\n"
+
+
+def test_a_page_gets_a_section_for_the_table(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# Title\n\ntext\n\n## Security\n\nmore\n")
+    write(content(ROWS), page)
+    text = page.read_text()
+    assert text.startswith("# Title\n\ntext\n\n## How fast\n\n")
+    assert text.endswith(f"{table(content(ROWS))}{END}\n\n## Security\n\nmore\n")
+
+
+def test_the_readme_has_the_table_that_was_measured():
+    """Both or neither: a table without its measurement could say anything."""
+    text = README.read_text()
+    assert (BEGIN in text) == BENCH.exists()
+    if BENCH.exists():
+        assert table(json.loads(BENCH.read_text())) in text

@@ -1,0 +1,179 @@
+"""The compiled closed form against EAIK, against forward kinematics, and against itself."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from symgrasp.ik import ClosedFormIK, SphericalIK, solver_for
+from symgrasp.poses import from_position_quat, pose_error, rotation_about
+from symgrasp.robot.robot import Arm
+from symgrasp.scene.scene import Scene
+from tests.conftest import load_small
+
+ARMS = ("panda", "iiwa", "backwards", "six")
+
+
+def arm_of(scene: Scene, name: str) -> Arm:
+    return scene.arm(name)
+
+
+def synthetic(H, P, R0=None) -> Arm:
+    """Return an arm that is its axes alone: what a solver reads of it."""
+    n = len(H)
+    arm = object.__new__(Arm)
+    H = np.array(H, dtype=float)
+    arm.__dict__.update(
+        name="synthetic",
+        H=H / np.linalg.norm(H, axis=1, keepdims=True),
+        P=np.array(P, dtype=float),
+        R0=np.eye(3) if R0 is None else R0,
+        joint_names=tuple(f"j{k}" for k in range(n)),
+        lower=np.full(n, -2.9),
+        upper=np.full(n, 2.9),
+        robot=SimpleNamespace(model=SimpleNamespace(path="synthetic")),
+    )
+    return arm
+
+
+@pytest.fixture(scope="module")
+def arms() -> dict[str, Arm]:
+    scene = load_small("log_iiwa_and_panda")
+    R0 = rotation_about(np.array([0.6, 0.0, 0.8]), 1.1)
+    x, y, z = np.eye(3)
+    return {
+        "panda": scene.arm("panda"),
+        "iiwa": scene.arm("iiwa"),
+        # A wrist whose axes meet, an elbow with offsets, a shoulder of two skewed axes, on a turntable.
+        "backwards": synthetic(
+            [z, z + 0.3 * x, y, y, x, y, x + 0.2 * z],
+            [[0, 0, 0.2], [0.1, 0, 0.1], [0, 0, 0], [0.4, 0, 0.05], [0.3, 0, 0], [0, 0, 0], [0, 0, 0],
+             [0.1, 0.05, 0]],
+            R0,
+        ),
+        "six": synthetic(
+            [z, y, y, x, y, x],
+            [[0, 0, 0.3], [0, 0, 0], [0.4, 0, 0], [0.35, 0, 0.03], [0, 0, 0], [0, 0, 0], [0.1, 0, 0]],
+            R0,
+        ),
+    }  # fmt: skip
+
+
+def distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Largest joint difference modulo full turns."""
+    return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
+
+
+def samples(arm: Arm, count: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, len(arm.lower)))
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_same_branches_as_eaik(name, arms):
+    arm = arms[name]
+    general, ik = ClosedFormIK(arm, 4), SphericalIK(arm, 4)
+    assert ik.locked == general.locked
+    np.testing.assert_array_equal(ik.phi, general.phi)
+    total = 0
+    for T in arm.tool_pose(samples(arm, 250, 0)):
+        theirs, ours = general.solve(T), ik.solve(T)
+        for one, other in ((theirs, ours), (ours, theirs)):
+            for q, sample, inside in zip(one.q, one.sample, one.inside, strict=True):
+                same = other.sample == sample
+                gaps = distance(other.q[same], q)
+                assert gaps.min(initial=np.inf) < 1e-6
+                assert other.inside[same][gaps.argmin()] == inside
+        total += len(ours.q)
+    assert total > 500
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_recall(name, arms):
+    """The branches at q's own locked value contain q; an elbow all but straight blurs its neighbours."""
+    arm = arms[name]
+    ik = SphericalIK(arm, 1)
+    gaps = []
+    for q in samples(arm, 3000, 1):
+        phi = 0.0 if ik.locked is None else float(q[ik.locked])
+        gaps.append(distance(ik.solve_at(arm.tool_pose(q), phi).q, q).min(initial=np.inf))
+    assert np.max(gaps) < 1e-3
+    assert np.count_nonzero(np.array(gaps) > 1e-6) <= 3
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_solution_reaches_the_pose(name, arms):
+    arm = arms[name]
+    ik = SphericalIK(arm, 8)
+    poses = arm.tool_pose(samples(arm, 400, 2))
+    q, exists, inside = ik.solve_batch(poses)
+    assert exists.sum() > 1000
+    assert not (inside & ~exists).any()
+    pose = np.nonzero(exists)[0]
+    position, rotation = pose_error(arm.tool_pose(q[exists]), poses[pose])
+    assert position.max() < 1e-9
+    assert rotation.max() < 1e-9
+    within = ((q >= arm.lower) & (q <= arm.upper)).all(axis=-1)
+    np.testing.assert_array_equal(within[exists], inside[exists])
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_an_answer_does_not_depend_on_its_batch(name, arms):
+    """Bit for bit: alone, at one sample, and among others in another order."""
+    arm = arms[name]
+    ik = SphericalIK(arm, 5)
+    poses = arm.tool_pose(samples(arm, 60, 3))
+    q, exists, inside = ik.solve_batch(poses)
+    order = np.random.default_rng(4).permutation(len(poses))
+    shuffled = ik.solve_batch(poses[order])
+    np.testing.assert_array_equal(shuffled[1], exists[order])
+    np.testing.assert_array_equal(shuffled[0][shuffled[1]], q[order][exists[order]])
+    for k, T in enumerate(poses):
+        alone = ik.solve(T)
+        np.testing.assert_array_equal(alone.q, q[k][exists[k]])
+        np.testing.assert_array_equal(alone.inside, inside[k][exists[k]])
+        for sample in range(len(ik.phi)):
+            part = ik.solve_sample(T, sample)
+            np.testing.assert_array_equal(part.q, alone.q[alone.sample == sample])
+            np.testing.assert_array_equal(part.branch, alone.branch[alone.sample == sample])
+
+
+@pytest.mark.parametrize("name", ["panda", "iiwa"])
+def test_out_of_reach(name, arms):
+    ik = SphericalIK(arms[name], 8)
+    general = ClosedFormIK(arms[name], 8)
+    rng = np.random.default_rng(5)
+    empty = 0
+    for _ in range(300):
+        T = from_position_quat(rng.uniform([-1.4, -1.4, -0.8], [1.4, 1.4, 1.6]), rng.normal(size=4))
+        ours, theirs = ik.solve(T), general.solve(T)
+        assert len(ours.q) == len(theirs.q)
+        empty += not len(ours.q)
+    assert 30 < empty < 270
+
+
+def test_aligned_axes_of_the_triple(arms):
+    """With the shoulder straight, joints 1 and 3 share their work; some split of it is found."""
+    arm = arms["panda"]
+    ik = SphericalIK(arm, 1)
+    for q in samples(arm, 100, 6):
+        q[1] = 0.0
+        T = arm.tool_pose(q)
+        found = ik.solve_at(T, float(q[6]))
+        assert (np.abs(found.q[:, [3, 4, 5]] - q[[3, 4, 5]]).max(axis=1) < 1e-5).any()
+        position, _ = pose_error(arm.tool_pose(found.q), T)
+        assert position.max() < 1e-6
+
+
+def test_solver_for_takes_the_compiled_one_where_it_can(arms):
+    assert isinstance(solver_for(arms["panda"], 2), SphericalIK)
+    _, y, z = np.eye(3)
+    # Three parallel axes, as a UR5 has them: a closed form, but of another family.
+    parallel = synthetic(
+        [z, y, y, y, z, y],
+        [[0, 0, 0.09], [0, 0.1, 0], [0.42, 0, 0], [0.39, 0, 0], [0, 0.1, 0], [0, 0, -0.09], [0, 0.08, 0]],
+    )
+    assert type(solver_for(parallel, 2)) is ClosedFormIK
+    with pytest.raises(ValueError, match="no spherical triple"):
+        SphericalIK(parallel, 2)

@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symgrasp.errors import UrdfError
+from symgrasp.files import resolve
+from symgrasp.poses import from_position_rpy, quat_wxyz
+from symgrasp.robot.assembly import Frame, Mount, assemble
+from symgrasp.robot.model import RobotModel
+
+WSG = resolve("package://static_scenes/hands/wsg50.urdf", Path()) or Path()
+IIWA = resolve("package://pybullet_data/kuka_iiwa/model.urdf", Path()) or Path()
+POSE = from_position_rpy([0.01, -0.02, 0.05], [0.3, -0.2, 1.0])
+FLANGE = Frame("lbr_iiwa_link_7", tuple(POSE[:3, 3]), tuple(quat_wxyz(POSE)))
+
+
+def test_a_mounted_hand_is_where_it_was_put():
+    iiwa, hand = RobotModel(IIWA), RobotModel(WSG)
+    both = RobotModel(IIWA, [Mount(FLANGE, WSG, "")])
+    rng = np.random.default_rng(0)
+    q = rng.uniform(iiwa.lower, iiwa.upper)
+    opened = rng.uniform(hand.lower, hand.upper)
+    values = dict(zip(both.joint_names, np.zeros(len(both.joint_names)), strict=True))
+    values |= dict(zip(iiwa.joint_names, q, strict=True)) | dict(zip(hand.joint_names, opened, strict=True))
+    links = both.forward(np.array(list(values.values())))
+    flange = iiwa.forward(q)[iiwa.link_index("lbr_iiwa_link_7")]
+    for link, pose in zip(hand.link_names, hand.forward(opened), strict=True):
+        np.testing.assert_allclose(links[both.link_index(link)], flange @ POSE @ pose, atol=1e-9)
+        assert len(both.hulls(link)) == len(hand.hulls(link))
+
+
+def test_the_same_hand_twice_takes_a_prefix():
+    other = Frame("lbr_iiwa_link_3")
+    both = RobotModel(IIWA, [Mount(FLANGE, WSG, ""), Mount(other, WSG, "second_")])
+    assert {"wsg50_tool", "second_wsg50_tool"} <= set(both.link_names)
+    assert {"wsg50_joint", "second_wsg50_joint"} <= set(both.joint_names)
+    mirror = next(j for j in both.joints if j.name == "second_wsg50_mirror_joint")
+    assert both.joint_names[mirror.source] == "second_wsg50_joint"
+    with pytest.raises(UrdfError, match="not used twice"):
+        RobotModel(IIWA, [Mount(FLANGE, WSG, ""), Mount(other, WSG, "")])
+
+
+def test_a_frame_without_a_body_may_stand_on_a_mounted_hand():
+    mounts = [Mount(FLANGE, WSG, ""), Mount(Frame("wsg50_base", (0.0, 0.0, 0.2)), None, "tip")]
+    model = RobotModel(IIWA, mounts)
+    links = model.forward(model.default_values())
+    base, tip = links[model.link_index("wsg50_base")], links[model.link_index("tip")]
+    np.testing.assert_allclose(tip[:3, 3], base[:3, 3] + 0.2 * base[:3, 2], atol=1e-12)
+    assert not model.has_shape("tip")
+
+
+def test_a_link_that_is_not_there():
+    with pytest.raises(UrdfError, match="did you mean 'lbr_iiwa_link_7'") as caught:
+        assemble(IIWA, [Mount(Frame("lbr_iiwa_link_8"), WSG, "")])
+    assert caught.value.field == "mount: link"
+
+
+def test_what_is_mounted_has_one_root(tmp_path):
+    two = tmp_path / "two.urdf"
+    two.write_text("<robot name='two'><link name='a'/><link name='b'/></robot>")
+    with pytest.raises(UrdfError, match="2 root links"):
+        assemble(IIWA, [Mount(FLANGE, two, "")])
+    with pytest.raises(UrdfError, match="readable URDF"):
+        assemble(IIWA, [Mount(FLANGE, tmp_path / "none.urdf", "")])
+
+
+def test_meshes_become_absolute_and_colours_stay_apart(tmp_path):
+    """Both files have a material called grey; each keeps its own."""
+    for name, color in (("arm", "1 0 0 1"), ("hand", "0 1 0 1")):
+        (tmp_path / f"{name}.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        (tmp_path / f"{name}.urdf").write_text(
+            f"<robot name='{name}'><material name='grey'><color rgba='{color}'/></material>"
+            f"<link name='{name}'><visual><geometry><mesh filename='{name}.obj'/></geometry>"
+            "<material name='grey'/></visual></link></robot>"
+        )
+    robot = ET.fromstring(assemble(tmp_path / "arm.urdf", [Mount(Frame("arm"), tmp_path / "hand.urdf", "")]))
+    meshes = [mesh.get("filename") for mesh in robot.iter("mesh")]
+    assert meshes == [str(tmp_path / "arm.obj"), str(tmp_path / "hand.obj")]
+    colors = {m.get("name"): m.find("color") for m in robot.findall("material")}
+    used = [m.get("name") for m in robot.iterfind("link/visual/material")]
+    assert len(set(used)) == 2
+    assert [c.get("rgba") for name in used if (c := colors[name]) is not None] == ["1 0 0 1", "0 1 0 1"]

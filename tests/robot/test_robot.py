@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from symgrasp.errors import UrdfError
+from symgrasp.files import package_dir
+from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.model import RobotModel
+from symgrasp.robot.robot import Arm, Robot
+
+DATA = package_dir("pybullet_data") or Path()
+PANDA = DATA / "franka_panda" / "panda.urdf"
+KUKA = DATA / "kuka_iiwa" / "model.urdf"
+
+
+@pytest.fixture(scope="module")
+def panda() -> RobotModel:
+    return RobotModel(PANDA)
+
+
+def make_arm(model: RobotModel, home: np.ndarray | None = None) -> Arm:
+    robot = Robot("panda", model, np.eye(4), model.default_values() if home is None else home)
+    return Arm("panda", robot, "panda_grasptarget", HANDS["franka"])
+
+
+@pytest.mark.parametrize("path", [PANDA, KUKA])
+def test_forward_kinematics_agrees_with_yourdfpy(path):
+    model = RobotModel(path)
+    urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
+    assert urdf.actuated_joint_names == list(model.joint_names)
+    q = np.random.default_rng(0).uniform(model.lower, model.upper, (20, len(model.joint_names)))
+    poses = model.forward(q)
+    for row, values in enumerate(q):
+        urdf.update_cfg(values)
+        for k, link in enumerate(model.link_names):
+            np.testing.assert_allclose(poses[row, k], urdf.get_transform(link, model.root), atol=1e-9)
+
+
+def test_tool_pose_is_the_chain_read_off_the_urdf(panda):
+    arm = make_arm(panda)
+    q = np.random.default_rng(1).uniform(arm.lower, arm.upper, (50, 7))
+    full = np.stack([arm.robot_values(row, 0.05) for row in q])
+    chain = panda.forward(full)[:, panda.link_index("panda_grasptarget")]
+    np.testing.assert_allclose(arm.tool_pose(q), chain, atol=1e-12)
+    assert arm.tool_pose(q.reshape(5, 10, 7)).shape == (5, 10, 4, 4)
+
+
+def test_limits_and_names_come_from_the_urdf(panda):
+    arm = make_arm(panda)
+    assert arm.joint_names == tuple(f"panda_joint{i}" for i in range(1, 8))
+    assert arm.lower[3] == -3.1416
+    assert arm.upper[5] == 3.8223
+
+
+def test_full_turns_are_taken_back_into_the_limits(panda):
+    arm = make_arm(panda)
+    inside = np.random.default_rng(2).uniform(arm.lower, arm.upper, (100, 7))
+    turns = np.random.default_rng(3).integers(-2, 3, (100, 7))
+    back, ok = arm.within_limits(inside + 2 * np.pi * turns)
+    assert ok.all()
+    np.testing.assert_allclose(back, inside, atol=1e-12)
+    outside = inside.copy()
+    outside[:, 3] = 1.0  # joint 4 reaches from -π to 0
+    assert not arm.within_limits(outside)[1].any()
+
+
+def test_neighbours_look_through_links_without_a_body(panda):
+    assert frozenset(("panda_link7", "panda_hand")) in panda.neighbours()
+    assert panda.mount_links() == {"panda_link0"}
+
+
+def test_hand_bodies_open_with_the_hand(panda):
+    arm = make_arm(panda)
+    for opening in (0.0, 0.03, 0.08):
+        _, left, right = arm.hand_bodies(opening)
+        gap = left[:, 1].min() - right[:, 1].max()
+        assert gap == pytest.approx(opening, abs=5e-4)  # the pads are modelled 0.1 mm proud
+
+
+def test_palm_stays_behind_the_finger_depth(panda):
+    palm, *_ = make_arm(panda).hand_bodies(0.04)
+    assert palm[:, 2].max() < -HANDS["franka"].finger_depth
+
+
+def test_a_shared_model_does_not_share_state(panda):
+    home = panda.default_values()
+    a, b = make_arm(panda, home), make_arm(panda, home.copy())
+    values = a.robot_values(np.full(7, 0.1) * np.sign(a.lower + a.upper + 1e-9), 0.02)
+    assert not np.array_equal(values, b.robot.home)
+    np.testing.assert_array_equal(a.robot.home, home)
+
+
+def test_six_and_seven_joint_arms_only(panda):
+    robot = Robot("panda", panda, np.eye(4), panda.default_values())
+    with pytest.raises(UrdfError, match="6 or 7 revolute joints, not 5"):
+        Arm("short", robot, "panda_link5", HANDS["franka"])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"links": ("panda_paw",)}, "panda_hand"),
+        ({"touch_links": ("panda_leftfingr",)}, "did you mean 'panda_leftfinger'"),
+        ({"joints": {"panda_finger_joint": 0.5}}, "did you mean 'panda_finger_joint1'"),
+    ],
+)
+def test_a_hand_that_is_not_on_the_robot(panda, change, message):
+    fields = {**HANDS["franka"].__dict__, **change}
+    robot = Robot("panda", panda, np.eye(4), panda.default_values())
+    with pytest.raises(UrdfError, match=message):
+        Arm("panda", robot, "panda_grasptarget", Hand(**fields))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<robot", "valid URDF"),
+        ("<robot name='r'/>", "valid URDF"),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><box size='-1 1 1'/></geometry></collision>"
+            "</link></robot>",
+            "sizes that are positive",
+        ),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><sphere radius='nan'/></geometry>"
+            "</collision></link></robot>",
+            "sizes that are positive",
+        ),
+        ("<robot name='r'><link name='a'/><link name='a'/></robot>", "not used twice"),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><joint name='j' type='fixed'>"
+            "<parent link='a'/><child link='b'/></joint><joint name='j' type='fixed'><parent link='a'/>"
+            "<child link='c'/></joint></robot>",
+            "joint name: 'j'",
+        ),
+        ("<robot name='r'><link name='a'/><link name='b'/></robot>", "2 root links"),
+        (
+            "<robot name='r'><link name='a'><visual><geometry><mesh filename='no.stl'/></geometry>"
+            "</visual></link></robot>",
+            "no.stl",
+        ),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='floating'>"
+            "<parent link='a'/><child link='b'/></joint></robot>",
+            "floating",
+        ),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='revolute'>"
+            "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>",
+            "lower and an upper limit",
+        ),
+    ],
+)
+def test_unusable_urdfs(tmp_path, text, message, capfd):
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    with pytest.raises(UrdfError, match=message) as caught:
+        RobotModel(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().out == ""
+
+
+def test_a_missing_urdf(tmp_path):
+    with pytest.raises(UrdfError, match="readable URDF"):
+        RobotModel(tmp_path / "none.urdf")

@@ -1,0 +1,314 @@
+from __future__ import annotations
+
+import json
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+
+from symgrasp.errors import ProfileError, SceneError, SymgraspError, UrdfError
+from symgrasp.files import SCENES_DIR
+from symgrasp.object.library import load_object
+from symgrasp.poses import from_position_rpy, translation
+from symgrasp.robot.hand import HANDS
+from symgrasp.scene.format import scene_schema
+from symgrasp.scene.scene import Scene
+from symgrasp.scene.shipped import shipped_scenes
+from tests.conftest import SHIPPED, write_scene
+
+
+def test_the_shipped_scenes():
+    assert {"soda_can", "bottle_on_table", "pick_pour_place", "log_two_robots"} <= set(SHIPPED)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_scenes_fit_the_schema(name):
+    schema = scene_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    path = shipped_scenes()[name]
+    jsonschema.validate(json.loads(json.dumps(yaml.safe_load(path.read_text()))), schema)
+    assert Scene.load(path).sha256 == Scene.load(name).sha256
+    assert Scene.load(name).name == name
+    assert path.read_text().startswith("# ")  # what it shows, and where its numbers come from
+
+
+def test_defaults(content, tmp_path):
+    del content["map"]
+    scene = Scene.load(write_scene(tmp_path, content))
+    assert scene.settings.model_dump() == {
+        "heights": 48, "angles": 96, "redundancy": 32, "approach": 0.0, "margin": 0.0,
+    }  # fmt: skip
+    assert scene.task().arms == ("panda",)
+    assert scene.manifold.angles == 96
+
+
+def test_poses_in_degrees_and_quaternions(content, tmp_path):
+    content["tasks"] = [
+        {"name": "a", "pose": {"position": [1, 2, 3], "rpy_deg": [0, 90, 45]}},
+        {"name": "b", "pose": {"position": [1, 2, 3], "quat_wxyz": [0.5, 0, 0.5, 0]}},
+    ]
+    scene = Scene.load(write_scene(tmp_path, content))
+    expected = from_position_rpy([1, 2, 3], [0, np.pi / 2, np.pi / 4])
+    np.testing.assert_allclose(scene.task("a").T_world_object, expected)
+    np.testing.assert_allclose(scene.task("b").T_world_object[:3, 2], [1, 0, 0], atol=1e-12)
+
+
+def test_content_builds_the_same_scene_elsewhere(content, tmp_path):
+    """Relative files become absolute, so that the content works without the scene's folder."""
+    (tmp_path / "cup.obj").write_bytes((SCENES_DIR / "bowl.obj").read_bytes())
+    content["obstacles"].append({"name": "cup", "mesh": "cup.obj"})
+    scene = Scene.load(write_scene(tmp_path, content))
+    again = Scene.from_content(json.loads(json.dumps(scene.content)))
+    assert again.sha256 == scene.sha256
+    assert again.obstacles[-1].path == tmp_path / "cup.obj"
+
+
+def test_objects_of_the_library_and_from_a_mesh(content, tmp_path):
+    """Whatever the profile came from, the content holds it in numbers."""
+    profile = Scene.load("soda_can").profile
+    profile.mesh(facets=128).export(tmp_path / "can.stl")
+    for source, error in (({"library": "can_330ml"}, 4e-3), ({"mesh": "can.stl"}, 3e-4)):
+        content["object"] = {"name": "can", **source}
+        scene = Scene.load(write_scene(tmp_path, content))
+        heights = np.linspace(0.002, 0.113, 30)
+        np.testing.assert_allclose(scene.profile.radius(heights), profile.radius(heights), atol=error)
+        assert set(scene.content["object"]) == {"name", "profile", "scale"}
+        assert Scene.from_content(scene.content).sha256 == scene.sha256
+
+
+def test_a_hand_described_in_the_scene(content, tmp_path):
+    content["robots"][0]["hand"] = {
+        "name": "stubby",
+        "links": ["panda_hand", "panda_leftfinger", "panda_rightfinger"],
+        "touch_links": ["panda_leftfinger", "panda_rightfinger"],
+        "joints": {"panda_finger_joint1": 0.5},
+        "min_opening": 0.0,
+        "max_opening": 0.05,
+        "finger_depth": 0.03,
+        "pad_width": 0.01,
+    }
+    scene = Scene.load(write_scene(tmp_path, content))
+    assert scene.arm().hand.max_opening == 0.05
+    assert not scene.arm().hand.spans(0.03)
+
+
+def test_a_hand_mounted_on_a_flange():
+    scene = Scene.load("log_iiwa_and_panda")
+    panda, iiwa = scene.arms.values()
+    assert (panda.hand.name, iiwa.hand.name) == ("franka", "wsg50")
+    assert (panda.tool, iiwa.tool) == ("panda_grasptarget", "wsg50_tool")
+    assert iiwa.dof == 7
+    links = iiwa.robot.model.forward(iiwa.robot_values(iiwa.home))
+    flange, base = (links[iiwa.robot.model.link_index(n)] for n in ("lbr_iiwa_link_7", "wsg50_base"))
+    np.testing.assert_allclose(base, flange @ translation([0, 0, 0.045]), atol=1e-12)
+    np.testing.assert_allclose(iiwa.tool_pose(iiwa.home)[:3, 2], flange[:3, 2], atol=1e-9)
+
+
+MOUNT = {"link": "panda_link8", "pose": {"rpy_deg": [0, 0, 45]}, "prefix": "second_"}
+
+
+def test_a_mounted_hand_with_a_prefix(content, tmp_path):
+    del content["robots"][0]["tool"]
+    content["robots"][0].update(hand="pr2", mount=MOUNT)
+    scene = Scene.load(write_scene(tmp_path, content))
+    arm = scene.arm()
+    assert arm.tool == "panda_tool"
+    assert arm.hand.links[0] == "second_gripper_pole"
+    assert "second_left_gripper_joint" in scene.robots["panda"].model.joint_names
+    assert Scene.from_content(json.loads(json.dumps(scene.content))).sha256 == scene.sha256
+
+
+def test_an_inline_hand_brings_its_urdf_table_and_tool(content, tmp_path):
+    """Its relative URDF becomes absolute, so that the content works without the scene's folder."""
+    urdf = (SCENES_DIR / "hands" / "wsg50.urdf").read_text()
+    (tmp_path / "hand.urdf").write_text(urdf)
+    del content["robots"][0]["tool"]
+    hand = {
+        "name": "mine", "urdf": "hand.urdf", "links": ["wsg50_base"], "touch_links": [],
+        "tool": {"link": "wsg50_base", "pose": {"position": [0, 0, 0.15]}},
+        "joints": {"wsg50_joint": [[0, 0], [0.05, 0.03], [0.1, 0.05]]},
+        "min_opening": 0, "max_opening": 0.1, "finger_depth": 0.05, "pad_width": 0.02,
+    }  # fmt: skip
+    content["robots"][0].update(hand=hand, mount=MOUNT)
+    scene = Scene.load(write_scene(tmp_path, content))
+    again = Scene.from_content(json.loads(json.dumps(scene.content)))
+    assert again.sha256 == scene.sha256
+    assert again.arm().hand.joint_values(0.025) == pytest.approx({"second_wsg50_joint": 0.015})
+    assert again.arm().tool == "panda_tool"
+
+
+def test_home_by_name(content, tmp_path):
+    content["robots"][0]["home"] = {"panda_joint4": -2.0, "panda_finger_joint1": 0.01}
+    scene = Scene.load(write_scene(tmp_path, content))
+    model = scene.robots["panda"].model
+    home = dict(zip(model.joint_names, scene.robots["panda"].home, strict=True))
+    assert home["panda_joint4"] == -2.0
+    assert home["panda_finger_joint1"] == 0.01
+    assert home["panda_joint1"] == 0.0
+
+
+HAND = {
+    "name": "mine", "links": ["panda_hand"], "touch_links": [], "joints": {"panda_finger_joint1": 0.5},
+    "min_opening": 0, "max_opening": 0.08, "finger_depth": 0.03, "pad_width": 0.02,
+}  # fmt: skip
+
+
+def robot(change):
+    return lambda c: c["robots"][0].update(change)
+
+
+BOMB = "a0: &a0 [x, x]\n" + "".join(f"a{k}: &a{k} [*a{k - 1}, *a{k - 1}]\n" for k in range(1, 40))
+
+BAD = [
+    ("a: [1,\n b: }", SceneError, "file", "YAML document"),
+    ("\x00", SceneError, "file", "YAML document"),
+    ("- 1", SceneError, "file", "mapping"),
+    ("", SceneError, "file", "mapping"),
+    ("a: !!bool foo", SceneError, "file", "YAML document"),
+    ("a: 1\na: 2", SceneError, "file", "YAML document"),
+    ("[" * 3000, SceneError, "file", "YAML document"),
+    (BOMB, SceneError, "file", "YAML document"),
+    (lambda c: c["map"].update(approach=1e300), SceneError, "map.approach", "less than or equal"),
+    (lambda c: c["tasks"][0]["pose"].update(quat_wxyz=[1e308, 1e308, 0, 0]), SceneError,
+     "tasks[0].pose.quat_wxyz[0]", "less than or equal"),
+    (lambda c: c.update(extra=1), SceneError, "extra", "spelling"),
+    (robot({"tol": "x"}), SceneError, "robots[0].tol", "spelling"),
+    (lambda c: c.pop("object"), SceneError, "object", "required"),
+    (lambda c: c["tasks"][0].pop("pose"), SceneError, "tasks[0].pose", "required"),
+    (lambda c: c.update(schema_version=2), SceneError, "schema_version", "1"),
+    (lambda c: c.update(tasks=[]), SceneError, "tasks", "at least 1"),
+    (robot({"urdf": "no.urdf"}), SceneError, "robots[0].urdf", "existing URDF file"),
+    (robot({"urdf": "package://no_such_package/a.urdf"}), SceneError, "robots[0].urdf", "existing URDF"),
+    (robot({"tool": "panda_grasp"}), SceneError, "robots[0].tool", "did you mean 'panda_grasptarget'"),
+    (robot({"hand": "frank"}), SceneError, "robots[0].hand", "did you mean 'franka'"),
+    (robot({"hand": None}), SceneError, "robots[0]", "either tool and hand, or arms"),
+    (robot({"hand": {"name": "mine"}}), SceneError, "robots[0].hand.links", "required"),
+    (robot({"hand": {**HAND, "max_opening": 0.0001, "min_opening": 0.05}}), SceneError,
+     "robots[0].hand.max_opening", "more than 0.05"),
+    (robot({"hand": {**HAND, "joints": {"panda_finger_joint1": [[0, 0]]}}}), SceneError,
+     "robots[0].hand.joints.panda_finger_joint1", "two or more"),
+    (robot({"hand": {**HAND, "urdf": "no.urdf"}}), SceneError, "robots[0].hand.urdf", "existing URDF file"),
+    (robot({"hand": HAND, "tool": None}), SceneError, "robots[0].tool", "hand mine names none"),
+    (robot({"mount": {"link": "panda_link8"}}), SceneError, "robots[0].mount", "a urdf of its own"),
+    (robot({"hand": "wsg50", "mount": {"link": "panda_link9"}}), SceneError,
+     "robots[0].mount.link", "did you mean 'panda_link8'"),
+    (robot({"home": [1, 2]}), SceneError, "robots[0].home", "7 values, for panda_joint1"),
+    (robot({"home": [9, 0, 0, 0, 0, 0, 0]}), SceneError, "robots[0].home", "panda_joint1 within"),
+    (robot({"home": {"joint1": 0}}), SceneError, "robots[0].home", "'panda_joint1'"),
+    (lambda c: c["object"].update(profile=[[0, -0.1], [1, 0.1]]), ProfileError, "profile[0]", "not negative"),
+    (lambda c: c["object"].update(profile=[[0, 0.1], [1, 0.1], [0.5, 0.1]]), ProfileError,
+     "profile[2]", "above"),
+    (lambda c: c["object"].update(mesh="can.stl"), SceneError,
+     "object", "exactly one of profile, library"),
+    (lambda c: c.update(object={"name": "o", "mesh": "no.stl"}), SceneError,
+     "object.mesh", "existing mesh file"),
+    (lambda c: c.update(object={"name": "o", "library": "beer"}), SceneError,
+     "object.library", "'jam_jar'"),
+    (lambda c: c["object"].update(profile="round"), SceneError, "object.profile", "list"),
+    (lambda c: c["obstacles"].append({"name": "m", "mesh": "no.stl"}), SceneError,
+     "obstacles[3].mesh", "mesh file"),
+    (lambda c: c["obstacles"][0].update(sphere={"radius": 1}), SceneError, "obstacles[0]", "exactly one of"),
+    (lambda c: c["obstacles"][0].update(box=[1, -1, 1]), SceneError, "obstacles[0].box[1]", "greater than 0"),
+    (lambda c: c["obstacles"][0].update(name="panda"), SceneError,
+     "robots, obstacles and object: name", "twice"),
+    (lambda c: c["tasks"][0]["pose"].update(position=[float("nan"), 0, 0]), SceneError,
+     "tasks[0].pose.position[0]", "finite"),
+    (lambda c: c["tasks"][0]["pose"].update(rpy_deg=[0, float("inf"), 0]), SceneError,
+     "tasks[0].pose.rpy_deg[1]", "finite"),
+    (lambda c: c["tasks"][0]["pose"].update(rpy_deg=[0, 0, 0], quat_wxyz=[1, 0, 0, 0]), SceneError,
+     "tasks[0].pose", "not both"),
+    (lambda c: c["tasks"][0]["pose"].update(quat_wxyz=[0, 0, 0, 0]), SceneError,
+     "tasks[0].pose", "length above"),
+    (lambda c: c["tasks"][0].update(arms=["hand"]), SceneError, "tasks[0].arms", "'panda'"),
+    (lambda c: c["map"].update(heights=0), SceneError, "map.heights", "greater than or equal to 1"),
+    (lambda c: c["map"].update(margin=-1), SceneError, "map.margin", "greater than or equal to 0"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "kind", "field", "expected"), BAD)
+def test_bad_scenes_get_one_line(change, kind, field, expected, content, tmp_path):
+    if callable(change):
+        change(content)
+    path = write_scene(tmp_path, content if callable(change) else change)
+    with pytest.raises(kind) as caught:
+        Scene.load(path)
+    error = caught.value
+    assert error.field == field
+    assert expected in error.expected
+    assert str(error).startswith(str(path))
+    assert "\n" not in str(error)
+
+
+def test_a_missing_scene(tmp_path):
+    with pytest.raises(SceneError, match="did you mean 'soda_can'"):
+        Scene.load("soda_cans")
+    with pytest.raises(SceneError, match="readable text file"):
+        Scene.load(tmp_path / "none.yaml")
+
+
+def test_a_missing_mesh_of_a_robot_is_an_error(content, tmp_path):
+    (tmp_path / "r.urdf").write_text(
+        "<robot name='r'><link name='a'><visual><geometry><mesh filename='package://meshes/a.obj'/>"
+        "</geometry></visual></link></robot>"
+    )
+    content["robots"][0]["urdf"] = "r.urdf"
+    with pytest.raises(UrdfError, match=r"link a: 'package://meshes/a.obj': expected an existing mesh file"):
+        Scene.load(write_scene(tmp_path, content))
+
+
+def test_unknown_names_list_the_valid_ones():
+    scene = Scene.load("log_two_robots")
+    with pytest.raises(SceneError, match="'left', 'right'"):
+        scene.arm("middle")
+    with pytest.raises(SceneError, match="'lift'"):
+        scene.task("drop")
+
+
+def test_another_object_takes_the_place_of_the_scenes_own():
+    scene = Scene.load("bottle_on_table")
+    ball = load_object("tennis_ball")[1]
+    own = scene.manifold
+    changed = scene.with_object("ball", ball)
+    assert changed.profile is ball
+    assert changed.manifold.profile is ball
+    assert (scene.manifold, scene.file.object.name) == (own, "bottle")
+    assert changed.robots is scene.robots
+    again = Scene.from_content(changed.content)
+    assert again.sha256 == changed.sha256 != scene.sha256
+    assert np.array_equal(again.profile.points, ball.points)
+    assert again.file.object.name == "ball"
+
+
+@pytest.mark.parametrize("name", ["", "x" * 101, "table", "panda"])
+def test_an_object_needs_a_name_of_its_own(name):
+    scene = Scene.load("bottle_on_table")
+    with pytest.raises(SymgraspError, match=r"^object: name: ") as caught:
+        scene.with_object(name, scene.profile)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_mounted_hand_can_be_replaced():
+    scene = Scene.load("log_iiwa_and_panda")
+    assert scene.mounted == {"iiwa": "wsg50"}
+    changed = scene.with_hand("iiwa", "pr2")
+    assert changed.mounted == {"iiwa": "pr2"}
+    assert changed.arm("iiwa").hand == HANDS["pr2"]
+    assert set(HANDS["pr2"].links) <= set(changed.arm("iiwa").robot.model.link_names)
+    assert changed.arm("panda").hand == scene.arm("panda").hand
+    assert scene.arm("iiwa").hand == HANDS["wsg50"]
+    assert changed.with_hand("iiwa", "wsg50").sha256 == scene.sha256
+    for arm, hand in [("panda", "wsg50"), ("iiwa", "franka"), ("iiwa", "no_such")]:
+        with pytest.raises(SceneError) as caught:
+            scene.with_hand(arm, hand)
+        assert len(str(caught.value).splitlines()) == 1
+
+
+def test_settings_can_be_changed_and_are_checked():
+    scene = Scene.load("soda_can")
+    assert scene.with_settings(heights=3).manifold.heights == 3
+    assert scene.manifold.heights == 24
+    with pytest.raises(SymgraspError, match="heights"):
+        scene.with_settings(heights=-3)
+    with pytest.raises(SymgraspError, match="spelling"):
+        scene.with_settings(height=3)

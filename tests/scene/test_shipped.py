@@ -1,0 +1,29 @@
+"""Every shipped scene, as it ships: its planner finds a plan, and the plan holds."""
+
+from __future__ import annotations
+
+import pytest
+
+from symgrasp.plan.plan import Plan
+from symgrasp.plan.verify import verify
+from symgrasp.planners.planning import plan_bimanual, plan_handover, plan_sequential
+from symgrasp.scene.scene import Scene
+from tests.conftest import SHIPPED
+
+
+def plan_for(scene: Scene) -> Plan:
+    """Plan with the planner that the scene is made for."""
+    if all(len(task.arms) == 1 for task in scene.tasks.values()):
+        return plan_sequential(scene)
+    return plan_bimanual(scene) if len(scene.tasks) == 1 else plan_handover(scene)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_scene_s_planner_finds_a_plan_that_holds(name):
+    scene = Scene.load(name)
+    plan = plan_for(scene)
+    assert verify(plan).failures == []
+    grid = scene.manifold
+    cells = {grid.cell(h.grasp.h, h.grasp.theta) for task in plan.tasks for h in task.holds}
+    assert cells != {(0, 0)}
+    assert all(hold.margin_along > 0 for task in plan.tasks for hold in task.holds)
