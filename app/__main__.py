@@ -11,6 +11,7 @@ import threading
 import warnings
 
 from app.compute.cache import SharedCache
+from app.compute.warm_up import compute_first_map
 from app.server.lobby import open_lobby
 from symgrasp.compiling import COMPILING, telling_of_compiling
 from symgrasp.errors import InputError, SymgraspError
@@ -30,11 +31,11 @@ def serve(scene: str, host: str, port: int) -> None:
         InputError: the scene is unusable or the port is not free.
     """
     _check_free(host, port)
-    store = _warm_store(scene)
+    cache = _warm_cache(scene)
     # A browser may leave while something is drawn for it.
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     try:
-        with open_lobby(store, host, port):
+        with open_lobby(cache, host, port):
             shown = f"[{host}]" if ":" in host else host
             print(f"symgrasp: http://{shown}:{port}", flush=True)
             threading.Event().wait()
@@ -44,12 +45,12 @@ def serve(scene: str, host: str, port: int) -> None:
         print("\nsymgrasp: stopped", flush=True)
 
 
-def _warm_store(scene: str) -> SharedCache:
+def _warm_cache(scene: str) -> SharedCache:
     """Return the store with the first map in it, so that whoever opens the page finds it there."""
     with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
-        store = SharedCache(scene)
-        store.warm()
-    return store
+        cache = SharedCache(scene)
+        compute_first_map(cache)
+    return cache
 
 
 def _check_free(host: str, port: int) -> None:

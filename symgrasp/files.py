@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from typing import IO, Any
 
 import yaml
 
-__all__ = ["SCENES_DIR", "package_dir", "parse_yaml", "resolve", "write_atomically"]
+__all__ = ["SCENES_DIR", "file_sha256", "package_dir", "parse_yaml", "resolve", "write_atomically"]
 
 SCENES_DIR = Path(__file__).resolve().parent.parent / "static_scenes"
 """The shipped scenes and their meshes; beside the package, in a checkout and when installed."""
@@ -52,6 +53,16 @@ def resolve(reference: str, folder: Path) -> Path | None:
     candidates = [root / inner] if root else []
     candidates += [parent / rest for parent in (folder, *folder.parents)]
     return next((path for path in candidates if path.is_file()), None)
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's content.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 class _Loader(yaml.SafeLoader):

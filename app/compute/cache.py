@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections import OrderedDict
 from pathlib import Path
 
-from app.compute.map_service import MapService, check_visuals, log
 from app.files.links import Link
+from app.scene3d.visual_meshes import check_visuals
 from app.state.object_choice import OWN, ObjectChoice, from_library
-from app.state.requests import MapRequest, MapResult
-from symgrasp.errors import Cancelled, SceneError, SymgraspError, one_of
+from app.state.requests import MapKey, MapRequest, MapResult
+from symgrasp.errors import SceneError, one_of
 from symgrasp.files import SCENES_DIR
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
@@ -19,34 +18,33 @@ from symgrasp.world import check_tasks
 
 __all__ = ["SharedCache"]
 
-
 MAPS_KEPT = 64
-"""Maps that the server remembers, newest first; a big one (96 x 192 cells) takes about 4 MB."""
-
+"""Maps that the server keeps, newest first; a big one (96 x 192 cells) takes about 4 MB."""
 
 POSES_KEPT = 6
 """Of them, those of one task and arm that differ in pose: a drag leaves dozens that nobody comes back to."""
 
 
-WARMING = 5.0
-"""How long (s) people wait for the first map before the page opens without it."""
-
-
 class SharedCache:
-    """What all browsers share because it never changes: loaded scenes and computed maps.
+    """Scenes by name and maps by content; may be used from any thread.
 
     Args:
         first: the scene the page opens with, a shipped name or a file.
 
     Raises:
         InputError: that scene is unusable.
+
+    Attributes:
+        first: the scene the page opens with.
+        names: the scenes that can be opened by name.
+        folders: where the files of an uploaded scene may lie.
     """
 
     def __init__(self, first: str) -> None:
         self._lock = threading.Lock()
         self._scenes: dict[str, Scene] = {}
-        self._with: dict[tuple[str, str], tuple[Scene, ObjectChoice]] = {}
-        self._maps: OrderedDict[tuple[object, ...], MapResult] = OrderedDict()
+        self._with_object: dict[tuple[str, str], tuple[Scene, ObjectChoice]] = {}
+        self._maps: OrderedDict[MapKey, MapResult] = OrderedDict()
         self.first = first
         self.names = tuple(dict.fromkeys([first, *shipped_scenes()]))
         own = [] if first in shipped_scenes() else [Path(first).resolve().parent]
@@ -71,23 +69,23 @@ class SharedCache:
         with self._lock:
             return self._scenes.setdefault(name, scene)
 
-    def scene_with(self, name: str, choice: str) -> tuple[Scene, ObjectChoice | None]:
+    def scene_with(self, name: str, option: str) -> tuple[Scene, ObjectChoice | None]:
         """Return a scene by name with its own object or one of the library, and that object.
 
         Raises:
             InputError: one of them is unusable, or they do not go together.
         """
         scene = self.scene(name)
-        if choice == OWN:
+        if option == OWN:
             return scene, None
         with self._lock:
-            known = self._with.get((name, choice))
+            known = self._with_object.get((name, option))
         if known:
             return known
-        object_choice = from_library(choice)
-        changed = scene.with_object(object_choice.name, object_choice.profile), object_choice
+        choice = from_library(option)
+        changed = scene.with_object(choice.name, choice.profile), choice
         with self._lock:
-            return self._with.setdefault((name, choice), changed)
+            return self._with_object.setdefault((name, option), changed)
 
     def linked(self, link: Link) -> tuple[Scene, ObjectChoice | None]:
         """Return the scene of a link with its object and hands.
@@ -95,50 +93,28 @@ class SharedCache:
         Raises:
             InputError: there is none of that name.
         """
-        scene, object_choice = self.scene_with(link.scene or self.first, link.object or OWN)
+        scene, choice = self.scene_with(link.scene or self.first, link.object or OWN)
         for arm, hand in link.hands.items():
             if scene.mounted.get(arm) != hand:
                 scene = scene.with_hand(arm, hand)
                 check_visuals(scene)
-        return scene, object_choice
+        return scene, choice
 
     def map(self, request: MapRequest) -> MapResult | None:
-        """Return a map that was computed before."""
+        """Return a map that was computed before, with the names of the request."""
         with self._lock:
-            known = self._maps.get(request.place)
+            known = self._maps.get(request.key)
             if known:
-                self._maps.move_to_end(request.place)
-        return known.of(request) if known else None
+                self._maps.move_to_end(request.key)
+        return known.renamed(request) if known else None
 
     def keep(self, result: MapResult) -> None:
-        """Remember a map."""
+        """Keep a map."""
         with self._lock:
-            self._maps[result.request.place] = result
+            self._maps[result.request.key] = result
             requests = [known.request for known in self._maps.values()]
             alike = [r for r in requests if r.pose and r.differs_in_pose(result.request)]
             for request in alike[:-POSES_KEPT]:
-                del self._maps[request.place]
+                del self._maps[request.key]
             while len(self._maps) > MAPS_KEPT:
                 self._maps.popitem(last=False)
-
-    def warm(self) -> None:
-        """Compute the first map of the first scene, unless that takes too long to wait for.
-
-        What goes wrong is left for the page to say.
-        """
-        scene = self.scene(self.first)
-        task = scene.task()
-        begun: list[float] = []
-
-        def patience(share: float) -> None:
-            begun.append(time.monotonic())  # first told when everything is compiled
-            if begun[-1] - begun[0] > WARMING and share < 1:
-                raise Cancelled
-
-        bench = MapService(self)
-        try:
-            bench.map(MapRequest(scene, task.arms[0], task.name), patience)
-        except SymgraspError as error:  # also when cancelled
-            log.info("no first map: %s", error)
-        finally:
-            bench.close()

@@ -1,17 +1,16 @@
-"""Where one browser's maps and plans are computed: a process of its own, which may die without harm."""
+"""The process that computes for one session, as its job queue calls it; it may die without harm."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-from app.compute.cache import SharedCache
-from app.compute.map_service import Maps
-from app.compute.plan_service import OpenedPlan, PlanRequest
-from app.compute.process_pool import ProcessPool, _Process
-from app.state.plan_results import PlanResult, PlanResults
+from app.compute.channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
+from app.compute.plan_service import OpenedPlan, PlanOutcome, PlanRequest
+from app.compute.process_pool import ProcessPool, WorkerProcess
+from app.state.plan_results import PlanResult
 from app.state.requests import (
     CompareRequest,
     Comparison,
@@ -19,6 +18,7 @@ from app.state.requests import (
     ExplainResult,
     MapRequest,
     MapResult,
+    Maps,
 )
 from symgrasp.errors import Cancelled, NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
@@ -27,14 +27,11 @@ from symgrasp.scene.scene import Scene
 
 __all__ = ["ComputeProcess", "ProcessDied"]
 
-TICK = 0.05
-"""Time (s) after which a cancel is heard although the process says nothing."""
+POLL_INTERVAL = 0.05
+"""Time (s) after which a cancel is noticed although the process sends nothing."""
 
-PATIENCE = 10.0
-"""How long (s) a process may take to hear a cancel. Compiled code and new physics worlds take their time."""
-
-MOST_THINGS = 500
-"""Scenes and parts of scenes that a process keeps; then another takes its place."""
+CANCEL_TIMEOUT = 10.0
+"""How long (s) a call may go on after a cancel. Compiled code and new physics worlds take their time."""
 
 
 class ProcessDied(Exception):
@@ -42,22 +39,28 @@ class ProcessDied(Exception):
 
 
 class ComputeProcess:
-    """Computes for one browser; used by one thread at a time.
+    """Calls `MapService` and `PlanService` in a process of its own; used by one thread at a time.
 
-    `MapService` and `PlanService` do the computing in the process, which is started when it is first needed.
+    The process is started when it is first needed. Every method may raise `Cancelled` through its
+    progress, the errors of the service, and `ProcessDied`.
 
     Args:
-        store: knows the maps that were computed before, and keeps new ones.
-        staff: starts the process.
+        pool: starts the process.
+        keep: called with every map that is computed.
         compiling: called when the process compiles something for the first time on this machine.
     """
 
     def __init__(
-        self, store: SharedCache, pool: ProcessPool, compiling: Callable[[], None] = lambda: None
+        self,
+        pool: ProcessPool,
+        keep: Callable[[MapResult], None] = lambda _: None,
+        compiling: Callable[[], None] = lambda: None,
     ) -> None:
-        self._store, self._pool, self._compiling = store, pool, compiling
-        self._process: _Process | None = None
-        self._lister: _Process | None = None
+        self._pool, self._keep, self._compiling = pool, keep, compiling
+        self._process: WorkerProcess | None = None
+        self._planner: WorkerProcess | None = None
+        self._requests: dict[tuple[str, str], MapRequest] = {}
+        self._computed: list[ComputedMap] = []
 
     @property
     def pid(self) -> int | None:
@@ -65,115 +68,149 @@ class ComputeProcess:
         return self._process.pid if self._process else None
 
     def close(self) -> None:
-        """End the process; the next computation starts another."""
+        """End the process; the next call starts another."""
         process, self._process = self._process, None
         if process:
             process.end()
 
     def map(self, request: MapRequest, progress: Progress) -> MapResult:
-        """Return the map of a request, computed unless it is known."""
-        return self._store.map(request) or self._do("map", progress, request)
+        """Compute a map."""
+        self._call("map", progress, request, maps=[request])
+        return self._results([request])[request.task, request.arm]
 
-    def check(self, request: CompareRequest, known: FeasibilityMap, progress: Progress) -> Comparison:
+    def compare(
+        self, request: CompareRequest, shifted_from: FeasibilityMap, progress: Progress
+    ) -> Comparison:
         """Compute the map of the turned object from scratch, and compare it with the shifted one."""
-        return self._do("check", progress, request, known)
+        return self._call("compare", progress, request, shifted_from)
 
     def explain(self, request: ExplainRequest, progress: Progress) -> ExplainResult:
-        """Judge every candidate of a cell."""
-        return self._do("explain", progress, request)
+        """Compute the result of every candidate of a cell."""
+        return self._call("explain", progress, request)
 
     def check_tasks(self, scene: Scene, progress: Progress) -> None:
-        """Check the tasks of a scene that came from outside."""
-        self._do("check_tasks", progress, scene)
+        """Check the tasks of a scene that was uploaded."""
+        self._call("check_tasks", progress, scene)
 
-    def run(self, order: PlanRequest, plan_results: PlanResults, progress: Progress) -> PlanResults:
-        """Run a planner; return the book with what it found, or with why it found nothing."""
-        found = self._do("run", progress, order, plan_results.cleared())
-        self._lister = self._process
-        return found
+    def plan(self, request: PlanRequest, known: Maps, progress: Progress) -> tuple[PlanOutcome, Maps]:
+        """Run a planner; return what it found, and the maps it used by task and arm.
 
-    def more(self, maps: Maps, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
-        """Return further plans of the last run, and whether there may be still more.
+        Args:
+            request: which planner for what.
+            known: those of the maps it takes that were computed before.
+            progress: told the finished share; may raise `Cancelled`.
+        """
+        outcome = self._call("plan", progress, request, known, maps=request.maps)
+        self._planner = self._process
+        return outcome, known | self._results(request.maps)
+
+    def more(self, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
+        """Return further plans of the last list, and whether there may be still more.
 
         Raises:
-            NoPlanError: the process of the last run is gone, and its list with it.
+            NoPlanError: the process that made the list is gone, and the list with it.
         """
-        if self._process is None or self._process is not self._lister:
+        if self._process is None or self._process is not self._planner:
             raise NoPlanError("the list of solutions ended with the process that made it: plan again")
-        return self._do("more", progress, maps)
+        return self._call("more", progress)
 
-    def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
-        """Read a plan file and verify it; if it holds, return all that is needed to show it."""
-        return self._do("open", progress, content, name)
+    def open(self, content: bytes, name: str, progress: Progress) -> tuple[OpenedPlan, Maps]:
+        """Read a plan file and verify it; if it holds, return it with its scene, and its maps."""
+        opened: OpenedPlan = self._call("open", progress, content, name)
+        if opened.scene is None:
+            return opened, {}
+        scene = opened.scene.scene
+        requests = [MapRequest(scene, c.map.arm, c.map.task) for c in self._computed]
+        maps = self._results(requests)
+        for result in maps.values():
+            self._keep(result)
+        return opened, maps
 
-    def _do(self, name: str, progress: Progress, *args: object) -> Any:
-        process = self._ready(name, progress)
-        line = process.line
+    def _results(self, requests: Sequence[MapRequest]) -> Maps:
+        """Return the maps that the last call computed, as the answers to requests."""
+        wanted = {(request.task, request.arm): request for request in requests}
+        found = ((c, wanted.get((c.map.task, c.map.arm))) for c in self._computed)
+        return {(r.task, r.arm): MapResult(r, c.map, c.contacts) for c, r in found if r}
+
+    def _call(self, method: str, progress: Progress, *args: object, maps: Sequence[MapRequest] = ()) -> Any:
+        """Call a method of the services in the process.
+
+        Args:
+            method: its name there.
+            progress: told the finished share; may raise `Cancelled`.
+            args: of the method, besides its progress.
+            maps: the maps that it may compute.
+        """
+        process = self._ready(progress)
+        self._requests = {(request.task, request.arm): request for request in maps}
+        self._computed = []
         process.job_id += 1
         try:
-            line.forget_maps()
-            line.send(("do", process.job_id, (name, args)))
+            process.channel.send(Call(process.job_id, method, args))
             return self._follow(process, progress)
         except Cancelled:
-            process.unheard = time.monotonic()
+            process.cancelled_at = time.monotonic()
             with suppress(OSError):  # dead already: found out when it is needed next
-                line.send(("cancel", process.job_id, None))
+                process.channel.send(Cancel(process.job_id))
             raise
         except (EOFError, OSError) as error:
             self._process = None
             how = process.end(grace=1.0)  # a pipe may end a little before its process does
-            raise ProcessDied(
-                f"the process that computes ended unexpectedly ({how or 'it hung up'})"
-            ) from error
+            text = f"the process that computes ended unexpectedly ({how or 'it hung up'})"
+            raise ProcessDied(text) from error
 
-    def _ready(self, name: str, progress: Progress) -> _Process:
-        """Return a process that waits for an errand."""
+    def _ready(self, progress: Progress) -> WorkerProcess:
+        """Return a process that waits for a call."""
         process = self._process
-        if process and process.unheard is not None:
+        if process and process.cancelled_at is not None:
             try:
-                self._drain(process, process.unheard, progress)
+                self._await_end(process, process.cancelled_at, progress)
             except (EOFError, OSError):
                 self.close()
-        elif process and (not process.is_alive or (process.line.known > MOST_THINGS and name != "more")):
+        elif process and not process.is_alive:
             self.close()
         if self._process is None:
             self._process = self._pool.take()
         return self._process
 
-    def _drain(self, process: _Process, since: float, progress: Progress) -> None:
-        """Wait until the process has heard the cancel, but not for ever."""
-        while process.unheard is not None:
-            if process.line.connection.poll(TICK):
-                word, _, content = process.line.receive()
-                if word == "keep":
-                    self._store.keep(content)
-                elif word in ("done", "failed"):
-                    process.unheard = None
-            if process.unheard is not None and time.monotonic() - since > PATIENCE:
+    def _await_end(self, process: WorkerProcess, since: float, progress: Progress) -> None:
+        """Wait until the call that was cancelled ends, but not for ever."""
+        while process.cancelled_at is not None:
+            if process.channel.poll(POLL_INTERVAL):
+                message = process.channel.receive()
+                if isinstance(message, ComputedMap):
+                    self._receive_map(message)
+                elif not isinstance(message, (ProgressReport, Compiling)):
+                    process.cancelled_at = None
+            if process.cancelled_at is not None and time.monotonic() - since > CANCEL_TIMEOUT:
                 self.close()
                 return
             progress(0.0)
 
-    def _follow(self, process: _Process, progress: Progress) -> Any:
-        """Return what comes out of an errand."""
-        line, share = process.line, 0.0
+    def _follow(self, process: WorkerProcess, progress: Progress) -> Any:
+        """Return what a call returns, and pass on what it reports."""
+        channel, share = process.channel, 0.0
         while True:
-            if not line.connection.poll(TICK):
+            if not channel.poll(POLL_INTERVAL):
                 progress(share)
                 continue
-            word, _, content = line.receive()
-            if word == "progress":
-                share = content
+            message = channel.receive()
+            if isinstance(message, ProgressReport):
+                share = message.share
                 progress(share)
-            elif word == "known?":
-                line.send(("known", process.job_id, self._store.map(content)))
-            elif word == "keep":
-                self._store.keep(content)
-            elif word == "compiling":
+            elif isinstance(message, ComputedMap):
+                self._receive_map(message)
+            elif isinstance(message, Compiling):
                 self._compiling()
-            elif word == "failed":
-                if isinstance(content, (EOFError, OSError)):
-                    raise RuntimeError(f"{type(content).__name__}: {content}")
-                raise content
+            elif isinstance(message, Failure):
+                if isinstance(message.error, (EOFError, OSError)):  # not of this connection
+                    raise RuntimeError(f"{type(message.error).__name__}: {message.error}")
+                raise message.error
             else:
-                return content
+                return message.value
+
+    def _receive_map(self, computed: ComputedMap) -> None:
+        self._computed.append(computed)
+        request = self._requests.get((computed.map.task, computed.map.arm))
+        if request:
+            self._keep(MapResult(request, computed.map, computed.contacts))

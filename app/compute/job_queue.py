@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.compute.compute_process import ProcessDied
+from symgrasp.compiling import telling_of_compiling
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
 
@@ -19,26 +20,28 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A computation and who hears of it; all are called on the worker's thread.
+    """A computation and its listeners; all are called on the thread of the queue.
 
     Attributes:
         run: computes; calls its argument with the finished share, which may raise `Cancelled`.
-        progress: told the finished share.
-        done: told the result.
-        failed: told one line about what went wrong.
+        progress: called with the finished share.
+        compiling: called when code has to be compiled.
+        done: called with the result.
+        failed: called with one line about what went wrong.
     """
 
     run: Callable[[Progress], Any]
     progress: Progress
+    compiling: Callable[[], None]
     done: Callable[[Any], None]
     failed: Callable[[str], None]
 
 
 class JobQueue:
-    """One thread with room for one waiting job.
+    """One thread, with room for one waiting job.
 
     A new job replaces the waiting one and cancels the one under way, which stops at its next
-    progress; its listeners may still hear a last word that was on its way.
+    progress; its listeners may still receive a last call that was on its way.
 
     Args:
         name: of the thread.
@@ -63,9 +66,14 @@ class JobQueue:
                 self._changed.notify()
 
     def cancel(self) -> None:
-        """Stop what is under way and forget what waits."""
+        """Stop the job under way and forget the one that waits."""
         with self._changed:
             self._waiting = self._running = None
+
+    def compiling(self) -> None:
+        """Tell the listener of the job under way that code is compiled for it."""
+        if job := self._running:
+            job.compiling()
 
     def close(self) -> None:
         """Cancel everything and end the thread; may be called from anywhere, more than once."""
@@ -99,7 +107,8 @@ class JobQueue:
                 raise Cancelled
 
         try:
-            result = job.run(progress)
+            with telling_of_compiling(self.compiling):
+                result = job.run(progress)
         except Cancelled:
             return
         except SymgraspError as error:

@@ -1,22 +1,24 @@
-"""What the page asks the planners for: the same calls as those of the command line."""
+"""Runs planners for one session, in its process, with the same calls as the command line."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations, islice
+from pathlib import Path
 
 import numpy as np
 
-from app.compute.map_service import Maps, MapService, check_visuals
+from app.compute.map_service import MapService
 from app.files.scene_files import refuse_foreign_files
+from app.scene3d.visual_meshes import check_visuals
 from app.state.object_pose import ObjectPose, moved
-from app.state.plan_results import ClimbReplay, Kind, PlanFileReport, PlanResult, PlanResults, Refusal
-from app.state.requests import MapRequest
+from app.state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
+from app.state.requests import MapRequest, Maps
 from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import NoPlanError, PlanError
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.object.manifold import ROLLS
+from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.plan.checked_plan import check_plan
 from symgrasp.plan.plan import Hold, Plan, PlanTask
 from symgrasp.planners.bimanual import ClimbStep
@@ -34,18 +36,21 @@ from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
-__all__ = ["PLAN_LIMIT", "OpenedPlan", "PlanRequest", "PlanService"]
+__all__ = ["PLAN_LIMIT", "OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService"]
 
 PLAN_LIMIT = 5_000_000
-"""Largest plan file (bytes) that is looked at."""
+"""Largest plan file (bytes) that is read."""
 
 LISTED = 10
 """How many plans are listed at a time."""
 
+FeasibilityMaps = Mapping[tuple[str, str], FeasibilityMap]
+"""(task, arm) → map."""
+
 
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
-    """What is to be planned.
+    """Run a planner.
 
     Attributes:
         scene: the scene as loaded.
@@ -57,7 +62,7 @@ class PlanRequest:
     """
 
     scene: Scene
-    kind: Kind
+    kind: PlanKind
     method: str = ""
     name: str = ""
     poses: Mapping[str, ObjectPose] = field(default_factory=dict)
@@ -72,8 +77,10 @@ class PlanRequest:
         return [self.scene.task(self.name)] if self.kind == "bimanual" else tasks
 
     @property
-    def requests(self) -> list[MapRequest]:
-        """The maps it takes."""
+    def maps(self) -> list[MapRequest]:
+        """The maps it takes; none where the planner refuses the tasks anyway."""
+        if self.kind == "bimanual" and len(self.tasks[0].arms) == 1:
+            return []
         return [
             MapRequest(self.scene, arm, task.name, self.poses.get(task.name))
             for task in self.tasks
@@ -82,11 +89,37 @@ class PlanRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class OpenedPlan:
-    """A plan file that was looked at.
+class PlanOutcome:
+    """What a planner found.
 
     Attributes:
-        report: what was found out.
+        kind: which planner.
+        plans: the first plans of its list; none where there is a refusal.
+        more: whether the list may go on.
+        refusal: why it found nothing.
+        climb: the hill climbing, if that was the method.
+    """
+
+    kind: PlanKind
+    plans: tuple[PlanResult, ...] = ()
+    more: bool = False
+    refusal: Refusal | None = None
+    climb: ClimbReplay | None = None
+
+    def added_to(self, results: PlanResults, maps: Maps) -> PlanResults:
+        """Return the results of a page with this outcome, which was made from those maps."""
+        if self.plans:
+            return results.found(self.kind, self.plans, maps, more=self.more, climb=self.climb)
+        assert self.refusal
+        return results.refused(self.kind, self.refusal, maps, self.climb)
+
+
+@dataclass(frozen=True, eq=False)
+class OpenedPlan:
+    """A plan file that was read and verified.
+
+    Attributes:
+        report: what was checked.
         scene: the plan's scene, if the plan holds.
         plan: the plan, if it holds.
     """
@@ -97,14 +130,15 @@ class OpenedPlan:
 
 
 class PlanService:
-    """Plans for one browser; used by one thread at a time.
+    """Runs planners; used by one thread at a time.
 
     Args:
-        bench: computes the maps.
+        maps: computes the maps.
+        folders: where the files of an uploaded scene may lie.
     """
 
-    def __init__(self, bench: MapService) -> None:
-        self.bench = bench
+    def __init__(self, maps: MapService, folders: tuple[Path, ...]) -> None:
+        self._maps, self._folders = maps, folders
         self._list: Plans | None = None
         self._scene: Scene | None = None
         self._progress: Progress | None = None
@@ -115,37 +149,41 @@ class PlanService:
             self._list.close()
             self._list = None
 
-    def run(self, order: PlanRequest, plan_results: PlanResults, progress: Progress) -> PlanResults:
-        """Run a planner; return the book with what it found, or with why it found nothing.
+    def plan(self, request: PlanRequest, known: Maps, progress: Progress) -> PlanOutcome:
+        """Run a planner.
+
+        Args:
+            request: which planner for what.
+            known: those of the maps it takes that were computed before.
+            progress: told the finished share; may raise `Cancelled`.
 
         Raises:
             SceneError: the scene has nothing for that planner.
         """
         self.close()
-        scene = moved(order.scene, order.poses)
-        many = order.kind != "bimanual" or len(order.tasks[0].arms) > 1
-        maps, rest = self.bench.maps(order.requests if many else [], progress)
-        known = {key: result.map for key, result in maps.items()}
+        scene = moved(request.scene, request.poses)
+        results, progress = self._maps.maps(request.maps, known, progress)
+        maps = {key: result.map for key, result in results.items()}
         try:
-            if order.method == "hill_climb":
-                return self._climb(order, scene, maps, plan_results, rest)
-            if order.method in ("first", "regrasp"):
-                by_task = {task: m for (task, _), m in known.items()}
-                plan = plan_sequential(scene, order.name, by_task, order.method, rest)
-                return plan_results.found(order.kind, (_result(plan, scene, maps),), more=False)
-            self._progress, self._scene = rest, scene
-            self._list = self._listing(order, scene, known)
-            plans, more = self._next(maps, first=True)
-            return plan_results.found(order.kind, plans, more=more)
+            if request.method == "hill_climb":
+                return _climb(request, scene, maps, progress)
+            if request.method in ("first", "regrasp"):
+                plan = plan_sequential(scene, request.name, maps, request.method, progress)
+                return PlanOutcome(request.kind, (_result(plan, scene),))
+            self._progress, self._scene = progress, scene
+            self._list = self._new_list(request, scene, maps)
+            plans, more = self._next()
+            assert plans  # a planner that finds nothing says why
+            return PlanOutcome(request.kind, plans, more)
         except NoPlanError as error:
             self.close()
             conflict = error.conflict if isinstance(error, ConflictError) else None
-            return plan_results.refused(order.kind, Refusal(str(error), conflict), maps)
+            return PlanOutcome(request.kind, refusal=Refusal(str(error), conflict))
 
-    def more(self, maps: Maps, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
-        """Return further plans of the last run, and whether there may be still more."""
+    def more(self, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
+        """Return further plans of the last list, and whether there may be still more."""
         self._progress = progress
-        return self._next(maps)
+        return self._next()
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
         """Read a plan file and verify it; if it holds, return all that is needed to show it.
@@ -160,8 +198,8 @@ class PlanService:
         if len(content) > PLAN_LIMIT:
             size, limit = f"{len(content) / 1e6:.1f} MB", f"{PLAN_LIMIT / 1e6:g} MB"
             raise PlanError(name, "size of the file", size, f"a plan of at most {limit}")
-        folders = self.bench.store.folders
-        refuse_foreign_files(f"{name}: scene.content", Plan.parse(content, name).scene.content, folders)
+        content_of_scene = Plan.parse(content, name).scene.content
+        refuse_foreign_files(f"{name}: scene.content", content_of_scene, self._folders)
         checked = check_plan(content, name, lambda share: progress(share / 2))
         report = PlanFileReport(name, checked.report.checks, tuple(checked.report.failures))
         scene, plan = checked.scene, checked.plan
@@ -170,71 +208,64 @@ class PlanService:
         check_visuals(scene)
         keys = dict.fromkeys((task.name, hold.arm) for task in plan.tasks for hold in task.holds)
         requests = [MapRequest(scene, arm, task) for task, arm in keys]
-        maps, _ = self.bench.maps(requests, lambda share: progress((1 + share) / 2))
-        return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), _result(plan, scene, maps))
+        self._maps.maps(requests, {}, lambda share: progress((1 + share) / 2))
+        return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), _result(plan, scene))
 
-    def _listing(
-        self, order: PlanRequest, scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap]
-    ) -> Plans:
+    def _new_list(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:
         def tell(share: float) -> None:
-            assert self._progress
+            assert self._progress  # that of the call under way, which may be `more`
             self._progress(share)
 
-        if order.kind == "sequential":
-            return sequential_plans(scene, order.name, {task: m for (task, _), m in maps.items()}, tell)
-        if order.kind == "bimanual":
-            return bimanual_plans(scene, order.name, {arm: m for (_, arm), m in maps.items()}, tell)
+        if request.kind == "sequential":
+            return sequential_plans(scene, request.name, maps, tell)
+        if request.kind == "bimanual":
+            return bimanual_plans(scene, request.name, maps, tell)
         return handover_plans(scene, maps, tell)
 
-    def _next(self, maps: Maps, *, first: bool = False) -> tuple[tuple[PlanResult, ...], bool]:
+    def _next(self) -> tuple[tuple[PlanResult, ...], bool]:
         if self._list is None or self._scene is None:
             return (), False
         scene = self._scene
-        plans = tuple(_result(plan, scene, maps) for plan in islice(self._list, LISTED))
+        plans = tuple(_result(plan, scene) for plan in islice(self._list, LISTED))
         more = len(plans) == LISTED
         if not more:
             self.close()
-        assert plans or not first  # a planner that finds nothing says why
         return plans, more
 
-    def _climb(
-        self, order: PlanRequest, scene: Scene, maps: Maps, plan_results: PlanResults, progress: Progress
-    ) -> PlanResults:
-        """Climb, and search completely on the same maps to compare."""
-        by_arm = {arm: result.map for (_, arm), result in maps.items()}
-        steps: list[ClimbStep] = []
-        found = exact = refusal = None
-        try:
-            plan = plan_bimanual(
-                scene, order.name, by_arm, "hill_climb", order.seed, progress=progress, trace=steps
-            )
-            found = _result(plan, scene, maps)
-        except NoPlanError as error:
-            refusal = Refusal(str(error))
-        try:
-            exact = _result(plan_bimanual(scene, order.name, by_arm, progress=progress), scene, maps)
-        except NoPlanError as error:
-            refusal = Refusal(str(error))
-        arms = order.tasks[0].arms
-        climb = ClimbReplay(order.name, arms, order.seed, tuple(steps), found, exact) if steps else None
-        if found:
-            return plan_results.found(order.kind, (found,), more=False, climb=climb)
-        assert refusal
-        return plan_results.refused(order.kind, refusal, maps, climb)
+
+def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: Progress) -> PlanOutcome:
+    """Climb, and search completely on the same maps to compare."""
+    steps: list[ClimbStep] = []
+    found = exact = refusal = None
+    try:
+        plan = plan_bimanual(
+            scene, request.name, maps, "hill_climb", request.seed, progress=progress, trace=steps
+        )
+        found = _result(plan, scene)
+    except NoPlanError as error:
+        refusal = Refusal(str(error))
+    try:
+        exact = _result(plan_bimanual(scene, request.name, maps, progress=progress), scene)
+    except NoPlanError as error:
+        refusal = Refusal(str(error))
+    arms = request.tasks[0].arms
+    climb = ClimbReplay(request.name, arms, request.seed, tuple(steps), found, exact) if steps else None
+    if found:
+        return PlanOutcome(request.kind, (found,), climb=climb)
+    return PlanOutcome(request.kind, refusal=refusal, climb=climb)
 
 
-def _result(plan: Plan, scene: Scene, maps: Maps) -> PlanResult:
-    prints = tuple(
-        {h.arm: _print(scene, maps[task.name, h.arm].map, h) for h in task.holds} for task in plan.tasks
-    )
-    return PlanResult(plan, maps, prints, tuple(_gap(scene, task) for task in plan.tasks))
+def _result(plan: Plan, scene: Scene) -> PlanResult:
+    """Return a plan with the prints of its hands and the gaps between them."""
+    prints = tuple({h.arm: _print(scene, h) for h in task.holds} for task in plan.tasks)
+    return PlanResult(plan, prints, tuple(_gap(scene, task) for task in plan.tasks))
 
 
-def _print(scene: Scene, m: FeasibilityMap, hold: Hold) -> np.ndarray:
+def _print(scene: Scene, hold: Hold) -> np.ndarray:
     """Return the cells (H, A) under the hand, in the object's frame."""
-    row, column = m.manifold.cell(hold.grasp.h, hold.grasp.theta)
-    roll = ROLLS.index(hold.grasp.roll)
-    return scene.arm(hold.arm).handprint(m.manifold, row, roll).on(m.manifold, column)
+    grid = scene.manifold
+    row, column, roll = _cell(grid, hold)
+    return scene.arm(hold.arm).handprint(grid, row, roll).on(grid, column)
 
 
 def _gap(scene: Scene, task: PlanTask) -> float | None:
@@ -242,8 +273,12 @@ def _gap(scene: Scene, task: PlanTask) -> float | None:
     grid = scene.manifold
     placed = []
     for hold in task.holds:
-        row, column = grid.cell(hold.grasp.h, hold.grasp.theta)
-        roll = ROLLS.index(hold.grasp.roll)
+        row, column, roll = _cell(grid, hold)
         placed.append((scene.arm(hold.arm).handprint(grid, row, roll), column))
     pairs = combinations(placed, 2)
     return min((print_gap(a, b, second - first, grid) for (a, first), (b, second) in pairs), default=None)
+
+
+def _cell(grid: Manifold, hold: Hold) -> tuple[int, int, int]:
+    """Return row, column and roll of a hold on a grid."""
+    return *grid.cell(hold.grasp.h, hold.grasp.theta), ROLLS.index(hold.grasp.roll)

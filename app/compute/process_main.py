@@ -1,4 +1,4 @@
-"""The main loop of a process that computes for one browser and has all of its PyBullet."""
+"""The main loop of a process that computes for one session and has all of its PyBullet."""
 
 from __future__ import annotations
 
@@ -14,26 +14,24 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from app.compute.channel import Channel
+from app.compute.channel import Call, Cancel, Channel, Compiling, ComputedMap, Failure, ProgressReport, Result
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanService
-from app.state.requests import MapRequest, MapResult
+from app.state.requests import MapRequest
 from symgrasp.compiling import telling_of_compiling
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
-from symgrasp.scene.scene import Scene
-from symgrasp.world import check_tasks
 
 __all__ = ["serve"]
 
 log = logging.getLogger(__name__)
 
-TELL = 0.03
-"""Time (s) between two words about the progress."""
+REPORT_INTERVAL = 0.03
+"""Time (s) between two reports of the progress."""
 
 
 def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
-    """Run errands until the other end hangs up.
+    """Answer calls until the other end hangs up.
 
     Args:
         pipe: to the process that started this one.
@@ -42,7 +40,7 @@ def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the server, which hangs up
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
-        _Child(Channel(pipe, "child"), folders).work()
+        _Server(Channel(pipe), folders).run()
     except (EOFError, OSError):
         return  # the other end hung up
 
@@ -55,80 +53,48 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-class _Child:
-    def __init__(self, line: Channel, folders: tuple[Path, ...]) -> None:
-        self._line = line
-        self._errand, self._told = 0, 0.0
-        bench = MapService(_Shelf(folders, self._ask, self._tell))
-        plans = PlanService(bench)
-        self._skills: dict[str, Callable[..., Any]] = {
-            "map": bench.map, "check": bench.check, "explain": bench.explain, "check_tasks": _check_tasks,
-            "run": plans.run, "more": plans.more, "open": plans.open,
+class _Server:
+    def __init__(self, channel: Channel, folders: tuple[Path, ...]) -> None:
+        self._channel = channel
+        self._job_id, self._reported = 0, 0.0
+        self._maps = MapService(lambda result: channel.send(ComputedMap(result.map, result.contacts)))
+        plans = PlanService(self._maps, folders)
+        self._methods: dict[str, Callable[..., Any]] = {
+            "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
+            "check_tasks": self._maps.check_tasks,
+            "plan": plans.plan, "more": plans.more, "open": plans.open,
         }  # fmt: skip
 
-    def work(self) -> None:
+    def run(self) -> None:
         while True:
-            word, number, content = self._line.receive()
-            if word == "do":  # else it is about an errand that is over
-                self._errand, self._told = number, 0.0
-                self._tell(*self._do(*content))
-                self._line.forget_maps()
+            message = self._channel.receive()
+            if isinstance(message, Call):  # else it cancels a call that is over
+                self._job_id, self._reported = message.job_id, 0.0
+                self._channel.send(self._answer(message))
 
-    def _do(self, name: str, args: tuple[Any, ...]) -> tuple[str, Any]:
+    def _answer(self, call: Call) -> Result | Failure:
         try:
-            with telling_of_compiling(lambda: self._tell("compiling", None)):
-                return "done", self._skills[name](*args, self._progress)
+            with telling_of_compiling(lambda: self._channel.send(Compiling())):
+                return Result(self._methods[call.method](*call.args, self._progress))
         except Cancelled:
-            return "failed", Cancelled()
+            return Failure(Cancelled())
         except SymgraspError as error:
-            return "failed", error
+            return Failure(error)
         except Exception as error:  # whatever a library raises is told
             log.exception("a computation failed")
-            return "failed", _portable(error)
+            return Failure(_portable(error))
+
+    def _map(self, request: MapRequest, progress: Progress) -> None:
+        self._maps.map(request, progress)  # sent already
 
     def _progress(self, share: float) -> None:
-        while self._line.connection.poll():
-            self._hear()
+        while self._channel.poll():
+            if self._channel.receive() == Cancel(self._job_id):
+                raise Cancelled
         now = time.monotonic()
-        if now - self._told > TELL:
-            self._told = now
-            self._tell("progress", share)
-
-    def _hear(self) -> tuple[str, Any]:
-        word, number, content = self._line.receive()
-        if word == "cancel" and number == self._errand:
-            raise Cancelled
-        return word, content
-
-    def _ask(self, request: MapRequest) -> MapResult | None:
-        self._tell("known?", request)
-        while True:
-            word, content = self._hear()
-            if word == "known":
-                return content
-
-    def _tell(self, word: str, content: object) -> None:
-        self._line.send((word, self._errand, content))
-
-
-class _Shelf:
-    """What the server keeps, asked for over the line; in the place of `app.compute.cache.SharedCache`."""
-
-    def __init__(
-        self,
-        folders: tuple[Path, ...],
-        ask: Callable[[MapRequest], MapResult | None],
-        tell: Callable[[str, object], None],
-    ) -> None:
-        self.folders, self.map, self._tell = folders, ask, tell
-
-    def keep(self, result: MapResult) -> None:
-        self._tell("keep", result)
-
-
-def _check_tasks(scene: Scene, progress: Progress) -> None:
-    progress(0.0)
-    check_tasks(scene)
+        if now - self._reported > REPORT_INTERVAL:
+            self._reported = now
+            self._channel.send(ProgressReport(share))
 
 
 def _portable(error: Exception) -> Exception:

@@ -11,14 +11,57 @@ from pathlib import Path
 from app.compute.channel import Channel
 from app.compute.process_main import serve
 
-__all__ = ["ProcessPool"]
-
+__all__ = ["ProcessPool", "WorkerProcess"]
 
 SPAWN = multiprocessing.get_context("spawn")
 
 
+class WorkerProcess:
+    """A process that answers calls, and the channel to it.
+
+    Args:
+        folders: where the files of an uploaded scene may lie.
+
+    Attributes:
+        channel: to the process.
+        job_id: that of the last call.
+        cancelled_at: when (s, monotonic) that call was cancelled, if it has not ended since.
+    """
+
+    def __init__(self, folders: tuple[Path, ...]) -> None:
+        here, there = SPAWN.Pipe()
+        self.channel = Channel(here)
+        self.job_id = 0
+        self.cancelled_at: float | None = None
+        self._process: SpawnProcess = SPAWN.Process(
+            target=serve, args=(there, folders), name="symgrasp compute", daemon=True
+        )
+        self._process.start()
+        there.close()
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        assert self._process.pid
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        return self._process.is_alive()
+
+    def end(self, grace: float = 0.0) -> str:
+        """End it, whatever it does, after it had some time (s); return how it ended by itself, if it did."""
+        self._process.join(grace)
+        code = self._process.exitcode
+        self._process.kill()
+        self._process.join()
+        self.channel.close()
+        return "" if code is None else signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+
 class ProcessPool:
-    """Starts processes; keeps one at hand that has imported everything, as that takes a second or two.
+    """Starts processes; keeps one ready that has imported everything, as that takes a second or two.
 
     May be used from any thread.
 
@@ -29,69 +72,30 @@ class ProcessPool:
     def __init__(self, folders: tuple[Path, ...]) -> None:
         self._folders = folders
         self._lock = threading.Lock()
-        self._spare: _Process | None = None
+        self._spare: WorkerProcess | None = None
         self._closed = False
 
     def prepare(self) -> None:
         """Start a process for later, unless there is one."""
         with self._lock:
             if self._spare is None and not self._closed:
-                self._spare = _Process(self._folders)
+                self._spare = WorkerProcess(self._folders)
 
-    def take(self) -> _Process:
+    def take(self) -> WorkerProcess:
         """Return a process; it belongs to the caller, who ends it."""
         with self._lock:
             process, self._spare = self._spare, None
             if process and not process.is_alive:
                 process.end()
                 process = None
-            process = process or _Process(self._folders)
+            process = process or WorkerProcess(self._folders)
         self.prepare()
         return process
 
     def close(self) -> None:
-        """End the process that was kept at hand."""
+        """End the process that was kept ready."""
         with self._lock:
             self._closed = True
             if self._spare:
                 self._spare.end()
                 self._spare = None
-
-
-class _Process:
-    """A process and the line to it.
-
-    Attributes:
-        line: to it.
-        errand: number of the last errand.
-        unheard: when (s, monotonic) that was cancelled, if it has not answered since.
-    """
-
-    def __init__(self, folders: tuple[Path, ...]) -> None:
-        here, there = SPAWN.Pipe()
-        self.line = Channel(here, "server")
-        self.job_id = 0
-        self.unheard: float | None = None
-        self._process: SpawnProcess = SPAWN.Process(
-            target=serve, args=(there, folders), name="symgrasp workshop", daemon=True
-        )
-        self._process.start()
-        there.close()
-
-    @property
-    def pid(self) -> int:
-        assert self._process.pid
-        return self._process.pid
-
-    @property
-    def is_alive(self) -> bool:
-        return self._process.is_alive()
-
-    def end(self, grace: float = 0.0) -> str:
-        """End it, whatever it does, after it had some time (s); return how it ended by itself, if it did."""
-        self._process.join(grace)
-        code = self._process.exitcode
-        self._process.kill()
-        self._process.join()
-        self.line.connection.close()
-        return "" if code is None else signal.Signals(-code).name if code < 0 else f"exit code {code}"

@@ -68,7 +68,7 @@ def read_tasks(state: State, settings: Mapping[str, str]) -> State:
             poses[name] = pose(key, text)
     task = scene.task()
     before = poses.get(task.name)
-    return replace(state, scene=scene, poses=poses, before=before, task=task.name, arm=task.arms[0])
+    return replace(state, scene=scene, poses=poses, pose_when_chosen=before, task=task.name, arm=task.arms[0])
 
 
 def _listed(scene: Scene, settings: Mapping[str, str]) -> Scene:

@@ -18,6 +18,7 @@ import numpy as np
 
 from app.files.link_tasks import is_about_tasks, read_tasks, tasks_text
 from app.files.link_values import number, number_text, numbers, one
+from app.state import changes
 from app.state.map_view_state import RollChoice
 from app.state.page_link import Camera
 from app.state.state import Pick, State
@@ -66,22 +67,22 @@ class Link:
         state = read_tasks(state, self.settings)
         for key, text in self.settings.items():
             if key == "task":
-                state = state.choose_task(text)
+                state = changes.choose_task(state, text)
             elif key == "arm":
                 arms = state.scene.task(state.task).arms
-                state = state.choose_arm(one(key, text, arms))
+                state = changes.choose_arm(state, one(key, text, arms))
             elif key == "turn":
                 turn = np.deg2rad(number(key, text))
             elif key == "roll":
-                state = state.choose_roll(RollChoice(one(key, text, [r.value for r in RollChoice])))
+                state = changes.choose_roll(state, RollChoice(one(key, text, [r.value for r in RollChoice])))
             elif key == "view":
-                view = ColorBy(one(key, text, [v.value for v in ColorBy]))
-                state = replace(state, map_view=replace(state.map_view, view=view))
+                color_by = ColorBy(one(key, text, [v.value for v in ColorBy]))
+                state = replace(state, map_view=replace(state.map_view, color_by=color_by))
             elif key in SWITCHES:
-                state = replace(state, **{key: one(key, text, ("0", "1")) == "1"})
+                state = changes.switched(state, **{SWITCHES[key]: one(key, text, ("0", "1")) == "1"})
             elif key not in ("h", "theta", "side") and not is_about_tasks(key):
                 raise InputError("link", key, text, one_of(KEYS, key))
-        return self._pick(state.turn(turn))
+        return self._pick(changes.turn(state, turn))
 
     def _pick(self, state: State) -> State:
         if "h" not in self.settings:
@@ -90,7 +91,7 @@ class Link:
         profile = state.scene.profile
         inside = float(np.clip(h / 100, profile.h_min, profile.h_max))
         h = inside if abs(inside - h / 100) < ROUNDING else h / 100
-        state = state.choose(h, np.deg2rad(theta))
+        state = changes.choose(state, h, np.deg2rad(theta))
         if "side" not in self.settings or state.pick is None:
             return state
         sides = [f"{np.rad2deg(roll):.0f}" for roll in ROLLS]
@@ -98,7 +99,8 @@ class Link:
         return replace(state, pick=Pick(state.pick.h, state.pick.theta, sides.index(side)))
 
 
-SWITCHES = ("board", "gizmo", "dark")
+SWITCHES = {"board": "flat_map", "gizmo": "drag_handles", "dark": "dark"}
+"""Key of a link → the switch of `Display` that it sets."""
 KEYS = (
     "scene", "object", "hand.<arm>", "tasks", "arms.<task>", "at.<task>", "task", "arm", "turn", "roll",
     "view", *SWITCHES, "h", "theta", "side", "camera",
@@ -117,24 +119,24 @@ def link_of(state: State, served: Scene, camera: Camera | None = None) -> str:
         SymgraspError: something that was uploaded is shown, or the link would be too long to be read.
     """
     for what, uploaded in (
-        ("scene", state.own_scene),
+        ("scene", state.shown_upload),
         ("object", state.object_choice and state.object_choice.measurement),
     ):
         if uploaded:
             raise InputError("link", what, "an upload", "something the server has; save the scene instead")
     parts: dict[str, str] = {"scene": state.scene_name}
     if state.object_choice:
-        parts["object"] = state.object_choice.choice
+        parts["object"] = state.object_choice.option
     parts |= {f"hand.{arm}": hand for arm, hand in state.scene.mounted.items()}
     parts |= {"task": state.task, "arm": state.arm}
     parts |= tasks_text(state, served.tasks)
     optional: list[tuple[str, bool, Callable[[], str]]] = [
         ("turn", state.delta != 0, lambda: number_text(np.rad2deg(state.delta))),
-        ("roll", state.roll is not RollChoice.EITHER, lambda: state.roll.value),
-        ("view", state.map_view.view is not ColorBy.REASON, lambda: state.map_view.view.value),
-        ("board", not state.flat_map, lambda: "0"),
-        ("gizmo", state.gizmo, lambda: "1"),
-        ("dark", state.dark, lambda: "1"),
+        ("roll", state.map_view.roll is not RollChoice.EITHER, lambda: state.map_view.roll.value),
+        ("view", state.map_view.color_by is not ColorBy.REASON, lambda: state.map_view.color_by.value),
+        ("board", not state.display.flat_map, lambda: "0"),
+        ("gizmo", state.display.drag_handles, lambda: "1"),
+        ("dark", state.display.dark, lambda: "1"),
         ("camera", camera is not None, lambda: ",".join(f"{v:.3f}" for v in camera or ())),
     ]
     parts |= {key: text() for key, present, text in optional if present}

@@ -44,9 +44,9 @@ def candidate_html(state: State) -> str:
     shown_candidate, found = state.shown_candidate, state.explanation
     if shown_candidate is None or found is None or state.candidate is None:
         return ""
-    place = f"{state.candidate + 1} of {len(found.candidates)}"
+    where = f"{state.candidate + 1} of {len(found.candidates)}"
     return (
-        f'<div class="sg sg-verdict"><b>Candidate {place}</b>: φ = {np.rad2deg(shown_candidate.phi):.1f}°, '
+        f'<div class="sg sg-verdict"><b>Candidate {where}</b>: φ = {np.rad2deg(shown_candidate.phi):.1f}°, '
         f'branch {shown_candidate.branch + 1}<br><i style="background:{shown_candidate.reason.color}"></i>'
         f"{escape(candidate_line(shown_candidate))}</div>"
     )

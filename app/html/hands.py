@@ -7,14 +7,15 @@ from html import escape
 
 import numpy as np
 
-from app.html.map import Mark, map_html
+from app.html.map import map_html
 from app.html.readout import counted
 from app.html.solutions import worst_measures
 from app.html.stack import measures
+from app.render.marks import Mark
 from app.render.palette import PRINTS
 from app.render.prints import hand_color, shown_prints
 from app.state.map_view_state import RollChoice
-from app.state.plan_results import ClimbReplay, PlanResult
+from app.state.plan_results import ClimbReplay, PlanResult, PlanResults
 from app.state.state import State
 from symgrasp.object.manifold import ROLLS
 from symgrasp.plan.plan import PlanTask
@@ -28,7 +29,7 @@ ROOM = 330
 
 def hands_html(state: State) -> str:
     """Draw the maps of the plan's tasks, each arm's with the prints of all hands that hold together."""
-    if state.climbed:
+    if state.climb_step:
         return climb_html(state)
     if state.plan is None or state.plan.plan.kind == "sequential":
         return ""
@@ -43,7 +44,7 @@ def hands_html(state: State) -> str:
         turned = f"turned by {np.rad2deg(task.delta) + 0.0:.1f}°"
         name = f"{k + 1} · {escape(task.name)}" if len(plan.plan.tasks) > 1 else escape(task.name)
         blocks.append(f'<div class="sg-task{now}"><b>{name}</b><span>{turned}</span>{apart}</div>')
-        blocks.extend(_task_maps(plan, k, task, height))
+        blocks.extend(_task_maps(state.plan_results, plan, k, task, height))
     return "".join(blocks)
 
 
@@ -54,7 +55,7 @@ def gap_in_words(gap: float) -> str:
 
 def climb_html(state: State) -> str:
     """Draw a step of the hill climbing: every arm's map with all prints, and how the count went down."""
-    climb, step = state.plan_results.climb, state.climbed
+    climb, step = state.plan_results.climb, state.climb_step
     if climb is None or step is None:
         return ""
     prints = shown_prints(state)
@@ -102,13 +103,13 @@ def _result(plan: PlanResult | None) -> list[str]:
     return [apart, *worst_measures(plan)]
 
 
-def _task_maps(plan: PlanResult, k: int, task: PlanTask, height: int) -> list[str]:
+def _task_maps(results: PlanResults, plan: PlanResult, k: int, task: PlanTask, height: int) -> list[str]:
     several = len(task.holds) > 1
     marks = [Mark(hold.grasp.h, hold.grasp.theta, hold.arm if several else "") for hold in task.holds]
     prints = list(plan.prints[k].values()) if several else []
     blocks = []
     for i, hold in enumerate(task.holds):
-        m = plan.maps[task.name, hold.arm].map.shift(task.delta)
+        m = results.maps[task.name, hold.arm].map.shift(task.delta)
         roll = _choice(ROLLS.index(hold.grasp.roll))
         along, around, clear = measures(hold)
         title = f"{escape(hold.arm)}, roll {roll.value}: room {along}, {around}; {clear} clear"

@@ -9,17 +9,16 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 
 import numpy as np
 from PIL import Image
 
 from app.render.cell_colors import coloured
+from app.render.marks import Mark
 from app.render.palette import OVERLAP, PRINTS, faded
 from app.render.prints import hand_color, print_index
 from app.state.map_view_state import RollChoice
-from app.state.state import State
 from symgrasp.feasibility.color_by import ColorBy, Scale
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import Manifold, wrap
@@ -27,12 +26,10 @@ from symgrasp.object.manifold import Manifold, wrap
 __all__ = [
     "COLUMNS",
     "THETA_AXIS",
-    "Mark",
     "circle",
     "h_axis",
     "legend_html",
     "map_html",
-    "marks_of",
     "picture_html",
     "prints_html",
     "sample_columns",
@@ -45,15 +42,6 @@ COLUMNS = 1440
 
 SHADE = 205
 """Alpha of the cells under a hand."""
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A grasp drawn on a map: h (m), θ (rad), and what to call it."""
-
-    h: float
-    theta: float
-    label: str = ""
 
 
 def sample_columns(manifold: Manifold) -> np.ndarray:
@@ -71,13 +59,6 @@ def to_png(indices: np.ndarray, colors: np.ndarray, alpha: Sequence[int] | None 
     options = {"transparency": bytes(alpha)} if alpha else {}
     image.save(buffer, "PNG", compress_level=3, **options)
     return buffer.getvalue()
-
-
-def marks_of(state: State) -> list[Mark]:
-    """Return the grasps that are marked on the map: all of a plan's task, or the picked one."""
-    if state.shown and len(state.shown.holds) > 1:
-        return [Mark(hold.grasp.h, hold.grasp.theta, hold.arm) for hold in state.shown.holds]
-    return [Mark(state.pick.h, state.pick.theta)] if state.pick else []
 
 
 def map_html(

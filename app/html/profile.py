@@ -103,7 +103,7 @@ def symmetry_html(state: State) -> str:
         f"{1e3 * m.overall_rms:.2f} mm RMS; {1e3 * m.tolerance:.2f} mm are allowed."
     )
     scale = ""
-    if state.errors:
+    if state.display.symmetry_error:
         stops = ", ".join(_rgb(color) for color in DIVERGING)
         limit = f"{1e3 * _limit(m):.2g} mm"
         scale = (

@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from app.render.playback import plan_joint_values
+from app.render.playback import plan_joint_values, playback_frame
 from app.state.state import State
 from symgrasp.object.manifold import ROLLS
 from symgrasp.poses import Array
@@ -33,13 +33,13 @@ def joint_values(state: State) -> dict[str, Array]:
     Robots park at home, except the arms that hold the object in the plan's task that is shown,
     or the chosen arm at the chosen candidate of the picked cell, if that is feasible, or its witness.
     """
-    if state.motion:
-        return state.motion.joint_values
-    if state.shown:
-        return plan_joint_values(state.scene, state.shown)
+    if frame := playback_frame(state):
+        return frame.joint_values
+    if state.shown_task:
+        return plan_joint_values(state.scene, state.shown_task)
     values = {robot.name: robot.home.copy() for robot in state.scene.robots.values()}
-    if state.climbed and state.plan_results.climb:
-        for name, cell in zip(state.plan_results.climb.arms, state.climbed.cells, strict=True):
+    if state.climb_step and state.plan_results.climb:
+        for name, cell in zip(state.plan_results.climb.arms, state.climb_step.cells, strict=True):
             arm = state.scene.arm(name)
             witness = state.plan_results.maps[state.task, name].map.witness(cell)
             if witness:
@@ -66,7 +66,7 @@ def map_title(state: State) -> str:
 
 def check_html(state: State) -> str:
     """Say how many cells of the shifted map, drawn above this line, differ from the one drawn below it."""
-    check = state.map_view.check
+    check = state.map_view.comparison
     if check is None:
         return '<div class="sg sg-faint">The map is being computed from scratch …</div>'
     turn, cells = np.rad2deg(check.request.delta), check.map.reason.size
@@ -81,27 +81,27 @@ def grasp_html(state: State) -> str:
     if state.pick is None:
         text = "No grasp picked: click a cell on the object or on the map beside it, or enter h and θ."
         return f'<div class="sg sg-faint">{text}</div>'
-    place = _place(state.pick.h, state.pick.theta)
+    where = _place(state.pick.h, state.pick.theta)
     if not state.is_fresh or state.map is None or state.cell is None:
-        return f'<div class="sg"><b>{place}</b><br>waits for the map</div>'
-    place += f", roll {np.rad2deg(ROLLS[state.cell.roll]):.0f}°"
+        return f'<div class="sg"><b>{where}</b><br>waits for the map</div>'
+    where += f", roll {np.rad2deg(ROLLS[state.cell.roll]):.0f}°"
     why = escape(state.map.why(state.cell))
     witness = state.map.witness(state.cell)
     if witness is None and state.explanation and state.shown_candidate:
         best = "The best" if state.candidate == 0 else "One"
         ways = counted(len(state.explanation.candidates), "way")
         return (
-            f'<div class="sg"><b>{place}</b><br>{escape(state.arm)} cannot hold it here: '
+            f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} cannot hold it here: '
             f"{escape(state.explanation.reason.label)}. {best} of {ways} to try is the ghost.</div>"
         )
     if witness is None:
-        return f'<div class="sg"><b>{place}</b><br>{escape(state.arm)} cannot hold it here: {why}</div>'
+        return f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} cannot hold it here: {why}</div>'
     margin = state.map.margin(state.cell)
-    holds = state.shown.holds if state.shown else ()
+    holds = state.shown_task.holds if state.shown_task else ()
     q = next((list(hold.joints.values()) for hold in holds if hold.arm == state.arm), witness.q)
     joints = ", ".join(f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(q)))
     return (
-        f'<div class="sg"><b>{place}</b><br>{escape(state.arm)} holds it: {why}; '
+        f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} holds it: {why}; '
         f"room for {100 * margin.along:.1f} cm along and {np.rad2deg(margin.around):.1f}° around"
         f"<br>Joints {joints}; fingers {100 * witness.opening:.1f} cm apart</div>"
     )
@@ -146,7 +146,7 @@ def hands_line(state: State) -> str:
     """Say what the planner for several arms plans."""
     if not state.can_plan("bimanual"):
         return '<div class="sg sg-faint">Every task of this scene is for one arm.</div>'
-    task = state.scene.task(state.together)
+    task = state.scene.task(state.bimanual_task)
     what = f'<div class="sg sg-what">{escape(task.name)}: {escape(" and ".join(task.arms))}</div>'
     return what + _until_planned(
         state, "Every hand leaves a print on the map: places the hands so that they do not meet."

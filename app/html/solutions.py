@@ -22,7 +22,7 @@ def solutions_html(state: State) -> str:
     headings = ("", "grasp", "gap" if several else "", "room along", "around", "clear")
     rows = [_row(headings, "sg-faint")]
     for k, plan in enumerate(plans):
-        look = "sg-now" if k == state.plan_results.page else ""
+        look = "sg-now" if k == state.plan_results.index else ""
         gaps = [gap for gap in plan.gaps if gap is not None]
         gap = "" if not gaps else "overlap" if min(gaps) < 0 else f"{1e3 * min(gaps):.0f} mm"
         rows.append(_row((str(k + 1), _grasps(plan), gap, *worst_measures(plan)), look))

@@ -9,15 +9,15 @@ from itertools import groupby
 
 import numpy as np
 
-from app.html.map import THETA_AXIS, Mark, circle, h_axis, sample_columns, to_png
+from app.html.map import THETA_AXIS, circle, h_axis, sample_columns, to_png
+from app.render.marks import Mark
 from app.render.palette import INK, REASONS, rgb
 from app.render.weak_cache import cached_with_first
-from app.state.plan_results import PlanResult
 from app.state.requests import MapResult
 from app.state.state import State
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import ROLLS, wrap
-from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold
+from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold, PlanTask
 from symgrasp.reason import Reason
 
 __all__ = ["measures", "shared_columns", "stack_html"]
@@ -51,12 +51,12 @@ def stack_html(state: State) -> str:
             turn = f"{np.rad2deg(task.delta) + 0.0:.1f}°"
             now = "sg-now" if k == state.step else ""
             rows.append(_row((f"{k + 1} · {task.name}", turn, *measures(hold)), now))
-            result = plan.maps[task.name, hold.arm]
+            result = state.plan_results.maps[task.name, hold.arm]
             rows.append(_strip(result, grasp, state.plan_results.slide * task.delta, task.delta, height))
         if len(group) > 1:
             turns = tuple(state.plan_results.slide * task.delta for _, task, _ in group)
             rows.append(_row((f"all {len(group)} over each other", "", "", "", ""), ""))
-            rows.append(_overlay(plan, tuple(k for k, _, _ in group), turns, grasp, height))
+            rows.append(_overlay(_maps(state, [task for _, task, _ in group]), turns, grasp, height))
     axis = f'<div class="sg-map sg-axis">{THETA_AXIS}</div>'
     return f'<div class="sg-stack" role="img" aria-label="maps of the tasks">{"".join(rows)}{axis}</div>'
 
@@ -125,11 +125,12 @@ def _strip(result: MapResult, grasp: Grasp | None, slid: float, delta: float, he
     return _framed(sliding + marks, result.map, height)
 
 
-def _overlay(
-    plan: PlanResult, steps: tuple[int, ...], turns: tuple[float, ...], grasp: Grasp, height: int
-) -> str:
-    tasks = [plan.plan.tasks[k] for k in steps]
-    maps = tuple(plan.maps[task.name, task.holds[0].arm].map for task in tasks)
+def _maps(state: State, tasks: Sequence[PlanTask]) -> list[FeasibilityMap]:
+    return [state.plan_results.maps[task.name, task.holds[0].arm].map for task in tasks]
+
+
+def _overlay(maps: Sequence[FeasibilityMap], turns: tuple[float, ...], grasp: Grasp, height: int) -> str:
+    """Draw where the grasp is feasible in all maps, each turned by its δ (rad)."""
     shared = shared_columns(maps, turns, ROLLS.index(grasp.roll))
     source = _uri(to_png(shared[::-1].astype(np.uint8), SHARED))
     grid = maps[0].manifold

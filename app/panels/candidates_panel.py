@@ -5,7 +5,9 @@ from __future__ import annotations
 import viser
 
 from app.html.candidates import candidate_html, candidates_html
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.state import changes
 from app.state.requests import ExplainRequest
 from app.state.state import State
 from symgrasp.feasibility.explain import Explanation
@@ -20,13 +22,13 @@ class CandidatesPanel(Panel):
         super().__init__(gui, actions)
         self._shown: Explanation | None = None
         self.step = gui.add_slider("Candidate", 1, 2, 1, 1, visible=False, hint="The best is the first.")
-        self.on(self.step, lambda s, v: s.choose_candidate(int(v) - 1), "inputs")
+        self.on(self.step, lambda s, v: changes.choose_candidate(s, int(v) - 1), "inputs")
         self.one = self.html()
         self.all = self.html()
 
     def show(self, state: State) -> None:
         """Draw them; while the next ones come in a moment, those before stay."""
-        if state.busy and not state.is_waiting and isinstance(state.unmet, ExplainRequest):
+        if state.busy and not state.is_waiting and isinstance(state.missing_request, ExplainRequest):
             return
         found = state.explanation
         self.all.show(candidates_html(state))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from html import escape
 
 import viser
 
 from app.files.scene_files import SCENE_LIMIT
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.state import changes
 from app.state.state import State
 
 __all__ = ["FilesPanel", "link_html"]
@@ -42,7 +43,7 @@ class FilesPanel(Panel):
                 hint="One file, to be opened anywhere without a network",
             )  # fmt: skip
         self.dark = gui.add_checkbox("Dark", False)
-        self.on(self.dark, lambda s, v: replace(s, dark=v))
+        self.on(self.dark, lambda s, v: changes.switched(s, dark=v))
 
     def show(self, state: State) -> None:
         """Show the link that was made, and whether it still opens what is shown."""
@@ -50,7 +51,7 @@ class FilesPanel(Panel):
 
     def write_inputs(self, state: State) -> None:
         """Show whether it is dark."""
-        self.dark.value = state.dark
+        self.dark.value = state.display.dark
 
 
 def link_html(state: State) -> str:
@@ -59,5 +60,5 @@ def link_html(state: State) -> str:
         return ""
     address = escape(state.link.address, quote=True)
     earlier = '<div class="sg-note sg-warning">The page has changed since: this opens it as it was.</div>'
-    note = "" if state.link.told == state.told else earlier
+    note = "" if state.link.values == state.link_values else earlier
     return f'<div class="sg"><a class="sg-link" href="{address}">{address}</a>{note}</div>'

@@ -6,7 +6,9 @@ import numpy as np
 import viser
 
 from app.html.readout import grasp_html
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.state import changes
 from app.state.map_view_state import RollChoice
 from app.state.state import Pick, State
 
@@ -20,11 +22,11 @@ class GraspPanel(Panel):
         super().__init__(gui, actions)
         self.h = gui.add_number("h (cm)", 0.0, step=0.1)
         self.theta = gui.add_number("θ (°)", 0.0, min=-180.0, max=180.0, step=0.1)
-        self.on(self.h, lambda s, v: s.choose(v / 100, _shown(s).theta), "inputs")
-        self.on(self.theta, lambda s, v: s.choose(_shown(s).h, np.deg2rad(v)), "inputs")
+        self.on(self.h, lambda s, v: changes.choose(s, v / 100, _shown(s).theta), "inputs")
+        self.on(self.theta, lambda s, v: changes.choose(s, _shown(s).h, np.deg2rad(v)), "inputs")
         self.roll = self.choice("Roll", [roll.value for roll in RollChoice])
-        self.on(self.roll, lambda s, v: s.choose_roll(RollChoice(v)))
-        self.button("Let go", viser.Icon.HAND_OFF, lambda: actions.change(State.clear_pick), color="gray")
+        self.on(self.roll, lambda s, v: changes.choose_roll(s, RollChoice(v)))
+        self.button("Let go", viser.Icon.HAND_OFF, lambda: actions.change(changes.clear_pick), color="gray")
         self.grasp = self.html()
 
     def show(self, state: State) -> None:
@@ -38,7 +40,7 @@ class GraspPanel(Panel):
         pick = _shown(state)
         self.h.value = round(100 * pick.h, 2)
         self.theta.value = round(float(np.rad2deg(pick.theta)), 2)
-        self.roll.value = state.roll.value
+        self.roll.value = state.map_view.roll.value
 
 
 def _shown(state: State) -> Pick:

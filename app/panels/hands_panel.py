@@ -10,7 +10,9 @@ import viser
 from app.html.conflicts import why_html
 from app.html.hands import comparison_html, hands_html
 from app.html.readout import hands_line
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.state import plan_changes
 from app.state.plan_results import FIRST_SEED
 from app.state.state import State
 
@@ -33,14 +35,14 @@ class HandsPanel(Panel):
         self.method = self.choice("Method", tuple(HANDS_METHODS))
         self.on(
             self.method,
-            lambda s, v: s.turn_book(
-                lambda plan_results: replace(plan_results, hands_method=HANDS_METHODS[v])
+            lambda s, v: plan_changes.change_plan_results(
+                s, lambda results: replace(results, hands_method=HANDS_METHODS[v])
             ),
         )
         self.seed = gui.add_number("Seed", FIRST_SEED, min=0, max=2**31 - 1, step=1, visible=False)
         self.on(
             self.seed,
-            lambda s, v: s.turn_book(lambda plan_results: replace(plan_results, seed=int(v))),
+            lambda s, v: plan_changes.change_plan_results(s, lambda results: replace(results, seed=int(v))),
             "inputs",
         )
         self.run = self.button("All arms together", viser.Icon.USERS, lambda: plans.run("bimanual"))
@@ -53,11 +55,11 @@ class HandsPanel(Panel):
         self.why = self.html()
         self.comparison = self.html()
         self.frame = gui.add_slider("Climb", 1, 2, 1, 1, visible=False)
-        self.on(self.frame, lambda s, v: s.show_frame(int(v) - 1), "scrub")
+        self.on(self.frame, lambda s, v: plan_changes.show_frame(s, int(v) - 1), "scrub")
         self.replay = self.button(
             "Replay the climb",
             viser.Icon.PLAYER_PLAY,
-            lambda: plans.play(State.play_climb),
+            lambda: actions.change(plan_changes.play_climb),
             color="gray",
             visible=False,
         )
@@ -77,7 +79,7 @@ class HandsPanel(Panel):
         self.replay.visible = self.frame.visible
         if climb and self.frame.visible:
             self.frame.max = len(climb.steps)
-        playing = plan_results.moving == "climb"
+        playing = plan_results.playing == "climb"
         self.replay.label = "Pause the climb" if playing else "Replay the climb"
         self.replay.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
         self.maps.show(hands_html(state))

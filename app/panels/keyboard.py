@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import viser
 
-from app.panels.panel import Actions, Panel
-from app.state.history import redo, undo
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.state import changes, plan_changes
 from app.state.map_view_state import RollChoice
 from app.state.state import State
+from app.state.undo import redo, undo
 
 __all__ = ["Keyboard", "next_arm"]
 
@@ -37,19 +38,27 @@ class Keyboard(Panel):
         self._tasks: dict[str, viser.CommandHandle] = {}
         self.command("Next arm", lambda: change(next_arm), "M")
         self.command("Next roll", lambda: change(_next_roll), "R")
-        self.command("Put the object back", lambda: change(State.reset_pose), "B")
-        self.command("Let go of the grasp", lambda: change(State.clear_pick), "L")
-        self.command("Flat map", lambda: change(lambda s: replace(s, flat_map=not s.flat_map)), "F")
-        self.command("Drag handles", lambda: change(lambda s: replace(s, gizmo=not s.gizmo)), "G")
-        self.command("Light or dark", lambda: change(lambda s: replace(s, dark=not s.dark)), "T")
+        self.command("Put the object back", lambda: change(changes.reset_pose), "B")
+        self.command("Let go of the grasp", lambda: change(changes.clear_pick), "L")
+        self.command("Flat map", lambda: change(lambda s: changes.toggled(s, "flat_map")), "F")
+        self.command(
+            "Drag handles",
+            lambda: change(lambda s: changes.switched(s, drag_handles=not s.display.drag_handles)),
+            "G",
+        )
+        self.command("Light or dark", lambda: change(lambda s: changes.toggled(s, "dark")), "T")
         self.command("Plan one grasp for all tasks", lambda: plans.run("sequential"), "P")
         self.command("Plan all arms together", lambda: plans.run("bimanual"), "H")
         self.command("Hand over: plan all tasks in order", lambda: plans.run("handover"))
         self.command("List more solutions", plans.more)
-        self.command("Next solution", lambda: change(lambda s: s.choose_plan(s.plan_results.page + 1)), "J")
-        self.command("Play or pause the plan", lambda: plans.play(State.play_arms), "K")
-        self.command("Replay or pause the climb", lambda: plans.play(State.play_climb), "C")
-        self.command("Add a task with the object here", lambda: change(State.add_task), "I")
+        self.command(
+            "Next solution",
+            lambda: change(lambda s: plan_changes.choose_plan(s, s.plan_results.index + 1)),
+            "J",
+        )
+        self.command("Play or pause the plan", lambda: actions.change(plan_changes.play_arms), "K")
+        self.command("Replay or pause the climb", lambda: actions.change(plan_changes.play_climb), "C")
+        self.command("Add a task with the object here", lambda: change(changes.add_task), "I")
         self.command("Next task of the plan", lambda: change(lambda s: _step(s, 1)), "pagedown")
         self.command("Previous task of the plan", lambda: change(lambda s: _step(s, -1)), "pageup")
         self.command("Make a link", actions.make_link)
@@ -69,7 +78,9 @@ class Keyboard(Panel):
             self._tasks = {name: self._task(name, str(k)) for k, name in enumerate(names, 1)}
 
     def _task(self, name: str, digit: str) -> viser.CommandHandle:
-        return self.command(f"Task {name}", lambda: self.actions.change(lambda s: s.choose_task(name)), digit)
+        return self.command(
+            f"Task {name}", lambda: self.actions.change(lambda s: changes.choose_task(s, name)), digit
+        )
 
     def _next_scene(self) -> None:
         known = self._scenes.index(self._scene) if self._scene in self._scenes else -1
@@ -79,13 +90,13 @@ class Keyboard(Panel):
 def next_arm(state: State) -> State:
     """Show the map of the task's next arm."""
     arms = state.scene.task(state.task).arms
-    return state.choose_arm(arms[(arms.index(state.arm) + 1) % len(arms)])
+    return changes.choose_arm(state, arms[(arms.index(state.arm) + 1) % len(arms)])
 
 
 def _next_roll(state: State) -> State:
     rolls = list(RollChoice)
-    return state.choose_roll(rolls[(rolls.index(state.roll) + 1) % len(rolls)])
+    return changes.choose_roll(state, rolls[(rolls.index(state.map_view.roll) + 1) % len(rolls)])
 
 
 def _step(state: State, by: int) -> State:
-    return state if state.plan is None else state.show_step((state.step or 0) + by)
+    return state if state.plan is None else plan_changes.show_step(state, (state.step or 0) + by)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import viser
 
+from app.panels.actions import Actions
 from app.panels.candidates_panel import CandidatesPanel
 from app.panels.files_panel import FilesPanel
 from app.panels.grasp_panel import GraspPanel
@@ -13,7 +14,7 @@ from app.panels.hands_panel import HandsPanel
 from app.panels.keyboard import Keyboard
 from app.panels.map_panel import MapPanel
 from app.panels.object_panel import ObjectPanel
-from app.panels.panel import Actions, Panel
+from app.panels.panel import Panel
 from app.panels.plan_panel import PlanFilePanel, PlanPanel
 from app.panels.scene_panel import ScenePanel
 from app.panels.sequence_panel import SequencePanel, TasksPanel
@@ -99,9 +100,9 @@ class Layout:
             state: the state.
             write_inputs: write the inputs as well; not while a person is moving them.
         """
-        if state.dark != self._dark:
-            self._dark = state.dark
-            self._theme(dark=state.dark)
+        if state.display.dark != self._dark:
+            self._dark = state.display.dark
+            self._theme(dark=state.display.dark)
         for panel in self.panels:
             panel.show(state)
             if write_inputs:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import viser
 
-from app.html.map import legend_html, map_html, marks_of, prints_html
+from app.html.map import legend_html, map_html, prints_html
 from app.html.profile import holds_html, profile_html, symmetry_html
 from app.html.readout import check_html, map_title, solution_html
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.render.marks import marks_of
 from app.render.prints import print_names, shown_prints
 from app.state.state import State
 
@@ -35,7 +37,7 @@ class MapPanel(Panel):
     def show(self, state: State) -> None:
         """Draw the map, and under it the one it is compared with."""
         self.title.show(map_title(state))
-        self.plan.show(solution_html(state) if state.shown else "")
+        self.plan.show(solution_html(state) if state.shown_task else "")
         self.holds.show(holds_html(state) + symmetry_html(state))
         if state.map is None:
             self.map.show('<div class="sg sg-faint">The map is being computed …</div>')
@@ -44,12 +46,12 @@ class MapPanel(Panel):
             return
         look = state.map_view
         height = HEIGHT_OF_TWO if look.compare else HEIGHT
-        prints, legend = shown_prints(state), legend_html(state.map, state.roll, look.view)
+        prints, legend = shown_prints(state), legend_html(state.map, state.map_view.roll, look.color_by)
         if prints:
             legend += prints_html(print_names(state), prints)
         shown = map_html(
-            state.map, state.roll, marks_of(state), prints,
-            view=look.view, stale=not state.is_fresh, height=height,
+            state.map, state.map_view.roll, marks_of(state), prints,
+            view=look.color_by, stale=not state.is_fresh, height=height,
         )  # fmt: skip
         self.map.show(f'<div class="sg-side">{shown}{profile_html(state, height)}</div>')
         self.legend.show(legend)
@@ -57,11 +59,15 @@ class MapPanel(Panel):
 
     def _check(self, state: State) -> str:
         """Draw the map that was computed from scratch, and say how many cells differ."""
-        check = state.map_view.check
+        check = state.map_view.comparison
         if check is None:
             return check_html(state)
         shown = map_html(
-            check.map, state.roll, view=state.map_view.view, height=HEIGHT_OF_TWO, name="recomputed map"
+            check.map,
+            state.map_view.roll,
+            view=state.map_view.color_by,
+            height=HEIGHT_OF_TWO,
+            name="recomputed map",
         )
         room = profile_html(state, HEIGHT_OF_TWO)
         return f'{check_html(state)}<div class="sg-side">{shown}{room}</div>'

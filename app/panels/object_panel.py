@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import viser
 
-from app.panels.panel import Actions, Panel, within
+from app.panels.actions import Actions
+from app.panels.panel import Panel, within
+from app.state import changes
 from app.state.object_choice import UNITS, UPLOAD_LIMIT, choices
 from app.state.state import State
 from symgrasp.object.measure.mesh_io import MESH_ENDINGS
@@ -55,7 +55,7 @@ class ObjectPanel(Panel):
             )
         )
         self.colours = self.choice("Colours", COLOURS, visible=False)
-        self.on(self.colours, lambda s, v: replace(s, errors=v == COLOURS[1]))
+        self.on(self.colours, lambda s, v: changes.switched(s, symmetry_error=v == COLOURS[1]))
 
     def _build_pose(self) -> None:
         gui = self.gui
@@ -63,32 +63,32 @@ class ObjectPanel(Panel):
             "Rotation (°)", -180.0, 180.0, TURN_STEP, 0.0,
             hint="Turn the object about its own axis: the map only shifts.",
         )  # fmt: skip
-        self.on(self.turn, lambda s, v: s.turn(np.deg2rad(v)), "inputs")
+        self.on(self.turn, lambda s, v: changes.turn(s, np.deg2rad(v)), "inputs")
         self.position = {
             axis: gui.add_slider(f"{axis} (cm)", -BEYOND, BEYOND, 0.5, 0.0) for axis in ("x", "y", "z")
         }
         for axis, slider in self.position.items():
-            self.on(slider, lambda s, v, axis=axis: s.move(**{axis: v / 100}), "inputs")
+            self.on(slider, lambda s, v, axis=axis: changes.moved(s, **{axis: v / 100}), "inputs")
         self.lean = gui.add_slider(
             "Lean (°)", 0.0, 180.0, 1.0, 0.0, hint="Angle between the object's axis and the vertical."
         )
-        self.on(self.lean, lambda s, v: s.move(lean=np.deg2rad(v)), "inputs")
+        self.on(self.lean, lambda s, v: changes.moved(s, lean=np.deg2rad(v)), "inputs")
         self.towards = gui.add_slider(
             "Lean to (°)", -180.0, 180.0, 1.0, 0.0, hint="Direction the axis leans to; 0 is along x."
         )
-        self.on(self.towards, lambda s, v: s.move(towards=np.deg2rad(v)), "inputs")
+        self.on(self.towards, lambda s, v: changes.moved(s, towards=np.deg2rad(v)), "inputs")
         self.gizmo = gui.add_checkbox("Drag handles", False)
-        self.on(self.gizmo, lambda s, v: replace(s, gizmo=v))
+        self.on(self.gizmo, lambda s, v: changes.switched(s, drag_handles=v))
         self.button(
             "Put it back",
             viser.Icon.ARROW_BACK_UP,
-            lambda: self.actions.change(State.reset_pose),
+            lambda: self.actions.change(changes.reset_pose),
             color="gray",
         )
 
     def show(self, state: State) -> None:
         """Offer the object that was uploaded as well."""
-        if self.object_choice.options != (things := choices(state.uploaded)):
+        if self.object_choice.options != (things := choices(state.uploaded_object)):
             self.object_choice.options = things
 
     def write_inputs(self, state: State) -> None:
@@ -100,10 +100,10 @@ class ObjectPanel(Panel):
             slider.value = within(slider, 100 * getattr(base, axis))
         self.lean.value = within(self.lean, np.rad2deg(base.lean))
         self.towards.value = within(self.towards, np.rad2deg(base.towards))
-        self.object_choice.value = state.choice
+        self.object_choice.value = state.object_option
         self.colours.visible = bool(state.object_choice and state.object_choice.measurement)
-        self.colours.value = COLOURS[state.errors]
-        self.gizmo.value = state.gizmo
+        self.colours.value = COLOURS[state.display.symmetry_error]
+        self.gizmo.value = state.display.drag_handles
 
 
 def span(scene: Scene, axis: int) -> tuple[float, float]:

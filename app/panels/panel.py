@@ -3,62 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 import viser
 
-from app.server.plan_actions import PlanActions
+from app.panels.actions import Actions
 from app.state.state import State
 
-__all__ = ["Actions", "Change", "Html", "Panel", "within"]
+__all__ = ["Html", "Panel", "within"]
 
-Change = Callable[[State], State]
 Hotkey = Any
 """A letter, a digit or the name of a key; None for none. viser does not export the type."""
 Modifier = Literal["cmd/ctrl", "shift", "cmd/ctrl+shift"] | None
-
-
-class Actions(Protocol):
-    """What the widgets ask for beyond a change of the state."""
-
-    def change(self, change: Change, origin: str = "") -> None:
-        """Apply a change; widgets of that origin are not written back."""
-
-    def open_scene(self, name: str) -> None:
-        """Load another scene."""
-
-    def choose_object(self, choice: str) -> None:
-        """Put another object into the scene."""
-
-    def choose_hand(self, hand: str) -> None:
-        """Mount another hand on the chosen arm."""
-
-    def upload(self, name: str, content: bytes, scale: float) -> None:
-        """Measure a mesh and put the object into the scene."""
-
-    @property
-    def plans(self) -> PlanActions:
-        """What runs planners and keeps their plans."""
-        ...
-
-    def stop_or_retry(self) -> None:
-        """Stop the computation, or begin the one that was stopped again."""
-
-    def save_map(self, kind: str) -> None:
-        """Send the map as it is shown as a picture."""
-
-    def save_scene(self) -> None:
-        """Send the scene as a file."""
-
-    def load_scene(self, name: str, content: bytes) -> None:
-        """Open the scene in a file."""
-
-    def make_link(self) -> None:
-        """Put what is shown into an address."""
-
-    def save_view(self) -> None:
-        """Send the 3D view as a file."""
 
 
 class Html:

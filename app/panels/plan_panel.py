@@ -8,8 +8,10 @@ from app.compute.plan_service import PLAN_LIMIT
 from app.html.conflicts import opened_html
 from app.html.readout import solution_html
 from app.html.solutions import solutions_html
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
 from app.server.plan_actions import FORMATS
+from app.state import plan_changes
 from app.state.state import State
 
 __all__ = ["PlanFilePanel", "PlanPanel"]
@@ -27,16 +29,20 @@ class PlanPanel(Panel):
         super().__init__(gui, actions)
         plans = actions.plans
         self.solution = gui.add_slider("Solution", 1, 2, 1, 1, visible=False)
-        self.on(self.solution, lambda s, v: s.choose_plan(int(v) - 1), "scrub")
+        self.on(self.solution, lambda s, v: plan_changes.choose_plan(s, int(v) - 1), "scrub")
         self.list = self.html()
         self.text = self.html()
         self.more = self.button(
             "List more solutions", viser.Icon.LIST, plans.more, color="gray", visible=False
         )
         self.step = gui.add_slider("Plan step", 1.0, 2.0, 0.02, 1.0, visible=False)
-        self.on(self.step, lambda s, v: s.show_position(v - 1), "scrub")
+        self.on(self.step, lambda s, v: plan_changes.show_position(s, v - 1), "scrub")
         self.play = self.button(
-            "Play", viser.Icon.PLAYER_PLAY, lambda: plans.play(State.play_arms), color="gray", visible=False
+            "Play",
+            viser.Icon.PLAYER_PLAY,
+            lambda: actions.change(plan_changes.play_arms),
+            color="gray",
+            visible=False,
         )
         self.note = self.html()
 
@@ -53,7 +59,7 @@ class PlanPanel(Panel):
         self.step.visible = self.play.visible = plan_results.last > 0
         if plan_results.last:
             self.step.max = float(plan_results.last + 1)
-        playing = plan_results.moving == "arms"
+        playing = plan_results.playing == "arms"
         self.play.label = "Pause" if playing else "Play"
         self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
         self.note.show(NOT_A_MOTION if plan_results.last else "")
@@ -62,7 +68,7 @@ class PlanPanel(Panel):
         """Show which plan and which task it is."""
         plan_results = state.plan_results
         if len(plan_results.plans) > 1:
-            self.solution.value = plan_results.page + 1
+            self.solution.value = plan_results.index + 1
         if plan_results.last:
             self.step.value = round(plan_results.position + 1, 2)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import viser
 
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.state import changes
 from app.state.state import State
 from symgrasp.robot.hand import HANDS
 
@@ -35,13 +35,13 @@ class ScenePanel(Panel):
             self.flat_map = gui.add_checkbox("Flat map", True)
         self.on_choice(self.scene, actions.open_scene)
         self.on_choice(self.hand, actions.choose_hand)
-        self.on(self.task, lambda s, v: s.choose_task(v))
-        self.on(self.arm, lambda s, v: s.choose_arm(v))
-        self.on(self.flat_map, lambda s, v: replace(s, flat_map=v))
+        self.on(self.task, lambda s, v: changes.choose_task(s, v))
+        self.on(self.arm, lambda s, v: changes.choose_arm(s, v))
+        self.on(self.flat_map, lambda s, v: changes.switched(s, flat_map=v))
 
     def show(self, state: State) -> None:
         """Offer what the scene has, and the scene that was uploaded."""
-        scenes = (*self._scenes, *([state.loaded.choice] if state.loaded else []))
+        scenes = (*self._scenes, *([state.uploaded_scene.option] if state.uploaded_scene else []))
         if self.scene.options != scenes:
             self.scene.options = scenes
         if self.task.options != (tasks := tuple(state.scene.tasks)):
@@ -57,4 +57,4 @@ class ScenePanel(Panel):
         self.hand.visible = hand is not None
         if hand is not None:
             self.hand.value = hand
-        self.flat_map.value = state.flat_map
+        self.flat_map.value = state.display.flat_map

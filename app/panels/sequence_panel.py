@@ -10,7 +10,9 @@ import viser
 from app.html.conflicts import regrasps, why_html
 from app.html.readout import sequence_html, tasks_html
 from app.html.stack import stack_html
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
+from app.state import changes, plan_changes
 from app.state.state import State
 from app.state.task_list import TaskList
 
@@ -34,8 +36,8 @@ class SequencePanel(Panel):
         self.method = self.choice("Method", tuple(SEQUENCE_METHODS))
         self.on(
             self.method,
-            lambda s, v: s.turn_book(
-                lambda plan_results: replace(plan_results, sequence_method=SEQUENCE_METHODS[v])
+            lambda s, v: plan_changes.change_plan_results(
+                s, lambda results: replace(results, sequence_method=SEQUENCE_METHODS[v])
             ),
         )
         self.run = self.button("One grasp for all tasks", viser.Icon.ROUTE, lambda: plans.run("sequential"))
@@ -50,7 +52,7 @@ class SequencePanel(Panel):
         )  # fmt: skip
         self.on(
             self.slide,
-            lambda s, v: s.turn_book(lambda plan_results: replace(plan_results, slide=v / 100)),
+            lambda s, v: plan_changes.change_plan_results(s, lambda results: replace(results, slide=v / 100)),
             "inputs",
         )
 
@@ -83,19 +85,21 @@ class TasksPanel(Panel):
             self.add = self.button(
                 "Add a task with the object here",
                 viser.Icon.PLUS,
-                lambda: actions.change(State.add_task),
+                lambda: actions.change(changes.add_task),
                 color="gray",
                 hint="The object's present pose becomes a task after the chosen one, which stays as it was",
             )
             self.name = gui.add_text("Task name", "")
-            changes: dict[str, Callable[[TaskList], TaskList]] = {
+            edits: dict[str, Callable[[TaskList], TaskList]] = {
                 "Rename": lambda tasks: tasks.renamed(self.name.value),
                 "Earlier": lambda tasks: tasks.shifted(-1),
                 "Later": lambda tasks: tasks.shifted(1),
                 "Remove": TaskList.removed,
             }
-            self.edit = gui.add_button_group("Chosen task", tuple(changes))
-            self.edit.on_click(lambda _: actions.change(lambda s: s.change_tasks(changes[self.edit.value])))
+            self.edit = gui.add_button_group("Chosen task", tuple(edits))
+            self.edit.on_click(
+                lambda _: actions.change(lambda s: changes.change_tasks(s, edits[self.edit.value]))
+            )
 
     def show(self, state: State) -> None:
         """List the tasks."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import viser
 
 from app.html.readout import notes_html, status_html
-from app.panels.panel import Actions, Panel
-from app.state.history import redo, undo
+from app.panels.actions import Actions
+from app.panels.panel import Panel
 from app.state.state import State
+from app.state.undo import redo, undo
 
 __all__ = ["NotesPanel", "StatusPanel"]
 

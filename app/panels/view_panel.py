@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import viser
 
-from app.panels.panel import Actions, Panel
+from app.panels.actions import Actions
+from app.panels.panel import Panel
 from app.render.map_picture import FORMATS
 from app.state.state import State
 from symgrasp.feasibility.color_by import ColorBy
@@ -20,7 +21,7 @@ class ViewPanel(Panel):
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
         self.view = self.choice("Colours show", tuple(ColorBy))
-        self.on(self.view, lambda s, v: replace(s, map_view=replace(s.map_view, view=ColorBy(v))))
+        self.on(self.view, lambda s, v: replace(s, map_view=replace(s.map_view, color_by=ColorBy(v))))
         self.handprint = gui.add_checkbox(
             "Handprint", False, hint="The cells under the hand of the picked grasp."
         )
@@ -29,12 +30,12 @@ class ViewPanel(Panel):
             "Compare", False,
             hint="Also compute the map of the turned object from scratch, and count the cells that differ.",
         )  # fmt: skip
-        self.on(self.compare, lambda s, v: replace(s, map_view=s.map_view.choose_compare(v)))
+        self.on(self.compare, lambda s, v: replace(s, map_view=s.map_view.with_compare(v)))
         self.save = gui.add_button_group("Save map as", tuple(FORMATS))
         self.save.on_click(lambda _: actions.save_map(self.save.value))
 
     def write_inputs(self, state: State) -> None:
         """Show what is chosen."""
-        self.view.value = state.map_view.view
+        self.view.value = state.map_view.color_by
         self.handprint.value = state.map_view.handprint
         self.compare.value = state.map_view.compare

@@ -28,7 +28,7 @@ def cell_colors(state: State, m: FeasibilityMap) -> np.ndarray:
         state: the state.
         m: the map over the object as it is turned, or as computed.
     """
-    found = coloured(m, state.roll, state.map_view.view)
+    found = coloured(m, state.map_view.roll, state.map_view.color_by)
     colors = (found.colors if state.is_fresh else faded(found.colors))[found.index]
     prints = shown_prints(state)
     if not prints:

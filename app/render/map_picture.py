@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.html.map import marks_of
 from app.render.cell_colors import coloured
+from app.render.marks import marks_of
 from app.render.palette import PRINTS
 from app.render.prints import hand_color, print_index, print_names, shown_prints
 from app.state.map_view_state import RollChoice
@@ -29,7 +29,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 def picture_name(state: State, kind: str) -> str:
     """Return a name for the file."""
-    stem = "_".join([state.scene.name, state.task, state.arm, state.map_view.view])
+    stem = "_".join([state.scene.name, state.task, state.arm, state.map_view.color_by])
     return re.sub(r"\W+", "_", stem) + f".{kind.lower()}"
 
 
@@ -46,8 +46,8 @@ def map_picture(state: State, kind: str) -> bytes:
     m = state.map
     if m is None or not state.is_fresh:
         raise InputError("page", "map", "none for this pose yet", "a computed map")
-    found = _with_prints(coloured(m, state.roll, state.map_view.view), state)
-    roll = "either roll" if state.roll is RollChoice.EITHER else f"roll {state.roll.value}"
+    found = _with_prints(coloured(m, state.map_view.roll, state.map_view.color_by), state)
+    roll = "either roll" if state.map_view.roll is RollChoice.EITHER else f"roll {state.map_view.roll.value}"
     title = f"{state.scene.name} · {state.task} · {state.arm}"
     if state.delta:
         title += f" · turned by {np.rad2deg(state.delta):.5g}°"

@@ -10,11 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
+from app.render.weak_cache import cached_with_first
+from app.state.state import State
 from symgrasp.plan.plan import Hold, PlanTask
 from symgrasp.poses import Array, inverse
 from symgrasp.scene.scene import Scene
 
-__all__ = ["PlaybackFrame", "plan_joint_values"]
+__all__ = ["PlaybackFrame", "drawn_object_pose", "plan_joint_values", "playback_frame"]
 
 
 def plan_joint_values(scene: Scene, task: PlanTask) -> dict[str, Array]:
@@ -54,7 +56,7 @@ class PlaybackFrame:
         hold = self._carrier
         if hold is None:
             return (self.before if self.share < 0.5 else self.after).object_pose_turned.array()
-        tool = self.scene.arm(hold.arm).world_tool_pose(self._joints(hold))
+        tool = self.scene.arm(hold.arm).world_tool_pose(self._arm_values(hold))
         in_hand = inverse(hold.tool_pose.array()) @ self.before.object_pose_turned.array()
         return tool @ in_hand
 
@@ -64,8 +66,24 @@ class PlaybackFrame:
         after = {(hold.arm, hold.grasp) for hold in self.after.holds}
         return next((hold for hold in self.before.holds if (hold.arm, hold.grasp) in after), None)
 
-    def _joints(self, hold: Hold) -> Array:
+    def _arm_values(self, hold: Hold) -> Array:
         arm = self.scene.arm(hold.arm)
         names = arm.robot.model.joint_names
         values = self.joint_values[hold.robot]
         return np.array([values[names.index(name)] for name in arm.joint_names])
+
+
+@cached_with_first
+def playback_frame(state: State) -> PlaybackFrame | None:
+    """Return the frame of the playback, None unless it is between two tasks."""
+    if state.plan is None or state.step is None or not state.plan_results.is_between:
+        return None
+    start, share = state.plan_results.transition
+    before, after = state.plan.plan.tasks[start : start + 2]
+    return PlaybackFrame(state.scene, before, after, share)
+
+
+def drawn_object_pose(state: State) -> Array:
+    """Return where the object is drawn (4, 4): in the hand, while the arms are played."""
+    frame = playback_frame(state)
+    return frame.T_world_object if frame else state.T_world_object

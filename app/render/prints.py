@@ -39,12 +39,12 @@ def shown_prints(state: State) -> list[np.ndarray]:
     Of those that hold it together in a plan or climb, or of the picked grasp where that is asked for.
     """
     grid = state.scene.manifold
-    if state.climbed and state.plan_results.climb:
+    if state.climb_step and state.plan_results.climb:
         return [
             hand_print(state.scene, arm, cell.row, cell.roll).on(grid, cell.column)
-            for arm, cell in zip(state.plan_results.climb.arms, state.climbed.cells, strict=True)
+            for arm, cell in zip(state.plan_results.climb.arms, state.climb_step.cells, strict=True)
         ]
-    if state.plan and state.step is not None and state.shown and len(state.shown.holds) > 1:
+    if state.plan and state.step is not None and state.shown_task and len(state.shown_task.holds) > 1:
         return list(state.plan.prints[state.step].values())
     if state.map_view.handprint and state.pick and state.cell:
         row, column = grid.cell(state.pick.h, state.pick.theta)
@@ -54,10 +54,10 @@ def shown_prints(state: State) -> list[np.ndarray]:
 
 def print_names(state: State) -> list[str]:
     """Return the arms that the shown prints belong to."""
-    if state.climbed and state.plan_results.climb:
+    if state.climb_step and state.plan_results.climb:
         return list(state.plan_results.climb.arms)
-    if state.shown and len(state.shown.holds) > 1:
-        return [hold.arm for hold in state.shown.holds]
+    if state.shown_task and len(state.shown_task.holds) > 1:
+        return [hold.arm for hold in state.shown_task.holds]
     return [state.arm]
 
 

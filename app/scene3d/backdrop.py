@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.scene3d.nodes import add_links, place
+from app.scene3d.nodes import add_links, set_pose
 from app.scene3d.viewpoint import (
     Viewpoint,
 )
@@ -52,10 +52,10 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
     else:
         assert o.path is not None
         model = RobotModel(o.path)
-        place(scene.add_frame(name, show_axes=False), o.T_world_obstacle)
+        set_pose(scene.add_frame(name, show_axes=False), o.T_world_obstacle)
         poses = model.forward(model.default_values())
         for link, node in add_links(client, name, model).items():
-            place(node, poses[model.link_index(link)])
+            set_pose(node, poses[model.link_index(link)])
 
 
 def add_floor(client: viser.ClientHandle, name: str, scene: Scene, *, dark: bool) -> None:

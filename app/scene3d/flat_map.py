@@ -9,7 +9,7 @@ import viser
 
 from app.render.cell_colors import cell_colors
 from app.scene3d.cell_mesh import CellMesh, OnCell, flat
-from app.scene3d.nodes import place
+from app.scene3d.nodes import set_pose
 from app.scene3d.viewpoint import Viewpoint, stand_around
 from app.state.state import State
 from symgrasp.poses import Array, from_rotation
@@ -55,11 +55,11 @@ class FlatMap:
     def _turn(self, view: Viewpoint) -> None:
         self._view = view
         axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
-        place(self.frame, from_rotation(axes, self._position))
+        set_pose(self.frame, from_rotation(axes, self._position))
 
     def show(self, state: State) -> None:
         """Bring it up to the state."""
-        self.frame.visible = state.flat_map
+        self.frame.visible = state.display.flat_map
         if state.map:
             self.cells.paint(cell_colors(state, state.map))
             # What a turn leaves over beside whole cells moves the start of the grid.

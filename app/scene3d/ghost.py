@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from app.render.playback import playback_frame
 from app.state.state import State
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array
@@ -50,7 +51,7 @@ def ghost(state: State) -> Ghost | None:
     shown_candidate = state.shown_candidate
     if shown_candidate is None or state.explanation is None or shown_candidate.reason == Reason.FEASIBLE:
         return None
-    if state.shown or state.motion or state.climbed:  # the arms show something else
+    if state.shown_task or playback_frame(state) or state.climb_step:  # the arms show something else
         return None
     arm = state.scene.arm(state.arm)
     hits = frozenset(body for c in shown_candidate.collisions for body in (c.a, c.b))

@@ -7,7 +7,7 @@ import viser
 
 from app.render.palette import rgb
 from app.scene3d.ghost import Ghost, body_mesh, ghost, link_mesh
-from app.scene3d.nodes import place
+from app.scene3d.nodes import set_pose
 from app.state.state import State
 from symgrasp.scene.scene import Scene
 from symgrasp.world import Body
@@ -46,7 +46,7 @@ class GhostView:
         for body, node in self._bodies.items():
             node.visible = found is not None and body in found.others()
             if body.body == self.scene.file.object.name:
-                place(node, state.T_world_object)
+                set_pose(node, state.T_world_object)
         if found:
             self._pose(found)
 
@@ -64,14 +64,14 @@ class GhostView:
         for body in found.others() - set(self._bodies):
             mesh, pose = body_mesh(self.scene, body, state.T_world_object)
             node = self._bodies[body] = self._add(f"hit{len(self._bodies)}", mesh, HIT, HIT_OPACITY)
-            place(node, pose)
+            set_pose(node, pose)
 
     def _pose(self, found: Ghost) -> None:
         robot = self.scene.robots[found.robot]
         poses = robot.T_world_base @ robot.model.forward(found.values)
         for link, nodes in self._robots[found.robot].items():
             for node in nodes:
-                place(node, poses[robot.model.link_index(link)])
+                set_pose(node, poses[robot.model.link_index(link)])
 
     def _add(
         self, name: str, mesh: trimesh.Trimesh, color: tuple[int, int, int], opacity: float

@@ -8,10 +8,10 @@ from app.scene3d.visual_meshes import link_visuals
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.robot.model import RobotModel
 
-__all__ = ["add_links", "place"]
+__all__ = ["add_links", "set_pose"]
 
 
-def place(node: viser.SceneNodeHandle, pose: Array) -> None:
+def set_pose(node: viser.SceneNodeHandle, pose: Array) -> None:
     """Put a node at a pose (4, 4) in its parent."""
     node.wxyz = quat_wxyz(pose)
     node.position = pose[:3, 3]

@@ -10,9 +10,10 @@ import viser
 from app.html.profile import deviation_colors
 from app.render.cell_colors import cell_colors
 from app.render.palette import INK, PICK, rgb
+from app.render.playback import drawn_object_pose
 from app.render.prints import on_surface
 from app.scene3d.cell_mesh import CellMesh, OnCell, around
-from app.scene3d.nodes import place
+from app.scene3d.nodes import set_pose
 from app.state.state import State
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, from_position_quat, rotation_z
@@ -60,9 +61,9 @@ class ObjectView:
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
         """Bring it up to the state."""
-        place(self.body, state.T_world_seen)
-        place(self.surface.node, state.T_world_seen @ rotation_z(-state.delta))
-        if state.errors and state.object_choice and state.object_choice.measurement:
+        set_pose(self.body, drawn_object_pose(state))
+        set_pose(self.surface.node, drawn_object_pose(state) @ rotation_z(-state.delta))
+        if state.display.symmetry_error and state.object_choice and state.object_choice.measurement:
             colors = deviation_colors(state.object_choice.measurement, self.grid)
             self.surface.paint(on_surface(state, colors))
         elif state.result:
@@ -70,9 +71,9 @@ class ObjectView:
         self.pick.visible = state.pick is not None
         if state.pick:
             self.pick.position = self.grid.contact(state.pick.h, state.pick.theta)
-        self.gizmo.visible = state.gizmo
+        self.gizmo.visible = state.display.drag_handles
         if move_gizmo:
-            place(self.gizmo, state.T_world_object)
+            set_pose(self.gizmo, state.T_world_object)
 
 
 def _add_seam(client: viser.ClientHandle, name: str, profile: Profile) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.scene3d.nodes import add_links, place
+from app.scene3d.nodes import add_links, set_pose
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Robot
 
@@ -17,7 +17,7 @@ class RobotView:
 
     def __init__(self, client: viser.ClientHandle, root: str, robot: Robot) -> None:
         self.model = robot.model
-        place(client.scene.add_frame(root, show_axes=False), robot.T_world_base)
+        set_pose(client.scene.add_frame(root, show_axes=False), robot.T_world_base)
         nodes = add_links(client, root, robot.model)
         self.nodes = {self.model.link_index(link): node for link, node in nodes.items()}
         self._shown: Array | None = None
@@ -29,4 +29,4 @@ class RobotView:
         self._shown = values
         poses = self.model.forward(values)
         for index, node in self.nodes.items():
-            place(node, poses[index])
+            set_pose(node, poses[index])

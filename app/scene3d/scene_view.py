@@ -57,14 +57,14 @@ class SceneView:
             self._build(state)
         elif (state.scene.profile, state.scene.settings) != (self._scene.profile, self._scene.settings):
             self._build_object(state)
-        if state.dark != self._dark:
-            self._dark = state.dark
-            add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.dark)
+        if state.display.dark != self._dark:
+            self._dark = state.display.dark
+            add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.display.dark)
         with self.client.atomic():
             if state.is_current or not state.busy:  # arms wait where they are for a new map
                 for name, values in joint_values(state).items():
                     self.robots[name].show(values)
-            if state.unmet is None or not state.busy:
+            if state.missing_request is None or not state.busy:
                 self.ghost.show(state)
             self.object.show(state, move_gizmo=move_gizmo)
             if self.flat_map:
@@ -90,8 +90,8 @@ class SceneView:
             client.camera.look_at = np.array(given[3:]) if given else view.look_at
         client.scene.add_frame(root, show_axes=False)
         add_lights(client, root, view)
-        self._dark = state.dark
-        add_floor(client, f"{root}/floor", scene, dark=state.dark)
+        self._dark = state.display.dark
+        add_floor(client, f"{root}/floor", scene, dark=state.display.dark)
         for k, obstacle in enumerate(scene.obstacles):
             add_obstacle(client, f"{root}/obstacle{k}", obstacle, k)
         self._build_object(state)

@@ -15,8 +15,11 @@ from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from symgrasp.errors import MeshError
+from symgrasp.meshes import read_mesh
+from symgrasp.robot.model import RobotModel
+from symgrasp.scene.scene import Scene
 
-__all__ = ["link_visuals"]
+__all__ = ["check_visuals", "link_visuals"]
 
 Color = tuple[int, ...]
 
@@ -58,6 +61,21 @@ def link_visuals(urdf: bytes) -> dict[str, bytes]:
         if scene.geometry:
             glbs[link.name] = export_glb(scene, include_normals=True)
     return glbs
+
+
+def check_visuals(scene: Scene) -> None:
+    """Read everything of a scene that is shown.
+
+    Raises:
+        MeshError: a mesh cannot be read.
+    """
+    for robot in scene.robots.values():
+        link_visuals(robot.model.urdf)
+    for o in scene.obstacles:
+        if o.kind == "urdf" and o.path:
+            link_visuals(RobotModel(o.path).urdf)
+        elif o.kind == "mesh" and o.path:
+            read_mesh(o.path, f"obstacle {o.name}")
 
 
 def _add_visual(

@@ -25,14 +25,14 @@ STYLE = "font:13px/1.5 system-ui,sans-serif;margin:12px"
 
 
 @contextmanager
-def open_lobby(store: SharedCache, host: str, port: int) -> Iterator[Lobby]:
+def open_lobby(cache: SharedCache, host: str, port: int) -> Iterator[Lobby]:
     """Serve the page on a port while the ``with`` block runs.
 
     Raises:
         OSError: the port cannot be listened on.
     """
     server = quiet_server()
-    reception = Lobby(store, lambda client_id: client_id in server.get_clients())
+    reception = Lobby(cache, lambda client_id: client_id in server.get_clients())
     server.on_client_connect(reception.arrived)
     server.on_client_disconnect(reception.left)
     try:
@@ -54,9 +54,9 @@ class Lobby:
         is_here: whether the browser of that number is still connected.
     """
 
-    def __init__(self, store: SharedCache, is_here: Callable[[int], bool]) -> None:
-        self._store, self._is_here = store, is_here
-        self._pool = ProcessPool(store.folders)
+    def __init__(self, cache: SharedCache, is_here: Callable[[int], bool]) -> None:
+        self._cache, self._is_here = cache, is_here
+        self._pool = ProcessPool(cache.folders)
         self._lock = threading.Lock()
         self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
         self._sessions: dict[int, Session] = {}
@@ -106,7 +106,7 @@ class Lobby:
         try:
             greeting.remove()
             self._pool.prepare()
-            session = Session(client, self._store, self._pool, visit)
+            session = Session(client, self._cache, self._pool, visit)
         except Exception as error:
             log.exception("a session could not be opened")
             client.gui.reset()

@@ -1,23 +1,24 @@
-"""What the widgets for plans ask for: planning, listing, playing, files."""
+"""What widgets ask for about plans: planning, listing, opening and downloading."""
 
 from __future__ import annotations
 
 import re
-import threading
-import time
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
-from typing import Any, Protocol
+from dataclasses import replace
 
+from app.compute.cache import SharedCache
 from app.compute.compute_process import ComputeProcess
 from app.compute.plan_service import OpenedPlan, PlanRequest
-from app.state.plan_results import Kind
+from app.server.session_api import SessionApi
+from app.state.changes import open_upload
+from app.state.plan_changes import more_listed, show_results
+from app.state.plan_results import PlanKind, PlanResults
+from app.state.requests import Maps
 from app.state.state import State
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan
-from symgrasp.progress import Progress
 
-__all__ = ["FORMATS", "PlanActions", "SessionApi"]
+__all__ = ["FORMATS", "PlanActions"]
 
 FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
     "JSON": (".json", Plan.to_json),
@@ -27,120 +28,71 @@ FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
 }
 """What the page calls a format → ending of its files, and what writes them."""
 
-TICK = 0.05
-"""Time (s) between the pictures of a play."""
-
-
-class SessionApi(Protocol):
-    """What the desk needs of a browser's session."""
-
-    @property
-    def state(self) -> State | None:
-        """What is shown; None before the first scene stands."""
-        ...
-
-    @property
-    def lock(self) -> AbstractContextManager[bool]:
-        """Held while the state changes; who holds it may change it."""
-        ...
-
-    def change(self, change: Callable[[State], State], origin: str = "") -> None:
-        """Apply a change to the state."""
-
-    def submit(self, label: str, run: Callable[[Progress], Any], done: Callable[[int, Any], None]) -> None:
-        """Give the worker something to do."""
-
-    def send(self, name: str, content: bytes) -> None:
-        """Send a file to the browser."""
-
 
 class PlanActions:
-    """Plans for one browser.
+    """Plans for one browser; see `app.panels.actions.PlanActions`.
 
     Args:
-        office: the browser's session.
-        workshop: of its worker.
+        session: the browser's session.
+        process: computes for it.
+        cache: the maps that were computed before.
     """
 
-    def __init__(self, office: SessionApi, process: ComputeProcess) -> None:
-        self.office, self._workshop = office, process
-        self._ended = threading.Event()
-        self._player: threading.Thread | None = None
+    def __init__(self, session: SessionApi, process: ComputeProcess, cache: SharedCache) -> None:
+        self._session, self._process, self._cache = session, process, cache
 
-    def close(self) -> None:
-        """Play nothing any more; may be called from anywhere."""
-        self._ended.set()
-
-    def run(self, kind: Kind, method: str = "") -> None:
+    def run(self, kind: PlanKind, method: str = "") -> None:
         """Run a planner, with the method chosen for it unless another is asked for."""
-        state = self.office.state
+        state = self._session.state
         if state is None:
             return
-        plan_results, name = state.plan_results, state.arm
+        results, name = state.plan_results, state.arm
         if kind == "bimanual":
-            method, name = method or plan_results.hands_method, state.together
+            method, name = method or results.hands_method, state.bimanual_task
         elif kind == "sequential":
-            method = method or plan_results.sequence_method
-        order = PlanRequest(state.scene, kind, method, name, state.poses, plan_results.seed)
-        self.office.submit(
+            method = method or results.sequence_method
+        request = PlanRequest(state.scene, kind, method, name, state.poses, results.seed)
+        known = {(r.task, r.arm): result for r in request.maps if (result := self._cache.map(r))}
+
+        self._session.submit(
             "Planning",
-            lambda progress: self._workshop.run(order, plan_results, progress),
-            lambda ticket, found: self.office.change(lambda s: s.booked(ticket, found)),
+            lambda progress: self._process.plan(request, known, progress),
+            lambda state, found: show_results(state, found[0].added_to(state.plan_results, found[1])),
         )
 
     def more(self) -> None:
         """List further plans."""
-        state = self.office.state
+        state = self._session.state
         if state is None or not state.plan_results.more:
             return
-        maps = state.plan_results.maps
-        self.office.submit(
-            "Listing more solutions",
-            lambda progress: self._workshop.more(maps, progress),
-            lambda ticket, found: self.office.change(lambda s: s.listed(ticket, *found)),
+        self._session.submit(
+            "Listing more solutions", self._process.more, lambda state, found: more_listed(state, *found)
         )
 
     def open_file(self, name: str, content: bytes) -> None:
-        """Verify a plan that was uploaded and show it if it holds."""
+        """Verify a plan that was uploaded, and show it if it holds."""
+        self._session.submit(
+            f"Verifying {name}",
+            lambda progress: self._process.open(content, name, progress),
+            lambda state, found: opened(state, *found),
+        )
 
-        def done(ticket: int, opened: OpenedPlan) -> None:
-            self.office.change(
-                lambda s: (
-                    s.opened(opened.report, opened.scene, opened.plan)
-                    if s.busy and s.busy.ticket == ticket
-                    else s
-                )
-            )
-
-        label = f"Verifying {name}"
-        self.office.submit(label, lambda progress: self._workshop.open(content, name, progress), done)
-
-    def download(self, form: str) -> None:
+    def download(self, format_name: str) -> None:
         """Send the plan to the browser in one of `FORMATS`."""
-        state = self.office.state
+        state = self._session.state
         if state and state.plan:
             plan = state.plan.plan
-            ending, write = FORMATS[form]
+            ending, write = FORMATS[format_name]
             name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
-            self.office.send(name + ending, write(plan).encode())
+            self._session.send(name + ending, write(plan).encode())
 
-    def play(self, change: Callable[[State], State]) -> None:
-        """Start or stop a play."""
-        with self.office.lock:  # a player that is about to end does so first, and another one begins
-            self.office.change(change)
-            state = self.office.state
-            if state and state.plan_results.moving and not (self._player and self._player.is_alive()):
-                self._player = threading.Thread(target=self._play, name="player", daemon=True)
-                self._player.start()
 
-    def _play(self) -> None:
-        last = time.monotonic()
-        while not self._ended.wait(TICK):
-            now = time.monotonic()
-            with self.office.lock:
-                self.office.change(lambda s, seconds=now - last: s.played(seconds), "play")
-                state = self.office.state
-                if state is None or not state.plan_results.moving:
-                    self._player = None
-                    return
-            last = now
+def opened(state: State, found: OpenedPlan, maps: Maps) -> State:
+    """Show a plan from a file, with its scene; one that does not hold is only reported."""
+    report, plan = found.report, found.plan
+    if found.scene is None or plan is None:
+        return replace(state, plan_results=replace(state.plan_results, opened=report))
+    chosen = state.plan_results
+    results = PlanResults(chosen.sequence_method, chosen.hands_method, chosen.seed)
+    results = replace(results.found(plan.plan.kind, (plan,), maps, more=False), opened=report)
+    return show_results(open_upload(state, found.scene), results)

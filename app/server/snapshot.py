@@ -43,7 +43,7 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
         start = server.initial_camera
         start.position, start.look_at, start.fov = np.array(camera[:3]), np.array(camera[3:]), fov
         start.up = (0.0, 0.0, 1.0)
-        return server.get_scene_serializer().as_html(dark_mode=state.dark)
+        return server.get_scene_serializer().as_html(dark_mode=state.display.dark)
     finally:
         server.stop()
 

@@ -1,26 +1,17 @@
-"""Undo and redo: what a person chose, step by step; a drag is one step. Pure, like the state.
-
-Only what is chosen goes back, uploads with it: a scene or an object is on offer wherever it is shown.
-What was computed stays where it still fits, and comes again from what the server remembers where it
-does not.
-"""
+"""Undo and redo of any immutable state, step by step; a drag is one step."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
-if TYPE_CHECKING:
-    from app.state.state import State
-    from symgrasp.feasibility.map import FeasibilityMap
+__all__ = ["DRAG_PAUSE", "STEPS_KEPT", "Drag", "History"]
 
-__all__ = ["DRAG_PAUSE", "PLANS_KEPT", "STEPS_KEPT", "History", "redo", "remember", "undo"]
+T = TypeVar("T")
 
 STEPS_KEPT = 100
 """Steps that can be undone."""
-
-PLANS_KEPT = 6
-"""Findings of planners among them: a map may take 4 MB. Earlier steps come back without their plan."""
 
 DRAG_PAUSE = 0.8
 """Changes of one value that follow each other within this time (s) are one drag."""
@@ -31,107 +22,63 @@ class Drag:
     """A drag that may still go on.
 
     Attributes:
-        what: what it changes.
-        at: when (s) it was last heard of.
+        values: names of the values that it changes.
+        time: when (s) it last changed one.
     """
 
-    what: frozenset[object]
-    at: float
+    values: frozenset[object]
+    time: float
 
-    def goes_on(self, what: frozenset[object], now: float) -> bool:
-        """Whether a change is part of it."""
-        return what <= self.what and 0 <= now - self.at < DRAG_PAUSE
+    def includes(self, values: frozenset[object], time: float) -> bool:
+        """Return whether a change of these values at a time (s) is part of it."""
+        return values <= self.values and 0 <= time - self.time < DRAG_PAUSE
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class History(Generic[T]):
     """The states that can be returned to, the nearest last.
 
     Attributes:
-        past: before the present one.
-        future: after it, having been undone.
-        drag: the drag that led to the present one.
+        past: states before the present one.
+        future: states after it, which were undone.
+        drag: the drag that led to the present state, if one did.
     """
 
-    past: tuple[State, ...] = ()
-    future: tuple[State, ...] = ()
+    past: tuple[T, ...] = ()
+    future: tuple[T, ...] = ()
     drag: Drag | None = None
 
+    def recorded(
+        self,
+        before: Callable[[], T],
+        values: frozenset[object],
+        time: float,
+        *,
+        dragged: bool,
+    ) -> History[T]:
+        """Return the history after a change: a new step, or none where it goes on with the present drag.
 
-def remember(before: State, after: State, origin: str, now: float) -> State:
-    """Return the state after a change, with its history brought up to it.
+        Args:
+            before: makes the state before the change; called only for a new step.
+            values: names of the changed values.
+            time: when (s) they changed.
+            dragged: whether the change may be part of a drag.
+        """
+        if dragged and self.drag and self.drag.includes(values, time):
+            return replace(self, drag=Drag(self.drag.values, time))
+        past = (*self.past, before())[-STEPS_KEPT:]
+        return History(past, (), Drag(values, time) if dragged else None)
 
-    Args:
-        before: the state that was changed.
-        after: the changed one.
-        origin: "inputs", "gizmo" or "scrub" where the change may be part of a drag; "play" where
-            nobody chose anything.
-        now: the time (s), from any beginning.
-    """
-    if after.history is not before.history:  # the change was an undo or a redo
-        return after
-    if after.inputs == before.inputs or origin == "play":
-        return after
-    history = before.history
-    what = _what(before, after, origin)
-    if origin and history.drag and history.drag.goes_on(what, now):
-        return replace(after, history=replace(history, drag=Drag(history.drag.what, now)))
-    past = _light((*history.past, _chosen(before))[-STEPS_KEPT:])
-    return replace(after, history=History(past, (), Drag(what, now) if origin else None))
+    def undone(self, present: T) -> tuple[T, History[T]] | None:
+        """Return the state before the present one with its history, or None at the beginning."""
+        if not self.past:
+            return None
+        *past, state = self.past
+        return state, History(tuple(past), (*self.future, present))
 
-
-def undo(state: State) -> State:
-    """Return to the state before the last step."""
-    history = state.history
-    if not history.past:
-        return state
-    *past, then = history.past
-    return _restored(state, then, History(tuple(past), (*history.future, _chosen(state))))
-
-
-def redo(state: State) -> State:
-    """Take back an undo."""
-    history = state.history
-    if not history.future:
-        return state
-    *future, then = history.future
-    return _restored(state, then, History((*history.past, _chosen(state)), tuple(future)))
-
-
-def _what(before: State, after: State, origin: str) -> frozenset[object]:
-    """Name what a change is about: gizmo and scrubbers change several values at once, widgets one or two."""
-    if origin in ("gizmo", "scrub"):
-        return frozenset([origin])
-    pairs = zip(before.inputs, after.inputs, strict=True)
-    return frozenset(k for k, (old, new) in enumerate(pairs) if old != new)
-
-
-def _chosen(state: State) -> State:
-    """Leave out what is computed; a plan cannot be made again at once, so it stays."""
-    map_view = state.map_view.chosen()
-    return replace(
-        state, history=History(), map_view=map_view, result=None, refused=None, busy=None, problem=""
-    )
-
-
-def _light(past: tuple[State, ...]) -> tuple[State, ...]:
-    """Drop the plans of the earliest steps, so that not every map that was ever planned with is kept."""
-    kept: set[frozenset[FeasibilityMap]] = set()
-    steps: list[State] = []
-    for state in reversed(past):
-        maps = frozenset(result.map for result in state.plan_results.maps.values())
-        if maps and (maps in kept or len(kept) < PLANS_KEPT):
-            kept.add(maps)
-        elif maps:
-            state = replace(state, plan_results=state.plan_results.cleared(), step=None)
-        steps.append(state)
-    return tuple(reversed(steps))
-
-
-def _restored(now: State, then: State, history: History) -> State:
-    result = now.result if now.scene is then.scene else None
-    if then.plan and then.shown:
-        result = then.plan.maps.get((then.task, then.arm), result)
-    return replace(
-        then, history=history, result=result, plan_results=then.plan_results.still(), link=now.link
-    )
+    def redone(self, present: T) -> tuple[T, History[T]] | None:
+        """Return the state that the last undo left with its history, or None if there was no undo."""
+        if not self.future:
+            return None
+        *future, state = self.future
+        return state, History((*self.past, present), tuple(future))

@@ -1,4 +1,4 @@
-"""How the map is looked at, and what was found out about it for that: the recomputed map, the candidates."""
+"""How the map is looked at, and what was computed for that: a recomputed map, a cell's candidates."""
 
 from __future__ import annotations
 
@@ -13,77 +13,6 @@ from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.feasibility.map import FeasibilityMap
 
 __all__ = ["MapViewState", "RollChoice"]
-
-
-@dataclass(frozen=True)
-class MapViewState:
-    """What of the map is shown.
-
-    Attributes:
-        view: what its colours stand for.
-        handprint: whether the picked grasp's print lies on it.
-        compare: whether the map is computed from scratch as well, to compare it with the shifted one.
-        check: the newest of those.
-        explained: the candidates of the cell that was picked last.
-        candidate: index of the one that is shown; None for the one that decides the cell.
-    """
-
-    view: ColorBy = ColorBy.REASON
-    handprint: bool = False
-    compare: bool = False
-    check: Comparison | None = None
-    explained: ExplainResult | None = None
-    candidate: int | None = None
-
-    @property
-    def inputs(self) -> tuple[object, ...]:
-        """What widgets show and can change."""
-        return self.view, self.handprint, self.compare, self.candidate
-
-    def unmet(self, request: MapRequest, delta: float, cell: Cell | None) -> Request | None:
-        """Return what is to be found out next.
-
-        Args:
-            request: the map.
-            delta: turn of the object (rad).
-            cell: the picked cell of the map before it is shifted.
-        """
-        check = CompareRequest(request, delta)
-        if self.compare and (self.check is None or self.check.request != check):
-            return check
-        if cell is not None:
-            explain = ExplainRequest(request, cell)
-            if self.explained is None or self.explained.request != explain:
-                return explain
-        return None
-
-    def choose_compare(self, compare: bool) -> MapViewState:
-        """Compare with a recomputed map, or no more."""
-        return replace(self, compare=compare, check=self.check if compare else None)
-
-    def choose_candidate(self, candidate: int) -> MapViewState:
-        """Show a candidate, by its index among the explained ones; the best is the first."""
-        count = len(self.explained.explanation.candidates) if self.explained else 0
-        return replace(self, candidate=int(np.clip(candidate, 0, count - 1)) if count else None)
-
-    def take(self, found: Comparison | ExplainResult) -> MapViewState:
-        """Take what was found out."""
-        if isinstance(found, Comparison):
-            return replace(self, check=found if self.compare else None)
-        # One that was chosen before anything was explained was brought back by an undo.
-        return replace(self, explained=found, candidate=None if self.explained else self.candidate)
-
-    def chosen(self) -> MapViewState:
-        """Leave out what was found out."""
-        return replace(self, check=None, explained=None)
-
-    def elsewhere(self) -> MapViewState:
-        """Another scene is shown: in the same way, and nothing is known of it."""
-        return MapViewState(self.view, self.handprint, self.compare)
-
-    def another_cell(self) -> MapViewState:
-        """Another cell is picked."""
-        return replace(self, candidate=None)
 
 
 class RollChoice(Enum):
@@ -103,9 +32,9 @@ class RollChoice(Enum):
         """Return the reasons (H, A) that are shown."""
         return self.of(m, m.reason)
 
-    def values(self, m: FeasibilityMap, view: ColorBy) -> np.ndarray:
-        """Return the values (H, A) of a view that are shown, in its unit."""
-        return self.of(m, m.values(view))
+    def values(self, m: FeasibilityMap, color_by: ColorBy) -> np.ndarray:
+        """Return the values (H, A) that are shown when colouring by them, in their unit."""
+        return self.of(m, m.values(color_by))
 
     def of(self, m: FeasibilityMap, cells: np.ndarray) -> np.ndarray:
         """Return what is shown (H, A) of cells (R, H, A) of both rolls."""
@@ -114,3 +43,76 @@ class RollChoice(Enum):
     def roll(self, m: FeasibilityMap, row: int, column: int) -> int:
         """Return the index of the roll that is shown at a cell."""
         return int(self.rolls(m)[row, column])
+
+
+@dataclass(frozen=True)
+class MapViewState:
+    """How one browser looks at the map.
+
+    Attributes:
+        roll: the rolls shown.
+        color_by: what the colours stand for.
+        handprint: whether the picked grasp's print lies on it.
+        compare: whether the map is computed from scratch as well, to compare it with the shifted one.
+        comparison: the newest result of that.
+        explained: the candidates of the cell that was picked last.
+        candidate: index of the candidate shown; None for the one that decides the cell.
+    """
+
+    roll: RollChoice = RollChoice.EITHER
+    color_by: ColorBy = ColorBy.REASON
+    handprint: bool = False
+    compare: bool = False
+    comparison: Comparison | None = None
+    explained: ExplainResult | None = None
+    candidate: int | None = None
+
+    @property
+    def input_values(self) -> tuple[object, ...]:
+        """Everything that widgets show and can change."""
+        return self.roll, self.color_by, self.handprint, self.compare, self.candidate
+
+    def missing_request(self, request: MapRequest, delta: float, cell: Cell | None) -> Request | None:
+        """Return the first request about a map whose result is missing.
+
+        Args:
+            request: the map.
+            delta: turn of the object (rad).
+            cell: the picked cell of the map before it is shifted.
+        """
+        compare = CompareRequest(request, delta)
+        if self.compare and (self.comparison is None or self.comparison.request != compare):
+            return compare
+        if cell is not None:
+            explain = ExplainRequest(request, cell)
+            if self.explained is None or self.explained.request != explain:
+                return explain
+        return None
+
+    def with_compare(self, compare: bool) -> MapViewState:
+        """Compare with a recomputed map, or no more."""
+        return replace(self, compare=compare, comparison=self.comparison if compare else None)
+
+    def with_candidate(self, candidate: int) -> MapViewState:
+        """Show a candidate, by its index among the explained ones; the best is the first."""
+        count = len(self.explained.explanation.candidates) if self.explained else 0
+        return replace(self, candidate=int(np.clip(candidate, 0, count - 1)) if count else None)
+
+    def with_result(self, result: Comparison | ExplainResult) -> MapViewState:
+        """Take a result about the map."""
+        if isinstance(result, Comparison):
+            return replace(self, comparison=result if self.compare else None)
+        # A candidate that was chosen before anything was explained was brought back by an undo.
+        return replace(self, explained=result, candidate=None if self.explained else self.candidate)
+
+    def without_results(self) -> MapViewState:
+        """Leave out what was computed."""
+        return replace(self, comparison=None, explained=None)
+
+    def for_another_scene(self) -> MapViewState:
+        """Return how another scene is looked at: all rolls in the same colours, nothing computed yet."""
+        return MapViewState(color_by=self.color_by, handprint=self.handprint, compare=self.compare)
+
+    def for_another_cell(self) -> MapViewState:
+        """Forget which candidate was chosen: another cell is picked."""
+        return replace(self, candidate=None)

@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 OWN = "the scene's own"
-"""The choice of the object that the scene came with."""
+"""The option of the object that the scene came with."""
 
 UPLOAD_LIMIT = 20_000_000
 """Largest mesh file (bytes) that is looked at."""
@@ -39,13 +39,13 @@ class ObjectChoice:
     """An object that is put into a scene.
 
     Attributes:
-        choice: what the page offers it as.
+        option: its name in the menu of the page.
         name: what the scene calls it.
         profile: its r(h).
         measurement: how the mesh was measured, of an uploaded one.
     """
 
-    choice: str
+    option: str
     name: str
     profile: Profile
     measurement: Measurement | None = None
@@ -53,7 +53,7 @@ class ObjectChoice:
 
 def choices(uploaded: ObjectChoice | None = None) -> tuple[str, ...]:
     """Return what there is to choose from."""
-    return (OWN, *library_objects(), *([uploaded.choice] if uploaded else []))
+    return (OWN, *library_objects(), *([uploaded.option] if uploaded else []))
 
 
 def from_library(choice: str) -> ObjectChoice:

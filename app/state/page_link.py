@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Camera", "MadeLink"]
+__all__ = ["Camera", "PageLink"]
 
 
 Camera = tuple[float, ...]
@@ -12,15 +12,15 @@ Camera = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class MadeLink:
-    """A link that was made.
+class PageLink:
+    """A link to the page as it was.
 
     Attributes:
         address: the whole address.
-        told: what was shown then; nothing once it was looked at from elsewhere.
-        camera: where it was looked at from.
+        values: what it contains, but for the camera; nothing once it was looked at from elsewhere.
+        camera: the camera it contains.
     """
 
     address: str
-    told: tuple[object, ...]
+    values: tuple[object, ...]
     camera: Camera

@@ -1,113 +1,122 @@
-"""Changes of what is shown of plans: which of them, which task, what is played."""
+"""Changes of what is shown of plans: which of them, which task, which step of a climb, what is played."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import replace
 
 import numpy as np
 
-from app.state.facts import Facts, Pick
 from app.state.plan_results import PlanResult, PlanResults
+from app.state.state import Pick, State
 
-__all__ = ["Leafing"]
+__all__ = [
+    "change_plan_results",
+    "choose_plan",
+    "more_listed",
+    "play_arms",
+    "play_climb",
+    "played",
+    "show_frame",
+    "show_position",
+    "show_results",
+    "show_step",
+]
 
 
-@dataclass(frozen=True, eq=False)
-class Leafing(Facts):
-    """Facts, and how the plans among them are leafed through."""
+def show_results(state: State, results: PlanResults) -> State:
+    """Take what a planner found, and show the first task of its first plan."""
+    return show_step(replace(state, plan_results=results, step=None, pick=None), 0)
 
-    def booked(self, ticket: int, plan_results: PlanResults) -> Self:
-        """Take what a planner found and show its first task, unless nobody waits for it any more."""
-        if self.busy is None or self.busy.ticket != ticket:
-            return self
-        return replace(
-            self, plan_results=plan_results, busy=None, problem="", step=None, pick=None
-        ).show_step(0)
 
-    def listed(self, ticket: int, plans: tuple[PlanResult, ...], more: bool) -> Self:
-        """Take further plans of the list and show the first of them."""
-        if self.busy is None or self.busy.ticket != ticket:
-            return self
-        state = replace(
-            self, plan_results=self.plan_results.extended(plans, more=more), busy=None, problem=""
-        )
-        return state.choose_plan(len(self.plan_results.plans)) if plans else state
+def more_listed(state: State, plans: tuple[PlanResult, ...], more: bool) -> State:
+    """Take further plans of the list, and show the first of them."""
+    after = replace(state, plan_results=state.plan_results.extended(plans, more=more))
+    return choose_plan(after, len(state.plan_results.plans)) if plans else after
 
-    def turn_book(self, change: Callable[[PlanResults], PlanResults]) -> Self:
-        """Change what is shown of the plans, if that is all that changes."""
-        plan_results = change(self.plan_results)
-        return self if plan_results is self.plan_results else replace(self, plan_results=plan_results)
 
-    def choose_plan(self, page: int) -> Self:
-        """Show another plan of the list, at the same task."""
-        step = self.step or 0
-        return replace(self, plan_results=self.plan_results.turned_to(page)).show_step(step)
+def change_plan_results(state: State, change: Callable[[PlanResults], PlanResults]) -> State:
+    """Change what is chosen or shown of plans, if that is all that changes."""
+    results = change(state.plan_results)
+    return state if results is state.plan_results else replace(state, plan_results=results)
 
-    def show_step(self, step: int) -> Self:
-        """Show a task of the plan: the object turned by δᵢ and the grasp on its map."""
-        return self.show_position(step)
 
-    def show_position(self, position: float) -> Self:
-        """Show the plan at a position of the play: the task nearest to it, the arms maybe between two."""
-        if self.plan is None:
-            return self
-        plan_results = self.plan_results.at(position)
-        step = plan_results.nearest
-        task = self.plan.plan.tasks[step]
-        hold = next((h for h in task.holds if h.arm == self.arm), task.holds[0])
-        pick = Pick(hold.grasp.h, hold.grasp.theta, 0 if np.cos(hold.grasp.roll) > 0 else 1)
-        return replace(
-            self,
-            plan_results=plan_results,
-            step=step,
-            task=task.name,
-            arm=hold.arm,
-            delta=task.delta,
-            pick=pick,
-            map_view=self.map_view.another_cell(),
-            result=self.plan.maps[task.name, hold.arm],
-            problem="",
-        )
+def choose_plan(state: State, index: int) -> State:
+    """Show another plan of the list, at the same task."""
+    step = state.step or 0
+    return show_step(replace(state, plan_results=state.plan_results.at_plan(index)), step)
 
-    def show_frame(self, frame: int) -> Self:
-        """Show a step of the hill climbing: the hands on the maps as they were computed."""
-        climb = self.plan_results.climb
-        if climb is None:
-            return self
-        arm = self.arm if self.arm in climb.arms else climb.arms[0]
-        return replace(
-            self,
-            plan_results=self.plan_results.at_frame(frame),
-            step=None,
-            task=climb.task,
-            arm=arm,
-            delta=0.0,
-            pick=None,
-            result=self.plan_results.maps[climb.task, arm],
-            problem="",
-        )
 
-    def play_arms(self) -> Self:
-        """Start or stop the play of the plan."""
-        return replace(self, plan_results=self.plan_results.play_arms())._followed()
+def show_step(state: State, step: int) -> State:
+    """Show a task of the plan: the object turned by δᵢ and the grasp on its map."""
+    return show_position(state, step)
 
-    def play_climb(self) -> Self:
-        """Start or stop the replay of the hill climbing."""
-        return replace(self, plan_results=self.plan_results.play_climb())._followed()
 
-    def played(self, seconds: float) -> Self:
-        """Let what is played go on; it stops where the person has moved on to something else."""
-        moving = self.plan_results.moving
-        if not moving:
-            return self
-        if (self.step if moving == "arms" else self.climbed) is None:
-            return self.turn_book(PlanResults.still)
-        return replace(self, plan_results=self.plan_results.advanced(seconds))._followed()
+def show_position(state: State, position: float) -> State:
+    """Show the plan at a position of the playback: the task nearest to it, the arms maybe between two."""
+    if state.plan is None:
+        return state
+    results = state.plan_results.at_position(position)
+    step = results.nearest
+    task = state.plan.plan.tasks[step]
+    hold = next((h for h in task.holds if h.arm == state.arm), task.holds[0])
+    pick = Pick(hold.grasp.h, hold.grasp.theta, 0 if np.cos(hold.grasp.roll) > 0 else 1)
+    return replace(
+        state,
+        plan_results=results,
+        step=step,
+        task=task.name,
+        arm=hold.arm,
+        delta=task.delta,
+        pick=pick,
+        map_view=state.map_view.for_another_cell(),
+        result=results.maps[task.name, hold.arm],
+        problem="",
+    )
 
-    def _followed(self) -> Self:
-        """Show what the book is open at."""
-        if self.plan_results.moving == "climb" or self.plan_results.frame is not None:
-            return self.show_frame(self.plan_results.frame or 0)
-        return self.show_position(self.plan_results.position)
+
+def show_frame(state: State, frame: int) -> State:
+    """Show a step of the hill climbing: the hands on the maps as they were computed."""
+    climb = state.plan_results.climb
+    if climb is None:
+        return state
+    arm = state.arm if state.arm in climb.arms else climb.arms[0]
+    return replace(
+        state,
+        plan_results=state.plan_results.at_frame(frame),
+        step=None,
+        task=climb.task,
+        arm=arm,
+        delta=0.0,
+        pick=None,
+        result=state.plan_results.maps[climb.task, arm],
+        problem="",
+    )
+
+
+def play_arms(state: State) -> State:
+    """Start or stop playing the plan."""
+    return _shown(replace(state, plan_results=state.plan_results.play_arms()))
+
+
+def play_climb(state: State) -> State:
+    """Start or stop the replay of the hill climbing."""
+    return _shown(replace(state, plan_results=state.plan_results.play_climb()))
+
+
+def played(state: State, seconds: float) -> State:
+    """Let what is played go on; it stops where the person has moved on to something else."""
+    playing = state.plan_results.playing
+    if not playing:
+        return state
+    if (state.step if playing == "arms" else state.climb_step) is None:
+        return change_plan_results(state, PlanResults.paused)
+    return _shown(replace(state, plan_results=state.plan_results.advanced(seconds)))
+
+
+def _shown(state: State) -> State:
+    """Show the step of the climb or the position of the playback that the plan results are at."""
+    results = state.plan_results
+    if results.playing == "climb" or results.frame is not None:
+        return show_frame(state, results.frame or 0)
+    return show_position(state, results.position)

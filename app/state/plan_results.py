@@ -1,4 +1,4 @@
-"""What the planners found, as one browser leafs through it: plans, why there are none, climbs, the play."""
+"""What the planners found, and which part of it one browser shows: plan, task, step of a climb, playback."""
 
 from __future__ import annotations
 
@@ -8,16 +8,24 @@ from typing import Literal
 
 import numpy as np
 
-from app.state.requests import MapResult
+from app.state.requests import Maps
 from symgrasp.plan.plan import Plan
 from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.planners.conflicts import Conflict
 
-__all__ = ["FIRST_SEED", "ClimbReplay", "Kind", "PlanFileReport", "PlanResult", "PlanResults", "Refusal"]
+__all__ = [
+    "FIRST_SEED",
+    "ClimbReplay",
+    "PlanFileReport",
+    "PlanKind",
+    "PlanResult",
+    "PlanResults",
+    "Refusal",
+]
 
-Kind = Literal["sequential", "bimanual", "handover"]
+PlanKind = Literal["sequential", "bimanual", "handover"]
 
-Moving = Literal["", "arms", "climb"]
+Playing = Literal["", "arms", "climb"]
 """What is being played."""
 
 FIRST_SEED = 39
@@ -34,6 +42,22 @@ STEPS_A_SECOND = 10.0
 
 LONGEST_REPLAY = 12.0
 """How long (s) the replay of a long climb takes: it then skips steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """A plan and what is needed to show it, besides the maps it was made from.
+
+    Attributes:
+        plan: the plan.
+        prints: for every task of the plan, in order, arm → the cells (H, A) under its hand.
+        gaps: for every task of the plan the smallest gap (m) between two prints, negative where they
+            overlap, None where one hand holds alone.
+    """
+
+    plan: Plan
+    prints: tuple[Mapping[str, np.ndarray], ...]
+    gaps: tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
@@ -77,7 +101,7 @@ class ClimbReplay:
 
 @dataclass(frozen=True)
 class PlanFileReport:
-    """What was found out about a plan that came from a file.
+    """The result of verifying a plan from a file.
 
     Attributes:
         name: of the file.
@@ -98,33 +122,33 @@ class PlanResults:
         sequence_method, hands_method: the methods chosen.
         seed: of hill climbing.
         plans: the plans listed so far, best first.
-        page: which of them is shown.
+        index: of the one that is shown.
         more: whether the list may go on.
         kind: which planner was run last.
-        maps: (task, arm) → the maps it used, also where it found nothing.
+        maps: (task, arm) → the maps it used, at δ = 0, also where it found nothing.
         refusal: why it found nothing.
         climb: the climbing, if the plan came from it.
         frame: which of its steps is shown.
         slide: how far the maps are slid over each other: 0 as computed, 1 by each task's δ.
-        position: where the play is: k at task k, and between.
-        moving: what is being played.
-        opened: what is known about the file that was opened last.
+        position: where the playback is: k at task k, and between.
+        playing: what is being played.
+        opened: the report on the file that was opened last.
     """
 
     sequence_method: str = "best"
     hands_method: str = "exact"
     seed: int = FIRST_SEED
     plans: tuple[PlanResult, ...] = ()
-    page: int = 0
+    index: int = 0
     more: bool = False
-    kind: Kind | None = None
-    maps: Mapping[tuple[str, str], MapResult] = field(default_factory=dict)
+    kind: PlanKind | None = None
+    maps: Maps = field(default_factory=dict)
     refusal: Refusal | None = None
     climb: ClimbReplay | None = None
     frame: int | None = None
     slide: float = 1.0
     position: float = 0.0
-    moving: Moving = ""
+    playing: Playing = ""
     opened: PlanFileReport | None = None
 
     # -- what follows from it ---------------------------------------------------------------
@@ -132,7 +156,7 @@ class PlanResults:
     @property
     def plan(self) -> PlanResult | None:
         """The plan that is shown."""
-        return self.plans[self.page] if self.plans else None
+        return self.plans[self.index] if self.plans else None
 
     @property
     def last(self) -> int:
@@ -141,27 +165,27 @@ class PlanResults:
 
     @property
     def nearest(self) -> int:
-        """The task that the play is nearest to."""
+        """Index of the task that the playback is nearest to."""
         return int(np.clip(np.floor(self.position + 0.5), 0, self.last))
 
     @property
-    def leg(self) -> tuple[int, float]:
-        """The task that the play comes from, and the share of the way to the next one, eased at both ends."""
+    def transition(self) -> tuple[int, float]:
+        """The task that the playback comes from, and the share of the way to the next, eased at both ends."""
         start = min(int(self.position), max(self.last - 1, 0))
         share = self.position - start
         return start, share * share * (3 - 2 * share)
 
     @property
     def is_between(self) -> bool:
-        """Whether the play is between two tasks."""
+        """Whether the playback is between two tasks."""
         return self.position != self.nearest
 
     @property
-    def inputs(self) -> tuple[object, ...]:
-        """What widgets show and can change."""
+    def input_values(self) -> tuple[object, ...]:
+        """Everything that widgets show and can change."""
         return (
-            self.sequence_method, self.hands_method, self.seed, self.page, self.plans, self.frame, self.slide,
-            self.position, self.climb,
+            self.sequence_method, self.hands_method, self.seed, self.index, self.plans, self.frame,
+            self.slide, self.position, self.climb,
         )  # fmt: skip
 
     # -- changes ----------------------------------------------------------------------------
@@ -171,37 +195,34 @@ class PlanResults:
         return PlanResults(self.sequence_method, self.hands_method, self.seed, slide=self.slide)
 
     def found(
-        self, kind: Kind, plans: tuple[PlanResult, ...], *, more: bool, climb: ClimbReplay | None = None
-    ) -> PlanResults:
-        """Take the first plans of a list, one at least."""
-        return replace(
-            self.cleared(), kind=kind, plans=plans, more=more, climb=climb, maps=plans[0].maps, slide=1.0
-        )
-
-    def refused(
         self,
-        kind: Kind,
-        refusal: Refusal,
-        maps: Mapping[tuple[str, str], MapResult],
+        kind: PlanKind,
+        plans: tuple[PlanResult, ...],
+        maps: Maps,
+        *,
+        more: bool,
         climb: ClimbReplay | None = None,
     ) -> PlanResults:
+        """Take the first plans of a list, one at least."""
+        return replace(self.cleared(), kind=kind, plans=plans, maps=maps, more=more, climb=climb, slide=1.0)
+
+    def refused(
+        self, kind: PlanKind, refusal: Refusal, maps: Maps, climb: ClimbReplay | None = None
+    ) -> PlanResults:
         """Take that there is no plan."""
-        plan_results = replace(self.cleared(), kind=kind, refusal=refusal, maps=maps, climb=climb)
-        return replace(plan_results, frame=len(climb.steps) - 1) if climb else plan_results
+        results = replace(self.cleared(), kind=kind, refusal=refusal, maps=maps, climb=climb)
+        return replace(results, frame=len(climb.steps) - 1) if climb else results
 
     def extended(self, plans: tuple[PlanResult, ...], *, more: bool) -> PlanResults:
         """Take further plans of the list."""
         return replace(self, plans=(*self.plans, *plans), more=more)
 
-    def turned_to(self, page: int) -> PlanResults:
+    def at_plan(self, index: int) -> PlanResults:
         """Show another plan of the list."""
-        if not self.plans:
-            return self
-        page = int(np.clip(page, 0, len(self.plans) - 1))
-        return replace(self, page=page, maps=self.plans[page].maps)
+        return replace(self, index=int(np.clip(index, 0, len(self.plans) - 1))) if self.plans else self
 
-    def at(self, position: float) -> PlanResults:
-        """Move the play to a position."""
+    def at_position(self, position: float) -> PlanResults:
+        """Move the playback to a position."""
         position = float(np.clip(position, 0.0, self.last)) if np.isfinite(position) else self.position
         return replace(self, position=position, frame=None)
 
@@ -212,48 +233,30 @@ class PlanResults:
         return replace(self, frame=int(np.clip(frame, 0, len(self.climb.steps) - 1)))
 
     def play_arms(self) -> PlanResults:
-        """Start or stop the play; from the end it starts anew."""
-        if self.moving == "arms" or not self.last:
-            return self.still()
+        """Start or stop playing the plan; from the end it starts anew."""
+        if self.playing == "arms" or not self.last:
+            return self.paused()
         position = 0.0 if self.position >= self.last else self.position
-        return replace(self, moving="arms", position=position, frame=None)
+        return replace(self, playing="arms", position=position, frame=None)
 
     def play_climb(self) -> PlanResults:
         """Start or stop the replay of the climb; from the end it starts anew."""
-        if self.moving == "climb" or self.climb is None:
-            return self.still()
+        if self.playing == "climb" or self.climb is None:
+            return self.paused()
         over = self.frame is None or self.frame >= len(self.climb.steps) - 1
-        return replace(self, moving="climb", frame=0 if over else self.frame)
+        return replace(self, playing="climb", frame=0 if over else self.frame)
 
-    def still(self) -> PlanResults:
+    def paused(self) -> PlanResults:
         """Play nothing."""
-        return replace(self, moving="") if self.moving else self
+        return replace(self, playing="") if self.playing else self
 
     def advanced(self, seconds: float) -> PlanResults:
-        """Let the play go on; at the end it stops."""
-        if self.moving == "arms":
-            plan_results = self.at(self.position + seconds / SECONDS_A_TASK)
-            return plan_results if plan_results.position < plan_results.last else plan_results.still()
-        if self.moving == "climb" and self.climb is not None:
+        """Let the playback go on; at the end it stops."""
+        if self.playing == "arms":
+            results = self.at_position(self.position + seconds / SECONDS_A_TASK)
+            return results if results.position < results.last else results.paused()
+        if self.playing == "climb" and self.climb is not None:
             steps = max(1, round(seconds * self.climb.speed))
-            plan_results = self.at_frame((self.frame or 0) + steps)
-            return plan_results if plan_results.frame != len(self.climb.steps) - 1 else plan_results.still()
+            results = self.at_frame((self.frame or 0) + steps)
+            return results if results.frame != len(self.climb.steps) - 1 else results.paused()
         return self
-
-
-@dataclass(frozen=True, eq=False)
-class PlanResult:
-    """A plan and what is needed to show it.
-
-    Attributes:
-        plan: the plan.
-        maps: for every (task, arm) the map it was made from, at δ = 0.
-        prints: for every task of the plan, in order, arm → the cells (H, A) under its hand.
-        gaps: for every task of the plan the smallest gap (m) between two prints, negative where they
-            overlap, None where one hand holds alone.
-    """
-
-    plan: Plan
-    maps: Mapping[tuple[str, str], MapResult]
-    prints: tuple[Mapping[str, np.ndarray], ...]
-    gaps: tuple[float | None, ...]

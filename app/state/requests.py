@@ -1,4 +1,4 @@
-"""What the page asks its worker for by itself, and what the worker is busy with."""
+"""What the page computes unasked, the results of that, and the computation under way."""
 
 from __future__ import annotations
 
@@ -19,15 +19,20 @@ __all__ = [
     "Comparison",
     "ExplainRequest",
     "ExplainResult",
+    "MapKey",
     "MapRequest",
     "MapResult",
+    "Maps",
     "Request",
 ]
+
+MapKey = tuple[str, str, bytes]
+"""Content of all that a map depends on: hash of the scene, name of the arm, the object's pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class MapRequest:
-    """What a map is computed for; equal requests have equal maps, whatever other tasks the scene has.
+    """Compute a map; equal requests have equal maps, whatever other tasks the scene has.
 
     Attributes:
         scene: the scene as loaded.
@@ -40,60 +45,57 @@ class MapRequest:
     task: str
     pose: ObjectPose | None = None
 
-    @property
+    @cached_property
     def T_world_object(self) -> Array:
         """The base pose (4, 4)."""
         return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
 
     @cached_property
-    def place(self) -> tuple[object, ...]:
-        """All that the map depends on, so neither the task's name nor the scene's other tasks."""
-        return (*self._stage, self.T_world_object.tobytes())
-
-    @cached_property
-    def _stage(self) -> tuple[object, ...]:
-        scene = self.scene
-        shared = (scene.robots, scene.obstacles, scene.profile, scene.settings)
-        return (*map(id, shared), self.arm)  # the scene keeps them alive
+    def key(self) -> MapKey:
+        """All that the map depends on: neither the task's name nor the scene's other tasks."""
+        return self.scene.map_sha256, self.arm, self.T_world_object.tobytes()
 
     def __eq__(self, other: object) -> bool:
-        """Whether the map and its name are the same."""
-        return isinstance(other, MapRequest) and (self.task, self.place) == (other.task, other.place)
+        """Whether the map and its task are the same."""
+        return isinstance(other, MapRequest) and (self.task, self.key) == (other.task, other.key)
 
     def __hash__(self) -> int:
         """Return a number that equal requests share."""
-        return hash((self.task, self.place))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Leave out what was derived: it means nothing in another process."""
-        return MapRequest, (self.scene, self.arm, self.task, self.pose)
+        return hash((self.task, self.key))
 
     def differs_in_pose(self, other: object) -> bool:
-        """Whether the other one is for the same map, but for the object's pose."""
-        return isinstance(other, MapRequest) and (self.task, self._stage) == (other.task, other._stage)
+        """Return whether the other one is for the same map, but for the object's pose."""
+        return isinstance(other, MapRequest) and (self.task, *self.key[:2]) == (other.task, *other.key[:2])
 
     def moved_task(self) -> Task:
-        """Return the task, moved there."""
+        """Return the task, moved to the pose."""
         return Task(self.task, self.scene.task(self.task).arms, self.T_world_object)
 
     def moved_scene(self) -> Scene:
-        """Return the scene with the task moved there."""
+        """Return the scene with the task moved to the pose."""
         return moved(self.scene, {self.task: self.pose} if self.pose else {})
 
 
 @dataclass(frozen=True, eq=False)
 class MapResult:
-    """A computed map, and what the object is inside of at that pose (one phrase each)."""
+    """A computed map, and the obstacles that the object is inside of at that pose (one phrase each)."""
 
     request: MapRequest
     map: FeasibilityMap
     contacts: tuple[str, ...] = ()
 
-    def of(self, request: MapRequest) -> MapResult:
-        """Return it as the answer to a request for the same place, maybe under another task's name."""
-        if request == self.request:
+    def renamed(self, request: MapRequest) -> MapResult:
+        """Return it as the answer to a request with the same key, with the names of its scene and task."""
+        if request is self.request:
             return self
-        return MapResult(request, replace(self.map, task=request.task), self.contacts)
+        names = (request.scene.name, request.task)
+        same = names == (self.map.scene, self.map.task)
+        named = self.map if same else replace(self.map, scene=names[0], task=names[1])
+        return MapResult(request, named, self.contacts)
+
+
+Maps = dict[tuple[str, str], MapResult]
+"""(task, arm) → its map."""
 
 
 @dataclass(frozen=True)
@@ -109,13 +111,13 @@ class CompareRequest:
     delta: float
 
     def differs_in_pose(self, other: object) -> bool:
-        """Whether the other one only turns the object further."""
+        """Return whether the other one only turns the object further."""
         return isinstance(other, CompareRequest) and self.map == other.map
 
 
 @dataclass(frozen=True)
 class ExplainRequest:
-    """Judge every candidate of a cell.
+    """Compute the result of every candidate of a cell.
 
     Attributes:
         map: the map.
@@ -126,7 +128,7 @@ class ExplainRequest:
     cell: Cell
 
     def differs_in_pose(self, other: object) -> bool:
-        """Never: what becomes of another cell is of no use."""
+        """Return False: the candidates of another cell are of no use."""
         return False
 
 
@@ -145,7 +147,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class ExplainResult:
-    """What becomes of the candidates of a cell."""
+    """The results of the candidates of a cell."""
 
     request: ExplainRequest
     explanation: Explanation
@@ -156,7 +158,7 @@ class Busy:
     """A computation under way.
 
     Attributes:
-        ticket: number of the computation; the last words of an earlier one do not count.
+        job_id: number of its job; the last messages of an earlier one do not count.
         label: what is computed.
         request: what it answers, None for what a person asked for.
         share: how much of it is done.
@@ -164,15 +166,15 @@ class Busy:
         compiling: whether code that it needs had to be compiled, which may happen in several pieces.
     """
 
-    ticket: int
+    job_id: int
     label: str
     request: Request | None = None
     share: float = 0.0
     late: bool = False
     compiling: bool = False
 
-    def goes_first(self, request: Request) -> bool:
-        """Whether a request waits for this computation instead of taking its place.
+    def goes_before(self, request: Request) -> bool:
+        """Return whether a request waits for this computation instead of taking its place.
 
         A quick map is finished even if the object has moved on meanwhile. If every movement
         interrupted it, none would arrive until the drag ends.

@@ -1,39 +1,94 @@
-"""Every change to what one browser shows: no widgets, no threads, no I/O."""
+"""What one browser shows, as one immutable value, and what follows from it.
+
+The object stands at ``T_world_object = base · Rz(delta)``: the base pose is what a map is computed for,
+and δ, the turn about the object's own axis, only shifts that map (equation 3). The changes are functions
+from state to state, in `app.state.changes`, `app.state.job_changes`, `app.state.plan_changes` and
+`app.state.undo`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 
-import numpy as np
-
-from app.state.facts import Pick
-from app.state.map_view_state import RollChoice
-from app.state.object_choice import ObjectChoice
-from app.state.object_pose import ObjectPose
-from app.state.page_link import Camera, MadeLink
-from app.state.plan_changes import Leafing
-from app.state.plan_results import PlanFileReport, PlanResult, PlanResults
-from app.state.requests import Busy, Comparison, ExplainResult, MapResult, Request
-from app.state.task_list import TaskList
+from app.state.display import Display
+from app.state.history import History
+from app.state.map_view_state import MapViewState
+from app.state.object_choice import OWN, ObjectChoice
+from app.state.object_pose import ObjectPose, moved
+from app.state.page_link import PageLink
+from app.state.plan_results import PlanKind, PlanResult, PlanResults
+from app.state.requests import Busy, ExplainRequest, MapRequest, MapResult, Request
 from app.state.uploaded_scene import UploadedScene
-from symgrasp.errors import InputError, one_of
-from symgrasp.object.manifold import wrap
-from symgrasp.poses import Array
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.explain import CandidateResult, Explanation
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.plan.plan import PlanTask
+from symgrasp.planners.bimanual import ClimbStep
+from symgrasp.poses import Array, rotation_z
 from symgrasp.scene.scene import Scene
 
 __all__ = ["Pick", "State"]
 
-GIZMO_NOISE = 1e-6
-"""Change of position (m) or axis below which the gizmo only turned: browsers send rounded numbers."""
 
-CAMERA_NOISE = 1e-3
-"""How much (m) the camera may move before a link made of it is an earlier one: what links are rounded to."""
+@dataclass(frozen=True)
+class Pick:
+    """A grasp that was picked, in the object's frame: h (m), θ (rad), and the roll unless open."""
+
+    h: float
+    theta: float
+    roll: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class State(Leafing):
-    """One browser's scene, pose, map, pick and plan; a change returns a new one."""
+class State:
+    """One browser's scene, object pose, map, pick and plan.
+
+    Attributes:
+        scene: the scene as loaded, with the object that was put into it.
+        scene_name: what it was chosen by.
+        task, arm: the names chosen.
+        object_choice: the object that was put into the scene in place of its own.
+        uploaded_object: the object that was uploaded last.
+        uploaded_scene: the scene that was uploaded last.
+        poses: task → base pose, of the tasks that were moved.
+        pose_when_chosen: that of the chosen task when it was chosen; None where it had not been moved.
+        delta: turn (rad) of the object about its axis.
+        result: the newest map, maybe of an earlier request.
+        pick: the grasp picked.
+        map_view: how the map is looked at, and what was computed for that.
+        plan_results: what the planners found, and which part of it is shown.
+        step: index of the plan's task that is shown; None once the person has moved on.
+        busy: the computation under way.
+        refused: the request that was cancelled or failed: not computed again unasked.
+        problem: one line about what went wrong last.
+        display: switches of the page.
+        link: the link that was made last.
+        history: what can be undone and redone.
+    """
+
+    scene: Scene
+    scene_name: str
+    task: str
+    arm: str
+    object_choice: ObjectChoice | None = None
+    uploaded_object: ObjectChoice | None = None
+    uploaded_scene: UploadedScene | None = None
+    poses: Mapping[str, ObjectPose] = field(default_factory=dict)
+    pose_when_chosen: ObjectPose | None = None
+    delta: float = 0.0
+    result: MapResult | None = None
+    pick: Pick | None = None
+    map_view: MapViewState = field(default_factory=MapViewState)
+    plan_results: PlanResults = field(default_factory=PlanResults)
+    step: int | None = None
+    busy: Busy | None = None
+    refused: Request | None = None
+    problem: str = ""
+    display: Display = field(default_factory=Display)
+    link: PageLink | None = None
+    history: History[State] = field(default_factory=History)
 
     @staticmethod
     def of(scene: Scene, name: str) -> State:
@@ -41,226 +96,193 @@ class State(Leafing):
         task = scene.task()
         return State(scene, name, task.name, task.arms[0])
 
-    def open_scene(self, scene: Scene, name: str) -> State:
-        """Show another scene; what belongs to none stays."""
-        return replace(
-            State.of(scene, name),
-            uploaded=self.uploaded,
-            loaded=self.loaded,
-            map_view=self.map_view.elsewhere(),
-            flat_map=self.flat_map,
-            dark=self.dark,
-            history=self.history,
-        )
+    @property
+    def input_values(self) -> tuple[object, ...]:
+        """Everything that a widget or the gizmo shows and can change."""
+        return (
+            self.scene, self.scene_name, self.task, self.arm, self.base, self.delta, self.pick, self.step,
+            self.display, self.object_choice, self.uploaded_object, self.uploaded_scene,
+            *self.map_view.input_values,
+            *self.plan_results.input_values,
+        )  # fmt: skip
 
-    def load_scene(self, loaded: UploadedScene) -> State:
-        """Show a scene that was uploaded."""
-        return replace(self, loaded=loaded).open_scene(loaded.scene, loaded.choice)
+    @property
+    def link_values(self) -> tuple[object, ...]:
+        """Everything that a link contains, but for the camera."""
+        return (
+            self.scene, self.scene_name, self.object_choice, self.task, self.arm, self.poses, self.delta,
+            self.map_view.roll, self.pick, self.map_view.color_by, self.display,
+        )  # fmt: skip
 
-    def choose_object(self, scene: Scene, object_choice: ObjectChoice | None) -> State:
-        """Show the scene with another object in it, or with its own again (None)."""
-        uploaded = object_choice if object_choice and object_choice.measurement else self.uploaded
-        state = replace(self._without_plan(), busy=None, result=None, pick=None)
-        return replace(state, scene=scene, object_choice=object_choice, uploaded=uploaded, errors=False)
+    # -- scene and object -------------------------------------------------------------------
 
-    def choose_task(self, name: str) -> State:
-        """Show another task, with its first arm unless the chosen one takes part."""
-        task = self.scene.task(name)
-        if name == self.task:
-            return self
-        arm = self.arm if self.arm in task.arms else task.arms[0]
-        before = self.poses.get(name)
-        return replace(self, task=name, arm=arm, before=before, delta=0.0, step=None, problem="")
+    @property
+    def object_option(self) -> str:
+        """The option that the object was chosen by."""
+        return self.object_choice.option if self.object_choice else OWN
 
-    def choose_arm(self, name: str) -> State:
-        """Show the map of another arm of the task; of a plan that is shown, that arm's grasp."""
-        arms = self.scene.task(self.task).arms
-        if name not in arms:
-            raise InputError("page", "arm", name, one_of(arms, name))
-        state = replace(self, arm=name, problem="")
-        in_plan = self.shown and any(hold.arm == name for hold in self.shown.holds)
-        return state.show_step(self.step or 0) if in_plan else replace(state, step=None)
+    @property
+    def shown_upload(self) -> Scene | None:
+        """The uploaded scene, if that is the one shown, whatever object was put into it."""
+        uploaded = self.uploaded_scene
+        return uploaded.scene if uploaded and uploaded.option == self.scene_name else None
 
-    def choose_roll(self, roll: RollChoice) -> State:
-        """Show other rolls; a pick keeps its place and takes the roll shown."""
-        pick = replace(self.pick, roll=None) if self.pick else None
-        return replace(self, roll=roll, pick=pick, map_view=self.map_view.another_cell())
+    @cached_property
+    def base(self) -> ObjectPose:
+        """The object's base pose."""
+        return self.request.pose or ObjectPose.of(self.request.T_world_object)
 
-    def turn(self, delta: float) -> State:
-        """Turn the object to δ (rad) about its axis: nothing is recomputed."""
-        return replace(self, delta=float(_finite("rotation", delta)), step=None, problem="")
+    @cached_property
+    def T_world_object(self) -> Array:
+        """Where the object stands (4, 4)."""
+        return self.request.T_world_object @ rotation_z(self.delta)
 
-    def move(self, **changes: float) -> State:
-        """Move the object: fields of `ObjectPose`, in m and rad. A plan for other poses is dropped."""
-        for name, value in changes.items():
-            _finite(name, value)
-        pose = replace(self.base, **changes)
-        if pose == self.base:
-            return self
-        return replace(self._without_plan(), poses={**self.poses, self.task: pose})
+    def moved_scene(self) -> Scene:
+        """Return the scene with all tasks where they were moved to."""
+        return moved(self.scene, self.poses)
 
-    def drag(self, pose: Array) -> State:
-        """Take over the pose (4, 4) of the gizmo; a turn about the axis alone becomes δ."""
-        new = ObjectPose.of(pose)
-        delta = float(wrap(new.spin - self.base.spin))
-        shift = np.linalg.norm(pose[:3, 3] - self.T_world_object[:3, 3])
-        tilt = np.linalg.norm(pose[:3, 2] - self.T_world_object[:3, 2])
-        if max(shift, tilt) < GIZMO_NOISE:
-            return self.turn(delta)
-        state = self.move(x=new.x, y=new.y, z=new.z, lean=new.lean, towards=new.towards)
-        return replace(state, delta=delta)
+    # -- what is computed -------------------------------------------------------------------
 
-    def reset_pose(self) -> State:
-        """Put the object of this task back where the scene has it."""
-        poses = {name: pose for name, pose in self.poses.items() if name != self.task}
-        state = self if len(poses) == len(self.poses) else self._without_plan()
-        return replace(state, poses=poses, delta=0.0, step=None, problem="")
+    @cached_property
+    def request(self) -> MapRequest:
+        """The map that belongs to the task, arm and base pose."""
+        return MapRequest(self.scene, self.arm, self.task, self.poses.get(self.task))
 
-    def _without_plan(self) -> State:
-        """Drop the plan, also one that is being made."""
-        busy = self.busy if self.busy and self.busy.request else None
-        return replace(
-            self, plan_results=self.plan_results.cleared(), step=None, busy=busy, refused=None, problem=""
-        )
+    @property
+    def is_current(self) -> bool:
+        """Whether the map shown is the one for the object's pose."""
+        return self.result is not None and self.result.request == self.request
 
-    def choose(self, h: float, theta: float) -> State:
-        """Pick the grasp at height h (m) and angle θ (rad) in the object's frame."""
-        profile = self.scene.profile
-        if not profile.h_min <= _finite("h", h) <= profile.h_max:
-            expected = f"{100 * profile.h_min:g} to {100 * profile.h_max:g} cm"
-            raise InputError("grasp", "h (cm)", round(100 * h, 3), expected)
-        theta = float(wrap(_finite("θ", theta)))
-        map_view = self.map_view.another_cell()
-        return replace(self, pick=Pick(float(h), theta), map_view=map_view, step=None, problem="")
+    @property
+    def missing_request(self) -> Request | None:
+        """The first request whose result is missing."""
+        if not self.is_current:
+            return self.request
+        return self.map_view.missing_request(self.request, self.delta, self.base_cell)
 
-    def choose_candidate(self, candidate: int) -> State:
-        """Show a candidate of the picked cell, by its index; the best is the first."""
-        return replace(self, map_view=self.map_view.choose_candidate(candidate), step=None)
+    @property
+    def pending_request(self) -> Request | None:
+        """The same, unless it was cancelled or failed: then nothing is computed unasked."""
+        return None if self.missing_request == self.refused else self.missing_request
 
-    def choose_cell(self, row: int, column: int) -> State:
-        """Pick the centre of a cell of the map as it is shown."""
-        if self.map is None:
-            return self
-        manifold = self.map.manifold
-        return self.choose(float(manifold.h[row]), float(manifold.theta[column]))
+    @property
+    def next_request(self) -> Request | None:
+        """The request to begin now; None while another computation goes first, such as a planner."""
+        pending = self.pending_request
+        return None if pending is None or (self.busy and self.busy.goes_before(pending)) else pending
 
-    def choose_surface_cell(self, row: int, column: int) -> State:
-        """Pick a cell as it lies on the object's surface, whose colours do not turn with the object."""
-        if self.result is None:
-            return self
-        _, turned = self.result.map.manifold.shift(self.delta)
-        return self.choose_cell(row, (column - turned) % self.result.map.manifold.angles)
+    @property
+    def is_obsolete(self) -> bool:
+        """Whether a request is being computed whose result is no longer needed."""
+        return bool(self.busy and self.busy.request) and self.pending_request is None
 
-    def clear_pick(self) -> State:
-        """Let go: the arms park."""
-        return replace(self, pick=None, map_view=self.map_view.another_cell(), step=None)
+    @property
+    def is_stopped(self) -> bool:
+        """Whether a result is missing that is not computed unless it is asked for again."""
+        return self.busy is None and self.missing_request is not None
 
-    def started(self, ticket: int, label: str, request: Request | None = None) -> State:
-        """A computation began; it replaces the one before."""
-        problem = self.problem if request else ""
-        return replace(self, busy=Busy(ticket, label, request), problem=problem)
+    @property
+    def is_waiting(self) -> bool:
+        """Whether something is being computed that takes long enough to say so."""
+        return self.busy is not None and (self.busy.request is None or self.busy.late or self.result is None)
 
-    def progressed(self, ticket: int, share: float, late: bool = False) -> State:
-        """The computation is this far, and so late by now that the page says so."""
-        busy = self.busy
-        if busy is None or busy.ticket != ticket:
-            return self
-        late = late or busy.late
-        if (share, late) == (busy.share, busy.late):
-            return self
-        return replace(self, busy=replace(busy, share=share, late=late))
+    @property
+    def is_fresh(self) -> bool:
+        """Whether the map shown is the one for the object's pose, or will be in a moment."""
+        if self.is_current:
+            return True
+        follows = self.result is not None and self.result.request.differs_in_pose(self.request)
+        return follows and self.busy is not None and not self.is_waiting
 
-    def compiles(self, ticket: int) -> State:
-        """The computation waits for code that is compiled, now and perhaps once more before it ends."""
-        return self.compiles_now() if self.busy and self.busy.ticket == ticket else self
+    # -- the map and the picked grasp -------------------------------------------------------
 
-    def compiles_now(self) -> State:
-        """What is under way waits for code that is compiled."""
-        return replace(self, busy=replace(self.busy, late=True, compiling=True)) if self.busy else self
+    @cached_property
+    def map(self) -> FeasibilityMap | None:
+        """The map over the object as it is turned; it may be of an earlier pose."""
+        return self.result.map.shift(self.delta) if self.result else None
 
-    def map_arrived(self, ticket: int, result: MapResult) -> State:
-        """Take a map: that of the object's pose, or on the way there that of an earlier one."""
-        is_awaited = self.busy is not None and self.busy.ticket == ticket
-        state = replace(self, busy=None) if is_awaited else self
-        follows = is_awaited and not self.is_current and result.request.differs_in_pose(self.request)
-        if result.request != self.request and not follows:
-            return state
-        return replace(state, result=result, refused=None)
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """The obstacles that the object is inside of, one phrase each."""
+        return self.result.contacts if self.result and self.is_current else ()
 
-    def found(self, ticket: int, found: Comparison | ExplainResult) -> State:
-        """Take what was found out about the map, unless it is about an earlier one."""
-        if self.busy is None or self.busy.ticket != ticket:
-            return self
-        map_view = self.map_view.take(found) if found.request.map == self.request else self.map_view
-        return replace(self, busy=None, map_view=map_view)
+    @cached_property
+    def cell(self) -> Cell | None:
+        """The cell of `map` that holds the pick."""
+        if self.pick is None or self.map is None:
+            return None
+        row, column = self.map.manifold.cell(self.pick.h, self.pick.theta)
+        roll = self.pick.roll
+        if roll is None:
+            roll = self.map_view.roll.roll(self.map, row, column)
+        return Cell(roll, row, column)
 
-    def stopped(self, ticket: int, problem: str = "") -> State:
-        """The computation was cancelled or failed: do not begin it again by itself."""
-        if self.busy is None or self.busy.ticket != ticket:
-            return self
-        refused = self.unmet
-        if problem and self.busy.request is None:  # it was not the map that failed
-            refused = self.refused
-        return replace(self, busy=None, refused=refused, problem=problem)
+    @cached_property
+    def base_cell(self) -> Cell | None:
+        """The same cell of the map before it is shifted: it has the same tool pose."""
+        if self.cell is None or self.result is None:
+            return None
+        grid = self.result.map.manifold
+        return self.cell.turned(grid.shift(self.delta)[1], grid.angles)
 
-    def failed(self, problem: str) -> State:
-        """Something that was asked for cannot be done; nothing else changes."""
-        return replace(self, problem=problem)
+    @property
+    def explanation(self) -> Explanation | None:
+        """The results of all candidates of the picked cell, once they are computed."""
+        found = self.map_view.explained
+        if found is None or not self.is_current or self.base_cell is None:
+            return None
+        return found.explanation if found.request == ExplainRequest(self.request, self.base_cell) else None
 
-    def retry(self) -> State:
-        """Compute the map after all."""
-        return replace(self, refused=None, problem="")
+    @property
+    def candidate(self) -> int | None:
+        """Index of the candidate shown: the one chosen, else the map's witness or what came closest."""
+        if self.explanation is None or not self.explanation.candidates:
+            return None
+        if self.map_view.candidate is not None:
+            return min(self.map_view.candidate, len(self.explanation.candidates) - 1)
+        witness = self.map.witness(self.cell) if self.map and self.cell else None
+        choices = [(candidate.sample, candidate.branch) for candidate in self.explanation.candidates]
+        shown = witness and (witness.sample, witness.branch)
+        return choices.index(shown) if shown in choices else 0
 
-    def change_tasks(self, change: Callable[[TaskList], TaskList]) -> State:
-        """Add, remove, rename or reorder tasks. A plan for the others is dropped."""
-        before = TaskList(self.scene, self.poses, self.task)
-        after = change(before)
-        if after == before:
-            return self
-        arms = after.scene.task(after.task).arms
-        stays = np.array_equal(after.T_world_object, before.T_world_object)
-        is_same = len(after.scene.tasks) == len(before.scene.tasks)
-        return replace(
-            self._without_plan(),
-            scene=after.scene,
-            poses=after.poses,
-            task=after.task,
-            arm=self.arm if self.arm in arms else arms[0],
-            before=self.before if is_same else after.poses.get(after.task),
-            delta=self.delta if stays else 0.0,
-        )
+    @property
+    def shown_candidate(self) -> CandidateResult | None:
+        """The candidate shown."""
+        if self.explanation is None or self.candidate is None:
+            return None
+        return self.explanation.candidates[self.candidate]
 
-    def add_task(self) -> State:
-        """Add a task with the object where it stands; that of the chosen task was only moved for this."""
-        pose = self.request.T_world_object
-        return self.change_tasks(lambda tasks: tasks.added(pose, self.before))
+    # -- plans ------------------------------------------------------------------------------
 
-    def linked(self, address: str, camera: Camera) -> State:
-        """Take the link that was made of it."""
-        return replace(self, link=MadeLink(address, self.told, camera), problem="")
+    @property
+    def plan(self) -> PlanResult | None:
+        """The plan that is shown, or was until the person moved on."""
+        return self.plan_results.plan
 
-    def seen_from(self, camera: Camera) -> State:
-        """Look from somewhere: a link made elsewhere is no longer that of what is shown."""
-        if self.link is None or not self.link.told:
-            return self
-        if np.allclose(camera, self.link.camera, rtol=0, atol=CAMERA_NOISE):
-            return self
-        return replace(self, link=replace(self.link, told=()))
+    @cached_property
+    def shown_task(self) -> PlanTask | None:
+        """The task of the plan that is shown."""
+        return self.plan.plan.tasks[self.step] if self.plan and self.step is not None else None
 
-    def opened(self, opened: PlanFileReport, scene: UploadedScene | None, plan: PlanResult | None) -> State:
-        """Take a plan from a file, with its scene; one that does not hold is only reported."""
-        if scene is None or plan is None:
-            return replace(
-                self, busy=None, problem="", plan_results=replace(self.plan_results, opened=opened)
-            )
-        plan_results = PlanResults(
-            self.plan_results.sequence_method, self.plan_results.hands_method, self.plan_results.seed
-        )
-        plan_results = replace(plan_results.found(plan.plan.kind, (plan,), more=False), opened=opened)
-        return replace(self.load_scene(scene), plan_results=plan_results).show_step(0)
+    @cached_property
+    def climb_step(self) -> ClimbStep | None:
+        """The step of the hill climbing that is shown, if nothing else is."""
+        climb, frame = self.plan_results.climb, self.plan_results.frame
+        if climb is None or frame is None or self.task != climb.task or self.delta or self.pick:
+            return None
+        return climb.steps[frame]
 
+    def can_plan(self, kind: PlanKind) -> bool:
+        """Return whether the scene has tasks for a planner."""
+        tasks = self.scene.tasks.values()
+        if kind == "sequential":
+            return any(task.arms == (self.arm,) for task in tasks)
+        if kind == "bimanual":
+            return any(len(task.arms) > 1 for task in tasks)
+        return len(tasks) > 1 and len({arm for task in tasks for arm in task.arms}) > 1
 
-def _finite(name: str, value: float) -> float:
-    if not np.isfinite(value):
-        raise InputError("page", name, value, "a finite number")
-    return value
+    @property
+    def bimanual_task(self) -> str:
+        """Name of the task for several arms that is planned: the chosen one, or the first."""
+        names = [task.name for task in self.scene.tasks.values() if len(task.arms) > 1]
+        return self.task if self.task in names or not names else names[0]

@@ -14,9 +14,9 @@ class UploadedScene:
     """A scene that was uploaded.
 
     Attributes:
-        choice: what the page offers it as.
+        option: its name in the menu of the page.
         scene: the scene.
     """
 
-    choice: str
+    option: str
     scene: Scene

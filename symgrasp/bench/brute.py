@@ -15,7 +15,7 @@ import pinocchio  # pyright: ignore[reportMissingImports]
 from symgrasp.ik import ClosedFormIK
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, axis_frame
-from symgrasp.robot.robot import Arm, RobotModel
+from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Obstacle
 from symgrasp.world import BulletWorld, Shape, checked_self_pairs
 
@@ -132,8 +132,8 @@ class BruteForce:
             mesh = read_mesh(o.path, f"obstacle {o.name}")
             yield np.eye(4), _triangles(mesh.vertices, mesh.faces)
         else:
-            assert o.path is not None
-            model = RobotModel(o.path)
+            model = o.model
+            assert model is not None
             links = o.T_world_obstacle @ model.forward(np.zeros(len(model.joint_names)))
             for link, shapes in world.shapes(o.name).items():
                 for shape in shapes:

@@ -202,8 +202,8 @@ def _obstacles(world: BulletWorld) -> Iterator[_Placed]:
     for o in world.scene.obstacles:
         name, pose = Name(o.name, ""), o.T_world_obstacle
         if o.kind == "urdf":
-            assert o.path is not None
-            model = RobotModel(o.path)
+            model = o.model
+            assert model is not None
             links = pose @ model.forward(np.zeros(len(model.joint_names)))
             yield from _links(world.shapes(o.name), o.name, model, links)
         elif o.kind == "mesh":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +15,7 @@ import yourdfpy
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import UrdfError, one_of
-from symgrasp.files import resolve
+from symgrasp.files import file_sha256, resolve
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, from_rotation, rotation_about
 from symgrasp.robot.assembly import Mount, assemble
@@ -57,6 +58,8 @@ class Joint:
 class RobotModel:
     """The kinematic tree of a URDF and the shapes of its links.
 
+    Models of equal content are equal, so that what is computed for one serves its copies too.
+
     Args:
         path: the URDF file.
         mounts: hands and frames that the file does not have.
@@ -68,6 +71,7 @@ class RobotModel:
     Attributes:
         path: the URDF file.
         urdf: the URDF with all that is mounted, every mesh as an absolute path.
+        sha256: SHA-256 of that URDF and of its collision meshes, as they were when it was loaded.
         name: the robot's name in it.
         link_names: all links; the first is the root.
         joints: all joints, parents before children.
@@ -89,6 +93,7 @@ class RobotModel:
         for link, shapes in self._collisions.items():
             for shape in shapes:
                 _check_shape(self.path, link, shape)
+        self.sha256 = self._content_sha256()
         self._hulls: dict[str, tuple[Array, ...]] = {}
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
         self.joints, self.link_names = self._build_tree(urdf, root)
@@ -106,6 +111,21 @@ class RobotModel:
         if path is None:
             raise UrdfError(self.path, f"link {link}", reference, "an existing mesh file")
         return path
+
+    def _content_sha256(self) -> str:
+        """Hash the URDF and the files of its collision meshes; meshes that are only seen are left out."""
+        digest = hashlib.sha256(self.urdf)
+        for link, shapes in self._collisions.items():
+            for mesh in (shape.geometry.mesh for shape in shapes if shape.geometry):
+                if mesh is not None:
+                    digest.update(self._file_sha256(self.mesh_path(mesh.filename, link)))
+        return digest.hexdigest()
+
+    def _file_sha256(self, path: Path) -> bytes:
+        try:
+            return file_sha256(path).encode()
+        except OSError as error:
+            raise UrdfError(self.path, "mesh", str(path), "a readable mesh file") from error
 
     def _build_tree(self, urdf: yourdfpy.URDF, root: str) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
         links = [root]
@@ -234,11 +254,10 @@ class RobotModel:
         return bool(self._collisions[link])
 
     def __eq__(self, other: object) -> bool:
-        """Models of the same URDF are equal, so what is found out about one serves the other."""
-        return isinstance(other, RobotModel) and self.urdf == other.urdf
+        return isinstance(other, RobotModel) and self.sha256 == other.sha256
 
     def __hash__(self) -> int:
-        return hash(self.urdf)
+        return hash(self.sha256)
 
     def collision_urdf(self) -> bytes:
         """Return the URDF without what is only seen; every link has a mass, or PyBullet complains."""

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from symgrasp.errors import InputError, SceneError, one_of
-from symgrasp.files import resolve
+from symgrasp.errors import InputError, MeshError, SceneError, one_of
+from symgrasp.files import file_sha256, resolve
 from symgrasp.object.library import library_objects, load_object
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array
@@ -62,7 +62,7 @@ class SceneBuilder:
             robots,
             arms,
             profile,
-            tuple(self._obstacle(i, o) for i, o in enumerate(file.obstacles)),
+            tuple(map(self._obstacle, file.obstacles)),
             {t.name: self._task(i, t, arms) for i, t in enumerate(file.tasks)},
         )
 
@@ -235,19 +235,28 @@ class SceneBuilder:
         values.setflags(write=False)
         return values
 
-    def _obstacle(self, i: int, o: ObstacleFile) -> Obstacle:
+    def _obstacle(self, o: ObstacleFile) -> Obstacle:
         kind = next(k for k in SHAPES if getattr(o, k) is not None)
         size: tuple[float, ...] = ()
-        path = None
+        path = model = None
+        digest = ""
         if o.box is not None:
             size = o.box
         elif o.cylinder is not None:
             size = (o.cylinder.radius, o.cylinder.height)
         elif o.sphere is not None:
             size = (o.sphere.radius,)
+        elif o.urdf is not None:
+            path = self._path(o.urdf)
+            model = self._model(path, ())
+            digest = model.sha256
         else:
-            path = self._path(o.mesh or o.urdf or "")
-        return Obstacle(o.name, kind, size, path, o.pose.matrix())
+            path = self._path(o.mesh or "")
+            try:
+                digest = file_sha256(path)
+            except OSError as error:
+                raise MeshError(path, f"obstacle {o.name}", str(error), "a readable mesh file") from error
+        return Obstacle(o.name, kind, size, path, o.pose.matrix(), model, digest)
 
     def _task(self, i: int, t: TaskFile, arms: Mapping[str, Arm]) -> Task:
         names = t.arms or (next(iter(arms)),)

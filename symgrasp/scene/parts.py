@@ -9,10 +9,9 @@ from typing import NamedTuple
 
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array
+from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
-from symgrasp.scene.format import (
-    SceneFile,
-)
+from symgrasp.scene.format import SceneFile
 
 __all__ = ["Obstacle", "SceneParts", "Task"]
 
@@ -27,6 +26,9 @@ class Obstacle:
         size: box: full sizes (3,); cylinder: radius, height; sphere: radius; otherwise empty.
         path: the mesh or URDF file, otherwise None.
         T_world_obstacle: its pose (4, 4).
+        model: the links of a URDF, otherwise None.
+        file_sha256: SHA-256 of the mesh file, or of the URDF and its collision meshes; empty where the
+            body has no file.
     """
 
     name: str
@@ -34,6 +36,8 @@ class Obstacle:
     size: tuple[float, ...]
     path: Path | None
     T_world_obstacle: Array
+    model: RobotModel | None = None
+    file_sha256: str = ""
 
 
 @dataclass(frozen=True, eq=False)

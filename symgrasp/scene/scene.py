@@ -19,6 +19,7 @@ from symgrasp.object.profile import Profile
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.building import SceneBuilder
 from symgrasp.scene.format import MapSettings, ObjectFile, PoseFile, SceneFile, TaskFile, describe
+from symgrasp.scene.map_content import map_content
 from symgrasp.scene.parts import Obstacle, Task
 from symgrasp.scene.shipped import shipped_scenes
 
@@ -104,7 +105,19 @@ class Scene:
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the content as canonical JSON."""
-        return hashlib.sha256(json.dumps(self.content, sort_keys=True).encode()).hexdigest()
+        return _sha256(self.content)
+
+    @cached_property
+    def map_sha256(self) -> str:
+        """SHA-256 of all that a map depends on besides the arm, the task's pose and the grid asked for.
+
+        Robots, object, obstacles, map settings, and the files of URDFs and collision meshes as they
+        were when the scene was loaded. The scene's name, description and tasks have no part in it.
+        """
+        thing = self.file.object.name
+        return _sha256(
+            map_content(self.robots, self.arms, thing, self.profile, self.obstacles, self.settings)
+        )
 
     @property
     def name(self) -> str:
@@ -229,3 +242,8 @@ class Scene:
         except ValidationError as error:
             raise SceneError("map settings", *describe(error, changes)) from None
         return replace(self, file=self.file.model_copy(update={"map": settings}))
+
+
+def _sha256(content: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of plain data as canonical JSON."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -115,8 +115,8 @@ class BulletWorld:
 
     def _load_obstacle(self, o: Obstacle) -> int:
         if o.kind == "urdf":
-            assert o.path is not None
-            return self._load_urdf(RobotModel(o.path), o.name, o.T_world_obstacle)
+            assert o.model is not None
+            return self._load_urdf(o.model, o.name, o.T_world_obstacle)
         client = self._client
         if o.kind == "box":
             half = [0.5 * s for s in o.size]

@@ -17,6 +17,7 @@ from app.html.map import sample_columns
 from app.render.palette import REASONS
 from app.scene3d.flat_map import FLAT_SIZE, flat_map_position
 from app.scene3d.viewpoint import viewpoint
+from app.state import changes
 from app.state.map_view_state import RollChoice
 from app.state.object_choice import from_mesh
 from app.state.state import State
@@ -91,7 +92,7 @@ def test_moving_the_object_computes_the_map_anew(open_page):
     page = open_page()
     page.slide("x (cm)", 60)
     page.slide("Lean (°)", 20)
-    request = State.of(BOTTLE, "").move(x=0.6).move(lean=np.deg2rad(20.0)).request
+    request = changes.moved(changes.moved(State.of(BOTTLE, ""), x=0.6), lean=np.deg2rad(20.0)).request
     expected = drawn(create_map(request.moved_scene()))
     page.wait_for_picture(lambda p: np.array_equal(p, expected))
     page.expect_title("pick")
@@ -141,8 +142,8 @@ def test_the_roll_can_be_chosen(open_page, bottle_map):
 
 def expect_picked(page: GraspPage, h: float, theta: float) -> None:
     """The page reads out the middle of the cell that was clicked."""
-    place = f"h = {round(100 * h, 2):g} cm, θ = {round(np.rad2deg(theta), 2):g}°"
-    expect(page.text(place)).to_be_visible()
+    set_pose = f"h = {round(100 * h, 2):g} cm, θ = {round(np.rad2deg(theta), 2):g}°"
+    expect(page.text(set_pose)).to_be_visible()
 
 
 @pytest.mark.parametrize("turn", [0.0, 37.5])
@@ -180,7 +181,7 @@ def test_dragging_the_handles_moves_the_object(open_page):
     expect(box).to_have_value(re.compile(r"^(9|10|11)(\.5)?$"))
     expect(page.slider_box("x (cm)")).to_have_value("55")
     page.expect_title("pick")
-    moved = State.of(BOTTLE, "").move(y=float(box.input_value()) / 100)
+    moved = changes.moved(State.of(BOTTLE, ""), y=float(box.input_value()) / 100)
     assert np.mean(page.picture() == drawn(create_map(moved.moved_scene()))) > 0.9  # the box rounds
 
 

@@ -19,8 +19,8 @@ from app.compute.compute_process import ComputeProcess, ProcessDied
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest
 from app.compute.process_pool import ProcessPool
-from app.state.plan_results import PlanResults
-from app.state.requests import CompareRequest, ExplainRequest, MapRequest, MapResult
+from app.state import changes
+from app.state.requests import CompareRequest, ExplainRequest
 from app.state.state import State
 from symgrasp.errors import Cancelled, NoPlanError, PlanError
 from symgrasp.feasibility.cell import Cell
@@ -31,21 +31,21 @@ from tests.conftest import load_small
 
 
 @pytest.fixture(scope="module")
-def store() -> SharedCache:
+def cache() -> SharedCache:
     return SharedCache("bottle_on_table")
 
 
 @pytest.fixture(scope="module")
-def pool(store):
-    pool = ProcessPool(store.folders)
+def pool(cache):
+    pool = ProcessPool(cache.folders)
     yield pool
     pool.close()
     assert multiprocessing.active_children() == []
 
 
 @pytest.fixture
-def shop(store, pool):
-    shop = ComputeProcess(store, pool)
+def shop(cache, pool):
+    shop = ComputeProcess(pool, cache.keep)
     yield shop
     shop.close()
 
@@ -64,19 +64,21 @@ def process_of(shop: ComputeProcess) -> int:
     return shop.pid
 
 
-def test_what_comes_back_is_what_a_workbench_computes_of_the_same_scene(shop, store):
+def test_what_comes_back_is_what_the_service_computes_of_the_same_scene(shop, cache):
     scene = load_small("bottle_on_table")
-    request = State.of(scene, "").move(x=0.5).request
+    request = changes.moved(State.of(scene, ""), x=0.5).request
     result = shop.map(request, quiet)
-    bench = MapService(SharedCache("bottle_on_table"))
+    bench = MapService()
     right = bench.map(request, quiet)
     assert np.array_equal(result.map.reason, right.map.reason)
     assert np.array_equal(result.map.q, right.map.q, equal_nan=True)
     assert result.request.scene is scene
-    assert store.map(request) is result
+    found = cache.map(request)
+    assert found
+    assert found.map is result.map
     with pytest.raises(ValueError, match="read-only"):
         result.map.reason[0, 0, 0] = 0
-    check = shop.check(CompareRequest(request, 0.4), result.map, quiet)
+    check = shop.compare(CompareRequest(request, 0.4), result.map, quiet)
     assert check.differing == 0
     asked = ExplainRequest(request, feasible_cell(result.map))
     candidates = shop.explain(asked, quiet).explanation.candidates
@@ -87,15 +89,21 @@ def test_what_comes_back_is_what_a_workbench_computes_of_the_same_scene(shop, st
     bench.close()
 
 
-def test_plans_are_listed_on_in_the_same_process_and_not_in_another(shop, store):
+def test_plans_are_listed_on_in_the_same_process_and_not_in_another(shop, cache):
     scene = load_small("pick_pour_place", heights=12, angles=24)
-    plan_results = shop.run(PlanRequest(scene, "sequential", "best", "panda"), PlanResults(), quiet)
-    assert all(result.request.scene is scene for result in plan_results.maps.values())
-    assert all(store.map(result.request) is result for result in plan_results.maps.values())
-    assert shop.more(plan_results.maps, quiet) == ((), False)
+    request = PlanRequest(scene, "sequential", "best", "panda")
+    outcome, maps = shop.plan(request, {}, quiet)
+    assert outcome.plans
+    assert set(maps) == {(task, "panda") for task in scene.tasks}
+    assert all(result.request.scene is scene for result in maps.values())
+    assert all(cache.map(result.request).map is result.map for result in maps.values())
+    again, known = shop.plan(request, maps, quiet)
+    assert known == maps  # nothing was computed again
+    assert [p.plan for p in again.plans] == [p.plan for p in outcome.plans]
+    assert shop.more(quiet) == ((), False)
     shop.close()
     with pytest.raises(NoPlanError, match="plan again"):
-        shop.more(plan_results.maps, quiet)
+        shop.more(quiet)
 
 
 def test_an_error_arrives_as_it_was_raised(shop):
@@ -104,20 +112,20 @@ def test_an_error_arrives_as_it_was_raised(shop):
     assert caught.value.source == "bad.json"
 
 
-def test_whatever_a_library_raises_arrives(store, monkeypatch):
+def test_whatever_a_library_raises_arrives(cache, monkeypatch):
     monkeypatch.setattr(process_pool, "serve", failures.serve_broken)
-    pool = ProcessPool(store.folders)
-    shop = ComputeProcess(store, pool)
+    pool = ProcessPool(cache.folders)
+    shop = ComputeProcess(pool, cache.keep)
     with pytest.raises(RuntimeError, match="Strange: of this process only"):
         shop.map(State.of(load_small("bottle_on_table"), "").request, quiet)
     shop.close()
     pool.close()
 
 
-def test_a_cancel_is_heard_by_the_process_which_goes_on(store, monkeypatch):
+def test_a_cancel_is_heard_by_the_process_which_goes_on(cache, monkeypatch):
     monkeypatch.setattr(process_pool, "serve", failures.serve_endless)
-    pool = ProcessPool(store.folders)
-    shop = ComputeProcess(store, pool)
+    pool = ProcessPool(cache.folders)
+    shop = ComputeProcess(pool, cache.keep)
     state = State.of(load_small("bottle_on_table"), "")
 
     def impatient(share: float) -> None:
@@ -134,11 +142,11 @@ def test_a_cancel_is_heard_by_the_process_which_goes_on(store, monkeypatch):
     pool.close()
 
 
-def test_a_process_that_dies_is_told_and_followed_by_another(store, monkeypatch):
+def test_a_process_that_dies_is_told_and_followed_by_another(cache, monkeypatch):
     with monkeypatch.context() as trouble:
         trouble.setattr(process_pool, "serve", failures.serve_endless)
-        pool = ProcessPool(store.folders)
-        shop = ComputeProcess(store, pool)
+        pool = ProcessPool(cache.folders)
+        shop = ComputeProcess(pool, cache.keep)
 
         def kill(share: float) -> None:
             if share == 0.5:
@@ -153,20 +161,21 @@ def test_a_process_that_dies_is_told_and_followed_by_another(store, monkeypatch)
     idle = next(p for p in multiprocessing.active_children() if p.pid == shop.pid)
     idle.kill()  # nobody needs to know
     idle.join()
-    shop.map(state.move(x=0.43).request, quiet)
+    shop.map(changes.moved(state, x=0.43).request, quiet)
     shop.close()
 
 
 SERVER = """
 import multiprocessing, sys
-from app.compute import Store
-from app.state import State
-from app.workshop import Staff, Workshop
-store = Store("bottle_on_table")
-staff = Staff(store.folders)
-staff.prepare()
-shop = Workshop(store, staff)
-shop.map(State.of(store.scene("bottle_on_table"), "").move(x=0.5).request, lambda share: None)
+from app.compute.cache import SharedCache
+from app.compute.compute_process import ComputeProcess
+from app.compute.process_pool import ProcessPool
+from app.state.requests import MapRequest
+cache = SharedCache("bottle_on_table")
+pool = ProcessPool(cache.folders)
+pool.prepare()
+process = ComputeProcess(pool)
+process.map(MapRequest(cache.scene("bottle_on_table"), "panda", "pick"), lambda share: None)
 print(len(multiprocessing.active_children()), flush=True)
 sys.stdin.read()
 """
@@ -180,26 +189,20 @@ def test_a_server_that_is_killed_leaves_no_process_behind():
         server.communicate(timeout=60)  # ends when the last one who could write is gone
 
 
-def test_what_both_ends_know_crosses_once_and_maps_are_forgotten_on_both():
+def test_messages_arrive_as_they_were_sent_and_arrays_stay_read_only():
     here, there = multiprocessing.Pipe()
-    one, other = Channel(here, "one"), Channel(there, "other")
+    one, other = Channel(here), Channel(there)
     scene = load_small("bottle_on_table")
-    moved = State.of(scene, "").move(x=0.5).request.moved_scene()
-    one.send((scene, moved))
-    first, second = other.receive()
-    for part in ("robots", "obstacles", "profile", "settings"):
-        assert getattr(first, part) is getattr(second, part)
-    request = MapRequest(first, "panda", "pick")
-    other.send((request, MapResult(request, small_map("bottle_on_table", "pick", "panda").map)))
-    back, result = one.receive()
-    assert back.scene is result.request.scene is scene
-    assert back.place == MapRequest(scene, "panda", "pick").place
-    one.send(result)
-    again = other.receive()
-    known = one.known
-    assert known == other.known
-    one.forget_maps()
-    other.forget_maps()
-    assert one.known == other.known == known - 1
-    one.send(result)
-    assert other.receive() is not again
+    moved = changes.moved(State.of(scene, ""), x=0.5).request
+    m = small_map("bottle_on_table", "pick", "panda").map
+    one.send((moved, m))
+    request, arrived = other.receive()
+    assert request == moved
+    assert request.scene.map_sha256 == scene.map_sha256
+    assert np.array_equal(arrived.reason, m.reason)
+    with pytest.raises(ValueError, match="read-only"):
+        arrived.reason[0, 0, 0] = 0
+    assert not other.poll()
+    one.close()
+    with pytest.raises(EOFError):
+        other.receive()

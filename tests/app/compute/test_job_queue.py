@@ -26,7 +26,8 @@ class Log:
         def hears(kind: str) -> Callable[[Any], None]:
             return lambda value: self.heard.put((name + kind, value))
 
-        return Job(run, hears("progress"), hears("done"), hears("failed"))
+        compiling = lambda: hears("compiling")(None)  # noqa: E731
+        return Job(run, hears("progress"), compiling, hears("done"), hears("failed"))
 
     def next(self) -> tuple[str, Any]:
         return self.heard.get(timeout=WAIT)

@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 from app.compute.cache import SharedCache
 from app.files.links import LONGEST, link_of, parse_link
 from app.panels.files_panel import link_html
-from app.state.history import remember, undo
+from app.state import changes, job_changes
 from app.state.map_view_state import RollChoice
 from app.state.object_choice import from_library
 from app.state.state import Pick, State
 from app.state.task_list import TaskList
+from app.state.undo import remember, undo
 from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility.color_by import ColorBy
@@ -58,17 +59,18 @@ def reopened(query: str, name: str) -> State:
 )
 def test_everything_chosen_comes_back(poses, delta, pick, roll, switches, task, view):
     name = "pick_pour_place"
-    state = opened(name).choose_roll(roll)
+    state = changes.choose_roll(opened(name), roll)
     for moved, pose in poses.items():
-        state = state.choose_task(moved).move(**pose)
+        state = changes.moved(changes.choose_task(state, moved), **pose)
     flat_map, gizmo, dark = switches
-    state = replace(state.choose_task(task).turn(delta), flat_map=flat_map, gizmo=gizmo, dark=dark)
-    state = replace(state, map_view=replace(state.map_view, view=view))
+    state = changes.turn(changes.choose_task(state, task), delta)
+    state = changes.switched(state, flat_map=flat_map, drag_handles=gizmo, dark=dark)
+    state = replace(state, map_view=replace(state.map_view, color_by=view))
     if pick:
         state = replace(state, pick=Pick(*pick))
     again = reopened(query_of(state), name)
-    assert (again.task, again.arm, again.roll) == (state.task, state.arm, state.roll)
-    assert (again.flat_map, again.gizmo, again.dark) == (flat_map, gizmo, dark)
+    assert (again.task, again.arm, again.map_view.roll) == (state.task, state.arm, state.map_view.roll)
+    assert (again.display.flat_map, again.display.drag_handles, again.display.dark) == (flat_map, gizmo, dark)
     assert again.map_view == state.map_view
     assert set(again.poses) == set(state.poses)
     for moved in state.poses:
@@ -82,7 +84,7 @@ def test_everything_chosen_comes_back(poses, delta, pick, roll, switches, task, 
 
 
 def test_a_link_is_short_and_readable():
-    state = opened("soda_can").move(x=0.5).turn(np.deg2rad(30))
+    state = changes.turn(changes.moved(opened("soda_can"), x=0.5), np.deg2rad(30))
     assert "&turn=30" in query_of(state)
     assert "&at.pick=50," in query_of(state)
     query = query_of(opened("soda_can"), (1.0, 0.5, 0.7, 0.1, 0.0, 0.25))
@@ -91,26 +93,26 @@ def test_a_link_is_short_and_readable():
 
 
 def test_objects_of_the_library_and_hands_come_back():
-    store = SharedCache("log_iiwa_and_panda")
-    scene, object_choice = store.linked(parse_link("object=log_70mm&hand.iiwa=pr2"))
+    cache = SharedCache("log_iiwa_and_panda")
+    scene, object_choice = cache.linked(parse_link("object=log_70mm&hand.iiwa=pr2"))
     assert scene.mounted["iiwa"] == "pr2"
     assert object_choice
-    assert object_choice.choice == "log_70mm"
+    assert object_choice.option == "log_70mm"
     state = replace(State.of(scene, "log_iiwa_and_panda"), object_choice=object_choice)
-    link = link_of(state, store.scene(state.scene_name))
-    again, _ = store.linked(parse_link(link))
+    link = link_of(state, cache.scene(state.scene_name))
+    again, _ = cache.linked(parse_link(link))
     assert again.sha256 == scene.sha256
     assert "tasks" not in link
 
 
 def test_what_was_uploaded_is_in_no_link():
     scene = load_small("soda_can")
-    state = State.of(scene, "soda_can").load_scene(UploadedScene("mine.yaml (upload)", scene))
+    state = changes.open_upload(State.of(scene, "soda_can"), UploadedScene("mine.yaml (upload)", scene))
     with pytest.raises(SymgraspError, match=r"link: scene: 'an upload': .*save the scene instead"):
         link_of(state, scene)
     mesh = replace(from_library("log_70mm"), measurement=object())  # pyright: ignore[reportArgumentType]
     with pytest.raises(SymgraspError, match="link: object: 'an upload'"):
-        link_of(State.of(scene, "soda_can").choose_object(scene, mesh), scene)
+        link_of(changes.choose_object(State.of(scene, "soda_can"), scene, mesh), scene)
 
 
 # -- the list of tasks ----------------------------------------------------------------------
@@ -119,16 +121,17 @@ NAMES = st.sampled_from(
     ["pick", "pour", "a, b", '"', "<script>alert(1)</script>", "&at.pick=1", "mäh ✓"]
 ) | st.text(min_size=1, max_size=12)
 EDITS = st.one_of(
-    st.just(State.add_task),
-    st.just(lambda s: s.change_tasks(TaskList.removed)),
-    st.builds(lambda by: lambda s: s.change_tasks(lambda t: t.shifted(by)), st.integers(-3, 3)),
-    st.builds(lambda name: lambda s: s.change_tasks(lambda t: t.renamed(name)), NAMES),
+    st.just(changes.add_task),
+    st.just(lambda s: changes.change_tasks(s, TaskList.removed)),
+    st.builds(lambda by: lambda s: changes.change_tasks(s, lambda t: t.shifted(by)), st.integers(-3, 3)),
+    st.builds(lambda name: lambda s: changes.change_tasks(s, lambda t: t.renamed(name)), NAMES),
     st.builds(
-        lambda k: lambda s: s.choose_task(list(s.scene.tasks)[k % len(s.scene.tasks)]), st.integers(0, 9)
+        lambda k: lambda s: changes.choose_task(s, list(s.scene.tasks)[k % len(s.scene.tasks)]),
+        st.integers(0, 9),
     ),
-    st.builds(lambda pose: lambda s: s.move(**pose), POSES),
-    st.builds(lambda delta: lambda s: s.turn(delta), ANGLES),
-    st.just(State.reset_pose),
+    st.builds(lambda pose: lambda s: changes.moved(s, **pose), POSES),
+    st.builds(lambda delta: lambda s: changes.turn(s, delta), ANGLES),
+    st.just(changes.reset_pose),
 )
 
 
@@ -160,15 +163,17 @@ def test_tasks_changed_in_any_way_come_back(name, edits):
 def test_only_what_differs_from_the_servers_tasks_is_in_a_link():
     state = opened("pick_pour_place")
     assert "tasks" not in query_of(state)
-    swapped = state.change_tasks(lambda tasks: tasks.shifted(1))
+    swapped = changes.change_tasks(state, lambda tasks: tasks.shifted(1))
     assert query_of(swapped) == "scene=pick_pour_place&task=pick&arm=panda&tasks=pour,pick,place"
-    renamed = state.change_tasks(lambda tasks: tasks.renamed("a, b"))
+    renamed = changes.change_tasks(state, lambda tasks: tasks.renamed("a, b"))
     assert "&tasks=%22a,+b%22,pour,place&at.a,+b=" in query_of(renamed)
     assert "at.pour" not in query_of(renamed)
-    back = renamed.change_tasks(lambda tasks: tasks.renamed("pick"))
+    back = changes.change_tasks(renamed, lambda tasks: tasks.renamed("pick"))
     assert query_of(back) == query_of(state)
     name = "handover_between_robots"
-    taken = opened(name).change_tasks(TaskList.removed).change_tasks(lambda tasks: tasks.renamed("pick"))
+    taken = changes.change_tasks(
+        changes.change_tasks(opened(name), TaskList.removed), lambda tasks: tasks.renamed("pick")
+    )
     query = query_of(taken)
     assert "&tasks=pick,place&arms.pick=left,right&at.pick=" in query
     assert_same_tasks(reopened(query, name), taken)
@@ -176,12 +181,14 @@ def test_only_what_differs_from_the_servers_tasks_is_in_a_link():
 
 
 def test_a_known_task_can_be_put_back_and_a_new_one_stands_where_it_was_made():
-    state = opened("pick_pour_place").move(x=0.6).choose_task("pour").choose_task("pick")
-    state = state.add_task().move(x=0.7)
+    state = changes.choose_task(
+        changes.choose_task(changes.moved(opened("pick_pour_place"), x=0.6), "pour"), "pick"
+    )
+    state = changes.moved(changes.add_task(state), x=0.7)
     again = reopened(query_of(state), "pick_pour_place")
     assert list(again.poses) == ["pick"]
-    assert again.reset_pose().base.x == pytest.approx(0.7)
-    put_back = again.choose_task("pick").reset_pose()
+    assert changes.reset_pose(again).base.x == pytest.approx(0.7)
+    put_back = changes.reset_pose(changes.choose_task(again, "pick"))
     assert put_back.base == opened("pick_pour_place").base
 
 
@@ -193,35 +200,37 @@ def test_a_link_that_would_be_too_long_to_be_read_is_not_made():
         for _ in range(200):
             assert len(query_of(state)) <= LONGEST
             parse_link(query_of(state))
-            state = state.add_task()
+            state = changes.add_task(state)
 
 
 def test_a_link_that_is_shown_is_marked_once_something_else_is_shown():
     state = opened("pick_pour_place")
     camera = (1.0, 0.5, 0.7, 0.1, 0.0, 0.25)
     assert link_html(state) == ""
-    state = state.linked("http://here/?scene=<script>", camera)
+    state = changes.linked(state, "http://here/?scene=<script>", camera)
     assert "<script>" not in link_html(state)
     assert EARLIER not in link_html(state)
-    assert EARLIER not in link_html(state.seen_from(camera).retry().failed("something"))
+    assert EARLIER not in link_html(
+        job_changes.failed(job_changes.retried(changes.seen_from(state, camera)), "something")
+    )
     for change in (
-        lambda s: s.seen_from((1.1, *camera[1:])),
-        lambda s: s.turn(0.1),
-        lambda s: s.choose_task("pour").move(x=0.5).choose_task("pick"),
-        lambda s: s.choose(0.1, 0.0),
-        lambda s: s.choose_roll(RollChoice.ZERO),
-        lambda s: replace(s, dark=True),
-        lambda s: s.change_tasks(lambda tasks: tasks.shifted(1)),
-        lambda s: s.move(x=0.51),
+        lambda s: changes.seen_from(s, (1.1, *camera[1:])),
+        lambda s: changes.turn(s, 0.1),
+        lambda s: changes.choose_task(changes.moved(changes.choose_task(s, "pour"), x=0.5), "pick"),
+        lambda s: changes.choose(s, 0.1, 0.0),
+        lambda s: changes.choose_roll(s, RollChoice.ZERO),
+        lambda s: changes.switched(s, dark=True),
+        lambda s: changes.change_tasks(s, lambda tasks: tasks.shifted(1)),
+        lambda s: changes.moved(s, x=0.51),
     ):
         assert EARLIER in link_html(change(state))
-    assert EARLIER not in link_html(state.turn(0.1).turn(0.0))
-    turned = remember(state, state.turn(0.1), "", 0.0)
+    assert EARLIER not in link_html(changes.turn(changes.turn(state, 0.1), 0.0))
+    turned = remember(state, changes.turn(state, 0.1), "", 0.0)
     assert EARLIER in link_html(turned)
     assert EARLIER not in link_html(undo(turned))
-    elsewhere = turned.seen_from((1.1, *camera[1:]))
+    elsewhere = changes.seen_from(turned, (1.1, *camera[1:]))
     assert EARLIER in link_html(undo(elsewhere))
-    assert elsewhere.seen_from((1.2, *camera[1:])) is elsewhere
+    assert changes.seen_from(elsewhere, (1.2, *camera[1:])) is elsewhere
 
 
 @pytest.mark.parametrize(
@@ -262,10 +271,10 @@ def test_a_link_that_is_shown_is_marked_once_something_else_is_shown():
     ],
 )
 def test_what_is_wrong_with_a_link_is_said_in_a_line(query, message):
-    store = SharedCache("bottle_on_table")
+    cache = SharedCache("bottle_on_table")
     with pytest.raises(SymgraspError, match=message) as error:
         link = parse_link(query)
-        scene, _ = store.linked(link)
+        scene, _ = cache.linked(link)
         link.apply(State.of(scene, ""))
     assert "\n" not in str(error.value)
 

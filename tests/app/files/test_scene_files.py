@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.files.scene_files import SCENE_LIMIT, read_scene, scene_yaml
+from app.state import changes
 from app.state.state import State
 from symgrasp.errors import SymgraspError
 from symgrasp.files import SCENES_DIR
@@ -21,11 +22,11 @@ LENGTHS = st.floats(-2, 2)
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_saved_scene_is_the_same_scene_again_for_page_and_command_line(name, tmp_path):
-    scene = State.of(load_small(name), name).move(x=0.31, lean=0.4).moved_scene()
+    scene = changes.moved(State.of(load_small(name), name), x=0.31, lean=0.4).moved_scene()
     text = scene_yaml(scene)
     assert str(SCENES_DIR) not in text  # nothing in it is of this machine only
     read = read_scene("saved.yaml", text.encode(), FOLDERS)
-    assert read.choice == "saved.yaml (upload)"
+    assert read.option == "saved.yaml (upload)"
     for again in (read.scene, Scene.load(write_scene(tmp_path, text))):
         assert scene_yaml(again) == text
         assert again.file.tasks == scene.file.tasks
@@ -38,7 +39,7 @@ def test_a_saved_scene_is_the_same_scene_again_for_page_and_command_line(name, t
 @settings(deadline=None, max_examples=20)
 @given(LENGTHS, LENGTHS, st.floats(0, 3.1), st.floats(-3, 3))
 def test_no_pose_is_lost_on_the_way(x, y, lean, towards):
-    state = State.of(load_small("bottle_on_table"), "").move(x=x, y=y, lean=lean, towards=towards)
+    state = changes.moved(State.of(load_small("bottle_on_table"), ""), x=x, y=y, lean=lean, towards=towards)
     read = read_scene("a.yaml", scene_yaml(state.moved_scene()).encode(), FOLDERS).scene
     assert np.allclose(read.task().T_world_object, state.request.T_world_object, atol=1e-12)
 

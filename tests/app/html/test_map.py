@@ -17,9 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from app.html.map import COLUMNS, Mark, h_axis, legend_html, map_html, prints_html, sample_columns
+from app.html.map import COLUMNS, h_axis, legend_html, map_html, prints_html, sample_columns
+from app.render.marks import Mark
 from app.render.palette import OVERLAP, PRINTS, REASONS, faded, rgb, to_linear
 from app.render.prints import on_surface, shown_prints
+from app.state import changes
 from app.state.map_view_state import RollChoice
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
@@ -55,7 +57,7 @@ def test_the_picture_shows_every_cell_in_its_colour():
 @given(st.integers(-720, 720))
 def test_any_step_of_the_slider_rolls_the_picture_by_as_many_columns(steps):
     state = opened()
-    turned = state.turn(steps * STEP)
+    turned = changes.turn(state, steps * STEP)
     assert np.array_equal(picture(turned), np.roll(picture(state), -steps, axis=1))
 
 
@@ -67,7 +69,7 @@ def test_sampling_agrees_with_the_grid_on_any_shift():
 
 def test_an_old_map_looks_old():
     state = opened()
-    html = map_html(state.map, state.roll, stale=True)
+    html = map_html(state.map, state.map_view.roll, stale=True)
     (image,) = pictures(html, "map")
     reason = RollChoice.EITHER.reason(state.map)[::-1, sample_columns(state.map.manifold)]
     assert np.array_equal(image, faded(REASONS)[reason])
@@ -87,7 +89,7 @@ def test_the_legend_counts_every_cell_once(roll):
 
 def test_marks_stand_where_their_grasp_is():
     state = opened()
-    html = map_html(state.map, state.roll, [Mark(0.15, np.pi / 2, "<b>")])
+    html = map_html(state.map, state.map_view.roll, [Mark(0.15, np.pi / 2, "<b>")])
     assert 'class="sg-mark" style="left:75.000%;bottom:50.000%"' in html
     assert "&lt;b&gt;" in html
     assert "<b>" not in html.replace("<b>h (cm)</b>", "").replace("<b>θ (°)</b>", "")
@@ -116,7 +118,7 @@ def test_each_hand_has_its_colour_their_overlap_a_third_and_the_rest_is_clear():
     moved = np.roll(left, 1, axis=1)  # a plan's own prints share no cell
     assert (left & moved).any()
     for other in (right, moved):
-        html = map_html(state.map, state.roll, prints=[left, other])
+        html = map_html(state.map, state.map_view.roll, prints=[left, other])
         (data,) = re.findall(r'alt="handprints" src="data:image/png;base64,([^"]+)"', html)
         image = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA"))
         columns = sample_columns(Manifold(state.scene.profile, *left.shape))

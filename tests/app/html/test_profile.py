@@ -21,6 +21,7 @@ from app.html.profile import (
     symmetry_html,
 )
 from app.render.palette import DIVERGING
+from app.state import changes
 from app.state.object_choice import ObjectChoice, from_mesh
 from app.state.state import State
 from symgrasp.feasibility.fit import fit
@@ -133,9 +134,11 @@ def test_the_colours_go_from_inside_to_outside_and_a_gap_has_none(oval):
 def test_the_symmetry_error_is_told_of_an_uploaded_mesh_only(oval):
     state = State.of(load_small("bottle_on_table"), "")
     assert symmetry_html(state) == ""
-    state = state.choose_object(state.scene.with_object(oval.name, oval.profile), oval)
+    state = changes.choose_object(state, state.scene.with_object(oval.name, oval.profile), oval)
     worst = oval.measurement.worst[0]
     assert f"Symmetry error: {1e3 * worst:.2f} mm at most" in symmetry_html(state)
     assert "linear-gradient" not in symmetry_html(state)
-    assert "linear-gradient" in symmetry_html(replace(state, errors=True))
-    assert not replace(state, errors=True).choose_object(state.scene, None).errors
+    assert "linear-gradient" in symmetry_html(changes.switched(state, symmetry_error=True))
+    assert not changes.choose_object(
+        changes.switched(state, symmetry_error=True), state.scene, None
+    ).display.symmetry_error

@@ -14,6 +14,7 @@ import pytest
 
 from app.__main__ import serve
 from app.html.readout import grasp_html, map_title, notes_html, solution_html, status_html
+from app.state import changes, job_changes
 from app.state.requests import MapResult
 from app.state.state import State
 from symgrasp.errors import InputError
@@ -72,10 +73,12 @@ def test_names_from_files_are_escaped_everywhere(content, tmp_path):
     content["robots"][0]["name"] = HOSTILE + "robot"
     scene = Scene.load(write_scene(tmp_path, content)).with_settings(heights=4, angles=8, redundancy=2)
     state = State.of(scene, HOSTILE)
-    state = state.map_arrived(0, MapResult(state.request, create_map(scene), (HOSTILE,))).failed(HOSTILE)
+    state = job_changes.failed(
+        job_changes.map_arrived(state, 0, MapResult(state.request, create_map(scene), (HOSTILE,))), HOSTILE
+    )
     shown = [f(state) for f in (map_title, status_html, notes_html, solution_html)]
-    shown += [grasp_html(state.choose_cell(i, j)) for i in range(4) for j in range(8)]
-    shown.append(status_html(state.started(1, HOSTILE)))
+    shown += [grasp_html(changes.choose_cell(state, i, j)) for i in range(4) for j in range(8)]
+    shown.append(status_html(job_changes.started(state, 1, HOSTILE)))
     assert not any("<script" in text for text in shown)
     assert sum("&lt;script" in text for text in shown) >= 4
 
@@ -84,24 +87,24 @@ def test_the_readout_says_how_and_why_not():
     state = opened()
     cells = {bool(state.map.feasible[:, i, j].any()): (i, j) for i, j in [(3, 15), (3, 8), (3, 0), (3, 4)]}
     assert set(cells) == {True, False}
-    held = grasp_html(state.choose_cell(*cells[True]))
+    held = grasp_html(changes.choose_cell(state, *cells[True]))
     assert "panda holds it: feasible" in held
     assert "Joints" in held
-    missed = state.choose_cell(*cells[False])
+    missed = changes.choose_cell(state, *cells[False])
     assert "panda cannot hold it here: " + missed.map.why(missed.cell) in grasp_html(missed)
-    assert "waits for the map" in grasp_html(missed.move(x=0.5))
+    assert "waits for the map" in grasp_html(changes.moved(missed, x=0.5))
     assert "No grasp picked" in grasp_html(state)
 
 
 def test_the_joints_of_a_plan_are_read_out_as_the_plan_has_them():
     state = with_plan("log_two_robots", "bimanual")
-    for hold in state.shown.holds:
+    for hold in state.shown_task.holds:
         joints = ", ".join(f"{round(math.degrees(q)) + 0:d}°" for q in hold.joints.values())
-        assert f"Joints {joints};" in grasp_html(state.choose_arm(hold.arm))
+        assert f"Joints {joints};" in grasp_html(changes.choose_arm(state, hold.arm))
 
 
 def test_the_plan_is_summed_up():
     assert solution_html(with_plan("pick_pour_place", "sequential")).count("One grasp for 3 tasks: h = ") == 1
     assert "2 arms hold the object together in lift" in solution_html(with_plan("log_two_robots", "bimanual"))
     assert load_small("bottle_on_table").name in map_title(opened())
-    assert "of an earlier pose" in map_title(opened().move(x=0.5))
+    assert "of an earlier pose" in map_title(changes.moved(opened(), x=0.5))

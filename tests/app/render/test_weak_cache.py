@@ -13,6 +13,7 @@ from app.html.stack import shared_columns, stack_html
 from app.render.cell_colors import cell_colors
 from app.render.prints import shown_prints
 from app.render.weak_cache import cached_with_first
+from app.state import plan_changes
 from app.state.map_view_state import RollChoice
 from app.state.plan_results import PlanResults
 from app.state.state import State
@@ -46,20 +47,18 @@ def test_a_result_is_made_once_and_goes_with_what_it_was_made_from():
     assert made == ["a", "b", "a"]
 
 
-def book_of_its_own() -> PlanResults:
+def results_of_its_own() -> PlanResults:
     """A plan whose maps nobody else has."""
     plan_results = planned("pick_pour_place", "sequential")
     maps = {key: replace(result, map=replace(result.map)) for key, result in plan_results.maps.items()}
-    return replace(
-        plan_results, maps=maps, plans=tuple(replace(plan, maps=maps) for plan in plan_results.plans)
-    )
+    return replace(plan_results, maps=maps)
 
 
 def drawn() -> list[weakref.ref[object]]:
     """Draw a plan in every way; return what was drawn."""
     state = opened("pick_pour_place")
     state = replace(state, scene=replace(state.scene))
-    state = state.started(1, "Planning").booked(1, book_of_its_own())
+    state = plan_changes.show_results(state, results_of_its_own())
     state = replace(state, map_view=replace(state.map_view, handprint=True))
     assert state.map
     for slide in (0.5, 1.0):

@@ -25,8 +25,10 @@ import pytest
 from app.compute import compute_process as process
 from app.compute.cache import SharedCache
 from app.compute.job_queue import JobQueue
+from app.compute.warm_up import compute_first_map
 from app.panels.status_panel import StatusPanel
 from app.scene3d.scene_view import SceneView
+from app.server.actions import Actions
 from app.server.lobby import Lobby, open_lobby
 from app.server.session import Session
 from app.server.viser_server import any_port
@@ -42,7 +44,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 class House:
     """A server, the port of its door, and what it keeps."""
 
-    store: SharedCache
+    cache: SharedCache
     reception: Lobby
     port: int
 
@@ -52,7 +54,7 @@ class House:
     def wait_until_empty(self) -> None:
         """Wait until every session has been closed, with its threads."""
         for thread in threading.enumerate():
-            if thread.name.startswith(("worker", "painter")):
+            if thread.name.startswith(("jobs", "painter")):
                 thread.join(30)
         deadline = time.monotonic() + 30
         while self.reception.open and time.monotonic() < deadline:
@@ -62,11 +64,11 @@ class House:
 
 @contextmanager
 def open_house_on_a_table() -> Iterator[House]:
-    store = SharedCache("bottle_on_table")
-    store.warm()
+    cache = SharedCache("bottle_on_table")
+    compute_first_map(cache)
     port = any_port()
-    with open_lobby(store, "127.0.0.1", port) as reception:
-        yield House(store, reception, port)
+    with open_lobby(cache, "127.0.0.1", port) as reception:
+        yield House(cache, reception, port)
 
 
 @pytest.fixture(scope="module")
@@ -284,26 +286,26 @@ def test_what_a_person_asks_for_in_two_ways_at_once_leaves_nothing_half_begun(ho
 
 
 def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(house, monkeypatch):
-    linked, open_scene, asked = SharedCache.linked, Session.open_scene, threading.Event()
+    linked, open_scene, asked = SharedCache.linked, Actions.open_scene, threading.Event()
 
-    def slow(store, link):
+    def slow(cache, link):
         """Load the first scene only when another has been asked for."""
         assert asked.wait(30)
-        return linked(store, link)
+        return linked(cache, link)
 
-    def told(session, name):
-        open_scene(session, name)
+    def told(actions, name):
+        open_scene(actions, name)
         asked.set()
 
     monkeypatch.setattr(SharedCache, "linked", slow)
-    monkeypatch.setattr(Session, "open_scene", told)
+    monkeypatch.setattr(Actions, "open_scene", told)
     with house.visit("scene=soda_can") as visitor:
         visitor.trigger("Next scene")
         assert "soda_can" in title(visitor.wait_for(ready))
 
 
 def test_a_first_scene_that_breaks_in_an_unexpected_way_leaves_no_empty_page(house, monkeypatch):
-    def broken(store, link):
+    def broken(cache, link):
         raise RuntimeError("of this test")
 
     monkeypatch.setattr(SharedCache, "linked", broken)
@@ -323,7 +325,7 @@ def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(house, monkeypat
         html = visitor.wait_for("This page could not be opened (RuntimeError: of &lt;this&gt; test)")
         assert "Loading" not in html
         for thread in set(threading.enumerate()) - before:
-            if thread.name.startswith(("worker", "painter")):
+            if thread.name.startswith(("jobs", "painter")):
                 thread.join(30)
                 assert not thread.is_alive()
         assert house.reception.open == 0
@@ -352,7 +354,7 @@ def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(h
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
     monkeypatch.setattr(process, "serve", failures.serve_compiling)
     port = any_port()
-    with open_lobby(house.store, "127.0.0.1", port), Wire(port) as visitor:
+    with open_lobby(house.cache, "127.0.0.1", port), Wire(port) as visitor:
         visitor.wait_for(ready)
         visitor.set("x (cm)", 54.5)
         visitor.wait_for(lambda _: any(w.get("value") == 50.0 for w in visitor.widgets.values()))

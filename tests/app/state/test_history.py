@@ -16,11 +16,13 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from app.state.history import DRAG_PAUSE, PLANS_KEPT, STEPS_KEPT, History, redo, remember, undo
+from app.state import changes, job_changes, plan_changes
+from app.state.history import DRAG_PAUSE, STEPS_KEPT, History
 from app.state.map_view_state import RollChoice
 from app.state.object_choice import from_library
 from app.state.plan_results import PlanResults
 from app.state.state import State
+from app.state.undo import PLANS_KEPT, redo, remember, undo
 from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import InputError
 from symgrasp.feasibility.map import FeasibilityMap
@@ -44,27 +46,27 @@ def test_undo_goes_back_and_redo_forth():
     person = Person(opened())
     states = [person.state]
     for change in (
-        lambda s: s.turn(0.5),
-        lambda s: s.move(x=0.5),
-        lambda s: s.choose(0.1, 1.0),
-        lambda s: s.choose_roll(RollChoice.ZERO),
-        lambda s: replace(s, flat_map=False),
-        State.reset_pose,
+        lambda s: changes.turn(s, 0.5),
+        lambda s: changes.moved(s, x=0.5),
+        lambda s: changes.choose(s, 0.1, 1.0),
+        lambda s: changes.choose_roll(s, RollChoice.ZERO),
+        lambda s: changes.switched(s, flat_map=False),
+        changes.reset_pose,
     ):
         states.append(person.does(change))
     for state in states[-2::-1]:
-        assert person.does(undo).inputs == state.inputs
-    assert person.does(undo).inputs == states[0].inputs  # nothing is left to undo
+        assert person.does(undo).input_values == state.input_values
+    assert person.does(undo).input_values == states[0].input_values  # nothing is left to undo
     for state in states[1:]:
-        assert person.does(redo).inputs == state.inputs
-    assert person.does(redo).inputs == states[-1].inputs
+        assert person.does(redo).input_values == state.input_values
+    assert person.does(redo).input_values == states[-1].input_values
 
 
 def test_what_is_done_after_an_undo_takes_the_place_of_what_was_undone():
     person = Person(opened())
-    person.does(lambda s: s.turn(0.5))
+    person.does(lambda s: changes.turn(s, 0.5))
     person.does(undo)
-    person.does(lambda s: s.turn(0.7))
+    person.does(lambda s: changes.turn(s, 0.7))
     assert person.does(redo).delta == 0.7
     assert person.does(undo).delta == 0.0
 
@@ -72,8 +74,8 @@ def test_what_is_done_after_an_undo_takes_the_place_of_what_was_undone():
 def test_a_drag_is_one_step_and_a_pause_begins_another():
     person = Person(opened())
     for k in range(20):
-        person.does(lambda s, k=k: s.turn(0.01 * k + 0.01), "inputs", after=0.05)
-    person.does(lambda s: s.turn(1.0), "inputs", after=DRAG_PAUSE)
+        person.does(lambda s, k=k: changes.turn(s, 0.01 * k + 0.01), "inputs", after=0.05)
+    person.does(lambda s: changes.turn(s, 1.0), "inputs", after=DRAG_PAUSE)
     assert len(person.state.history.past) == 2
     assert np.isclose(person.does(undo).delta, 0.2)
     assert person.does(undo).delta == 0.0
@@ -81,49 +83,53 @@ def test_a_drag_is_one_step_and_a_pause_begins_another():
 
 def test_drags_of_different_widgets_are_different_steps():
     person = Person(opened())
-    person.does(lambda s: s.move(x=0.5), "gizmo", after=0.01)
+    person.does(lambda s: changes.moved(s, x=0.5), "gizmo", after=0.01)
     for k in (1, 2):
-        person.does(lambda s, k=k: s.drag(replace(s.base, y=0.1 * k, spin=0.1 * k).matrix()), "gizmo", 0.01)
-    person.does(lambda s: s.turn(0.1), "inputs", after=0.01)
-    person.does(lambda s: s.choose(0.1, 0.3), "inputs", after=0.01)
+        person.does(
+            lambda s, k=k: changes.drag(s, replace(s.base, y=0.1 * k, spin=0.1 * k).matrix()), "gizmo", 0.01
+        )
+    person.does(lambda s: changes.turn(s, 0.1), "inputs", after=0.01)
+    person.does(lambda s: changes.choose(s, 0.1, 0.3), "inputs", after=0.01)
     assert len(person.state.history.past) == 3
     person.does(undo)
     person.does(undo)
     assert person.state.base.y == 0.2
-    assert person.does(undo).inputs == opened().inputs
+    assert person.does(undo).input_values == opened().input_values
 
 
 def test_what_is_computed_is_no_step_and_keeps_what_can_be_redone():
     person = Person(opened())
-    person.does(lambda s: s.turn(0.1))
+    person.does(lambda s: changes.turn(s, 0.1))
     person.does(undo)
-    person.does(lambda s: s.started(1, "map").progressed(1, 0.5).failed("no"))
+    person.does(
+        lambda s: job_changes.failed(job_changes.progressed(job_changes.started(s, 1, "map"), 1, 0.5), "no")
+    )
     assert person.state.history.past == ()
     assert person.does(redo).delta == 0.1
 
 
 def test_the_map_stays_while_poses_are_undone_and_goes_with_another_scene():
     person = Person(opened())
-    person.does(lambda s: s.move(x=0.5))
+    person.does(lambda s: changes.moved(s, x=0.5))
     shown = person.does(undo)
     assert shown.is_current  # it was never replaced
     can = load_small("soda_can")
-    person.does(lambda s: s.choose_object(can, None))
-    person.does(lambda s: s.map_arrived(1, small_map("soda_can", "pick", "panda")))
+    person.does(lambda s: changes.choose_object(s, can, None))
+    person.does(lambda s: job_changes.map_arrived(s, 1, small_map("soda_can", "pick", "panda")))
     back = person.does(undo)
     assert back.scene is shown.scene
     assert back.result is None
-    assert back.wanted == back.request
+    assert back.next_request == back.request
 
 
 def test_a_plan_comes_back_with_the_poses_it_was_made_for():
     person = Person(with_plan("pick_pour_place", "sequential"))
-    person.does(lambda s: s.show_step(2))
+    person.does(lambda s: plan_changes.show_step(s, 2))
     shown = person.state
-    person.does(lambda s: s.move(x=0.3))
+    person.does(lambda s: changes.moved(s, x=0.3))
     assert person.state.plan is None
     back = person.does(undo)
-    assert back.shown is shown.shown
+    assert back.shown_task is shown.shown_task
     assert back.is_current
     assert np.allclose(back.T_world_object, shown.T_world_object)
 
@@ -136,29 +142,31 @@ def test_an_upload_is_on_offer_where_it_is_shown():
         UploadedScene(f"{name} (upload)", replace(load_small("soda_can")))
         for name in ("a.yaml", "b.yaml", "b.yaml")
     ]
-    shown = [start, *[person.does(lambda s, new=new: s.load_scene(new)) for new in scenes]]
-    things = [replace(from_library("wine_bottle"), choice=c, measurement=object()) for c in ("1", "2", "2")]
+    shown = [start, *[person.does(lambda s, new=new: changes.open_upload(s, new)) for new in scenes]]
+    things = [replace(from_library("wine_bottle"), option=c, measurement=object()) for c in ("1", "2", "2")]
     for object_choice in things:
         scene = person.state.scene.with_object(object_choice.name, object_choice.profile)
         shown.append(
             person.does(
-                lambda s, scene=scene, object_choice=object_choice: s.choose_object(scene, object_choice)
+                lambda s, scene=scene, object_choice=object_choice: changes.choose_object(
+                    s, scene, object_choice
+                )
             )
         )
-    assert [s.own_scene for s in shown[1:4]] == [loaded.scene for loaded in scenes]
-    assert [s.uploaded for s in shown[4:]] == things
+    assert [s.shown_upload for s in shown[1:4]] == [loaded.scene for loaded in scenes]
+    assert [s.uploaded_object for s in shown[4:]] == things
     for step, states in ((undo, shown[-2::-1]), (redo, shown[1:])):
         for state in states:
             now = person.does(step)
             assert now.scene is state.scene
-            assert (now.own_scene, now.loaded) == (state.own_scene, state.loaded)
-            assert (now.object_choice, now.uploaded) == (state.object_choice, state.uploaded)
+            assert (now.shown_upload, now.uploaded_scene) == (state.shown_upload, state.uploaded_scene)
+            assert (now.object_choice, now.uploaded_object) == (state.object_choice, state.uploaded_object)
 
 
 def test_only_so_many_steps_are_kept_and_nothing_computed_with_them():
     person = Person(opened())
     for k in range(STEPS_KEPT + 5):
-        person.does(lambda s, k=k: s.turn(0.001 * k))
+        person.does(lambda s, k=k: changes.turn(s, 0.001 * k))
     past = person.state.history.past
     assert len(past) == STEPS_KEPT
     assert all(s.result is None and s.busy is None and s.history.past == () for s in past)
@@ -167,9 +175,7 @@ def test_only_so_many_steps_are_kept_and_nothing_computed_with_them():
 def with_maps_of_its_own(plan_results: PlanResults) -> PlanResults:
     """As a planner finds it when the object has been moved."""
     maps = {key: replace(result, map=replace(result.map)) for key, result in plan_results.maps.items()}
-    return replace(
-        plan_results, maps=maps, plans=tuple(replace(plan, maps=maps) for plan in plan_results.plans)
-    )
+    return replace(plan_results, maps=maps)
 
 
 def test_only_the_newest_plans_are_kept_with_their_maps():
@@ -179,17 +185,17 @@ def test_only_the_newest_plans_are_kept_with_their_maps():
     def plan(state: State) -> State:
         plan_results = with_maps_of_its_own(planned("pick_pour_place", "sequential"))
         maps.update(result.map for result in plan_results.maps.values())
-        return state.started(1, "Planning").booked(1, plan_results)
+        return plan_changes.show_results(state, plan_results)
 
     for k in range(PLANS_KEPT + 3):
         person.does(plan)
-        shown.append(person.does(lambda s: s.show_step(1)).pick)
-        person.does(lambda s, k=k: s.move(x=0.3 + 0.01 * k))
+        shown.append(person.does(lambda s: plan_changes.show_step(s, 1)).pick)
+        person.does(lambda s, k=k: changes.moved(s, x=0.3 + 0.01 * k))
     gc.collect()
     assert len(maps) == 3 * PLANS_KEPT
     for k, pick in reversed(list(enumerate(shown))):
         back = person.does(undo)
-        assert (back.plan is not None) == (back.shown is not None) == (k >= 3)
+        assert (back.plan is not None) == (back.shown_task is not None) == (k >= 3)
         assert back.pick == pick  # the grasp stays also without its plan
         person.does(undo)
         person.does(undo)
@@ -201,45 +207,47 @@ class UndoMachine(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.person = Person(opened("handover_between_robots"))
-        self.chosen, self.at = [self.person.state.inputs], 0
+        self.chosen, self.at = [self.person.state.input_values], 0
 
     def do(self, change: Callable[[State], State]) -> None:
-        before = self.person.state.inputs
+        before = self.person.state.input_values
         with suppress(InputError):
             self.person.does(change)
-        after = self.person.state.inputs
+        after = self.person.state.input_values
         if after != before:
             self.chosen[self.at + 1 :] = [after]
             self.at += 1
 
     @rule(delta=st.sampled_from([0.0, 0.4, -2.0]))
     def turn(self, delta: float) -> None:
-        self.do(lambda s: s.turn(delta))
+        self.do(lambda s: changes.turn(s, delta))
 
     @rule(x=st.sampled_from([0.4, 0.5]), lean=st.sampled_from([0.0, 0.3]))
     def move(self, x: float, lean: float) -> None:
-        self.do(lambda s: s.move(x=x, lean=lean))
+        self.do(lambda s: changes.moved(s, x=x, lean=lean))
 
     @rule(task=st.sampled_from(["pick", "hand over", "place"]))
     def choose_task(self, task: str) -> None:
-        self.do(lambda s: s.choose_task(task))
+        self.do(lambda s: changes.choose_task(s, task))
 
     @rule(arm=st.sampled_from(["left", "right"]))
     def choose_arm(self, arm: str) -> None:
-        self.do(lambda s: s.choose_arm(arm))
+        self.do(lambda s: changes.choose_arm(s, arm))
 
     @rule(h=st.sampled_from([0.05, 0.1]))
     def pick(self, h: float) -> None:
-        self.do(lambda s: s.choose(h, 0.0))
+        self.do(lambda s: changes.choose(s, h, 0.0))
 
     @rule()
     def reset(self) -> None:
-        self.do(State.reset_pose)
+        self.do(changes.reset_pose)
 
     @rule()
     def compute(self) -> None:
-        if self.person.state.wanted:
-            self.person.does(lambda s: s.started(1, "map", s.wanted).stopped(1, "no"))
+        if self.person.state.next_request:
+            self.person.does(
+                lambda s: job_changes.stopped(job_changes.started(s, 1, "map", s.next_request), 1, "no")
+            )
 
     @precondition(lambda self: self.at > 0)
     @rule()
@@ -256,7 +264,7 @@ class UndoMachine(RuleBasedStateMachine):
     @invariant()
     def the_finger_is_on_what_is_shown(self) -> None:
         state = self.person.state
-        assert state.inputs == self.chosen[self.at]
+        assert state.input_values == self.chosen[self.at]
         assert state.arm in state.scene.task(state.task).arms
         assert len(state.history.past) == self.at
         assert len(state.history.future) == len(self.chosen) - 1 - self.at

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from PIL import Image
 from trimesh import transform_points
 
-from app.compute.cache import SharedCache
 from app.compute.map_service import MapService
 from app.html.candidates import candidate_html, candidate_line, candidates_html, fates
 from app.html.map import legend_html
@@ -25,6 +24,7 @@ from app.render.cell_colors import cell_colors, coloured
 from app.render.map_picture import map_picture, picture_name
 from app.render.prints import shown_prints
 from app.scene3d.ghost import body_mesh, ghost
+from app.state import changes, job_changes
 from app.state.map_view_state import RollChoice
 from app.state.requests import CompareRequest, Comparison, ExplainRequest, ExplainResult
 from app.state.state import State
@@ -40,7 +40,7 @@ from tests.conftest import load_small
 
 @pytest.fixture(scope="module")
 def bench():
-    bench = MapService(SharedCache("bottle_on_table"))
+    bench = MapService()
     yield bench
     bench.close()
 
@@ -49,8 +49,8 @@ def quiet(share: float) -> None:
     """Progress that nobody watches."""
 
 
-def map_view(state: State, **changes: object) -> State:
-    return replace(state, map_view=replace(state.map_view, **changes))
+def with_view(state: State, **values: object) -> State:
+    return replace(state, map_view=replace(state.map_view, **values))
 
 
 def cell_with(state: State, reason: Reason) -> tuple[int, int]:
@@ -74,48 +74,50 @@ def test_all_that_is_shown_of_a_cell_belongs_to_one_roll(view):
 
 @pytest.mark.parametrize("view", ColorBy)
 def test_turning_the_object_only_rolls_any_view(view):
-    state = map_view(opened(), view=view)
+    state = with_view(opened(), view=view)
     grid = state.scene.manifold
     before = cell_colors(state, state.map)
-    turned = state.turn(3 * grid.dtheta)
+    turned = changes.turn(state, 3 * grid.dtheta)
     assert np.array_equal(cell_colors(turned, turned.map), np.roll(before, -3, axis=1))
     assert np.array_equal(cell_colors(turned, turned.result.map), before)  # the surface stays where it is
-    assert legend_html(turned.map, turned.roll, view) == legend_html(state.map, state.roll, view)
+    assert legend_html(turned.map, turned.map_view.roll, view) == legend_html(
+        state.map, state.map_view.roll, view
+    )
 
 
 def test_the_legend_of_values_is_a_scale_in_their_unit():
     state = opened()
-    html = legend_html(state.map, state.roll, ColorBy.CLEARANCE)
-    high = coloured(state.map, state.roll, ColorBy.CLEARANCE).scale.high
+    html = legend_html(state.map, state.map_view.roll, ColorBy.CLEARANCE)
+    high = coloured(state.map, state.map_view.roll, ColorBy.CLEARANCE).scale.high
     assert "clearance (mm)" in html
     assert f"<span>{high:g}</span>" in html
     assert high >= 1e3 * np.nanmax(state.map.clearance)
-    assert "scale" not in legend_html(state.map, state.roll, ColorBy.REASON)
+    assert "scale" not in legend_html(state.map, state.map_view.roll, ColorBy.REASON)
 
 
 def test_the_print_of_the_picked_grasp_lies_around_it():
     state = opened()
     row, column = cell_with(state, Reason.FEASIBLE)
-    picked = state.choose_cell(row, column)
+    picked = changes.choose_cell(state, row, column)
     assert shown_prints(picked) == []
-    assert shown_prints(map_view(state, handprint=True)) == []
-    (cells,) = shown_prints(map_view(picked, handprint=True))
+    assert shown_prints(with_view(state, handprint=True)) == []
+    (cells,) = shown_prints(with_view(picked, handprint=True))
     assert cells[row, column]
     assert 0 < cells.sum() < cells.size / 2
-    painted = cell_colors(map_view(picked, handprint=True), picked.map)
+    painted = cell_colors(with_view(picked, handprint=True), picked.map)
     assert np.array_equal((painted != cell_colors(picked, picked.map)).any(axis=-1), cells)
 
 
 @pytest.mark.parametrize("view", [ColorBy.REASON, ColorBy.CLEARANCE])
 def test_the_picture_of_the_map_is_a_file(view):
-    state = map_view(opened().turn(0.3), view=view)
+    state = with_view(changes.turn(opened(), 0.3), view=view)
     row, column = cell_with(state, Reason.FEASIBLE)
-    state = map_view(state.choose_cell(row, column), handprint=True)
+    state = with_view(changes.choose_cell(state, row, column), handprint=True)
     assert Image.open(io.BytesIO(map_picture(state, "PNG"))).width > 400
     assert ElementTree.fromstring(map_picture(state, "SVG")).tag.endswith("svg")
     assert picture_name(state, "SVG") == f"bottle_on_table_pick_panda_{view}.svg"
     with pytest.raises(SymgraspError, match="none for this pose yet"):
-        map_picture(state.move(x=0.5), "PNG")
+        map_picture(changes.moved(state, x=0.5), "PNG")
 
 
 # -- shifted against recomputed --------------------------------------------------------------
@@ -124,43 +126,43 @@ def test_the_picture_of_the_map_is_a_file(view):
 @settings(deadline=None, max_examples=20)
 @given(st.one_of(st.integers(-20, 20).map(lambda k: k * np.pi / 8), st.floats(-4, 4)))
 def test_the_recomputed_map_is_the_shifted_one(delta):
-    state = map_view(opened(), compare=True).turn(delta)
-    assert state.wanted == CompareRequest(state.request, state.delta)
-    bench = MapService(SharedCache("bottle_on_table"))
+    state = changes.turn(with_view(opened(), compare=True), delta)
+    assert state.next_request == CompareRequest(state.request, state.delta)
+    bench = MapService()
     try:
-        check = bench.check(state.wanted, state.result.map, quiet)
+        check = bench.compare(state.next_request, state.result.map, quiet)
     finally:
         bench.close()
     assert check.differing == 0
     assert np.array_equal(check.map.reason, state.map.reason)
     assert np.array_equal(check.map.manifold.theta, state.map.manifold.theta)
     assert np.allclose(check.map.T_world_object, state.map.T_world_object)
-    checked = state.started(1, "", state.wanted).found(1, check)
-    assert checked.wanted is None
+    checked = job_changes.result_arrived(job_changes.started(state, 1, "", state.next_request), 1, check)
+    assert checked.next_request is None
     assert f"{np.rad2deg(delta):.2f}°: <b>0 of {check.map.reason.size} cells differ" in check_html(checked)
 
 
 def test_the_comparison_counts_what_differs(bench):
-    state = map_view(opened(), compare=True).turn(0.4)
+    state = changes.turn(with_view(opened(), compare=True), 0.4)
     keep = np.ones(state.map.reason.shape, dtype=bool)
     keep[tuple(np.argwhere(state.result.map.feasible)[0])] = False
     wrong = state.result.map.masked(keep)
-    assert bench.check(state.wanted, wrong, quiet).differing == 1
+    assert bench.check(state.next_request, wrong, quiet).differing == 1
 
 
 def test_the_comparison_follows_the_slider():
-    state = map_view(opened(), compare=True)
-    first = state.started(1, "", state.wanted)
-    turned = first.turn(0.5)
-    assert turned.wanted is None  # finished first: the slider would interrupt it for ever
+    state = with_view(opened(), compare=True)
+    first = job_changes.started(state, 1, "", state.next_request)
+    turned = changes.turn(first, 0.5)
+    assert turned.next_request is None  # finished first: the slider would interrupt it for ever
     check = CompareRequest(state.request, 0.0)
-    arrived = turned.found(1, compute_nothing(check, state))
-    assert arrived.map_view.check.request == check
-    assert arrived.wanted == CompareRequest(state.request, 0.5)
-    moved = first.move(x=0.5)
-    assert moved.wanted == moved.request  # a new map goes first
-    late = first.progressed(1, 0.1, late=True).turn(0.5)
-    assert late.wanted == CompareRequest(state.request, 0.5)
+    arrived = job_changes.result_arrived(turned, 1, compute_nothing(check, state))
+    assert arrived.map_view.comparison.request == check
+    assert arrived.next_request == CompareRequest(state.request, 0.5)
+    moved = changes.moved(first, x=0.5)
+    assert moved.next_request == moved.request  # a new map goes first
+    late = changes.turn(job_changes.progressed(first, 1, 0.1, late=True), 0.5)
+    assert late.next_request == CompareRequest(state.request, 0.5)
 
 
 def compute_nothing(request: CompareRequest, state: State) -> Comparison:
@@ -168,38 +170,44 @@ def compute_nothing(request: CompareRequest, state: State) -> Comparison:
 
 
 def test_no_comparison_unless_asked_for():
-    state = opened().turn(0.3)
-    assert state.wanted is None
-    compared = map_view(state, compare=True)
-    got = compared.started(1, "", compared.wanted).found(1, compute_nothing(compared.wanted, state))
-    off = replace(got, map_view=got.map_view.choose_compare(False))
-    assert off.map_view.check is None
-    assert off.wanted is None
+    state = changes.turn(opened(), 0.3)
+    assert state.next_request is None
+    compared = with_view(state, compare=True)
+    got = job_changes.result_arrived(
+        job_changes.started(compared, 1, "", compared.next_request),
+        1,
+        compute_nothing(compared.next_request, state),
+    )
+    off = replace(got, map_view=got.map_view.with_compare(False))
+    assert off.map_view.comparison is None
+    assert off.next_request is None
 
 
 def test_a_stopped_comparison_stays_stopped_until_something_else_is_asked():
-    state = map_view(opened(), compare=True)
-    stopped = state.started(1, "", state.wanted).stopped(1)
-    assert stopped.wanted is None
-    assert stopped.retry().wanted == CompareRequest(state.request, 0.0)
-    assert stopped.turn(0.1).wanted == CompareRequest(state.request, 0.1)
+    state = with_view(opened(), compare=True)
+    stopped = job_changes.stopped(job_changes.started(state, 1, "", state.next_request), 1)
+    assert stopped.next_request is None
+    assert job_changes.retried(stopped).next_request == CompareRequest(state.request, 0.0)
+    assert changes.turn(stopped, 0.1).next_request == CompareRequest(state.request, 0.1)
 
 
 # -- candidates -----------------------------------------------------------------------------
 
 
 def explained(bench: MapService, state: State) -> State:
-    request = state.wanted
+    request = state.next_request
     assert isinstance(request, ExplainRequest)
-    return state.started(1, "", request).found(1, bench.explain(request, quiet))
+    return job_changes.result_arrived(
+        job_changes.started(state, 1, "", request), 1, bench.explain(request, quiet)
+    )
 
 
 @pytest.mark.parametrize("delta", [0.0, 0.3, np.pi / 8])
 @pytest.mark.parametrize("reason", [Reason.FEASIBLE, Reason.SCENE_COLLISION, Reason.UNREACHABLE])
 def test_the_candidates_are_those_of_the_picked_cell(bench, reason, delta):
-    state = opened().turn(delta)
-    state = explained(bench, state.choose_cell(*cell_with(state, reason)))
-    assert state.wanted is None
+    state = changes.turn(opened(), delta)
+    state = explained(bench, changes.choose_cell(state, *cell_with(state, reason)))
+    assert state.next_request is None
     assert state.explanation.reason == reason == state.map.reason[state.cell]
     tools = state.map.manifold.tool_poses(state.T_world_object, state.scene.arm().hand.finger_depth)
     assert np.allclose(state.explanation.T_world_tool, tools[state.cell], atol=1e-8)
@@ -215,26 +223,35 @@ def test_the_candidates_are_those_of_the_picked_cell(bench, reason, delta):
 
 def test_candidates_are_stepped_through_and_forgotten_with_the_cell(bench):
     state = opened()
-    state = explained(bench, state.choose_cell(*cell_with(state, Reason.FEASIBLE)))
+    state = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE)))
     last = len(state.explanation.candidates) - 1
-    assert state.choose_candidate(last).shown_candidate is state.explanation.candidates[-1]
-    assert state.choose_candidate(last + 5).candidate == last
-    assert state.choose_candidate(-1).candidate == 0
-    other = state.choose_candidate(last).choose_cell(*cell_with(state, Reason.SCENE_COLLISION))
+    assert changes.choose_candidate(state, last).shown_candidate is state.explanation.candidates[-1]
+    assert changes.choose_candidate(state, last + 5).candidate == last
+    assert changes.choose_candidate(state, -1).candidate == 0
+    other = changes.choose_cell(
+        changes.choose_candidate(state, last), *cell_with(state, Reason.SCENE_COLLISION)
+    )
     assert (other.explanation, other.candidate) == (None, None)
-    assert state.move(x=0.5).explanation is None
-    assert state.clear_pick().explanation is None
-    assert opened().choose_candidate(3).candidate is None
+    assert changes.moved(state, x=0.5).explanation is None
+    assert changes.clear_pick(state).explanation is None
+    assert changes.choose_candidate(opened(), 3).candidate is None
 
 
 def test_an_answer_about_another_cell_does_not_count(bench):
     state = opened()
-    first = state.choose_cell(*cell_with(state, Reason.FEASIBLE))
-    second = first.started(1, "", first.wanted).choose_cell(*cell_with(state, Reason.SCENE_COLLISION))
-    assert second.wanted == ExplainRequest(state.request, second.base_cell)  # takes its place at once
+    first = changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE))
+    second = changes.choose_cell(
+        job_changes.started(first, 1, "", first.next_request), *cell_with(state, Reason.SCENE_COLLISION)
+    )
+    assert second.next_request == ExplainRequest(state.request, second.base_cell)  # takes its place at once
     answer = ExplainResult(ExplainRequest(state.request, Cell(0, 0, 0)), None)
-    assert second.started(2, "", second.wanted).found(1, answer).map_view.explained is None
-    assert second.found(1, answer).explanation is None
+    assert (
+        job_changes.result_arrived(
+            job_changes.started(second, 2, "", second.next_request), 1, answer
+        ).map_view.explained
+        is None
+    )
+    assert job_changes.result_arrived(second, 1, answer).explanation is None
 
 
 # -- the ghost arm --------------------------------------------------------------------------
@@ -242,12 +259,12 @@ def test_an_answer_about_another_cell_does_not_count(bench):
 
 def test_a_failing_candidate_is_a_ghost_and_a_feasible_one_the_arm(bench):
     state = opened()
-    picked = state.choose_cell(*cell_with(state, Reason.FEASIBLE))
+    picked = changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE))
     assert ghost(picked) is None  # nothing is known yet
     held = explained(bench, picked)
     arm = state.scene.arm()
     for k, shown_candidate in enumerate(held.explanation.candidates):
-        shown = held.choose_candidate(k)
+        shown = changes.choose_candidate(held, k)
         at = arm.robot_values(shown_candidate.ended, held.explanation.opening)
         if shown_candidate.reason == Reason.FEASIBLE:
             assert ghost(shown) is None
@@ -262,7 +279,7 @@ def test_a_failing_candidate_is_a_ghost_and_a_feasible_one_the_arm(bench):
 
 def test_the_ghost_shows_what_collides(bench):
     state = opened()
-    hit = explained(bench, state.choose_cell(*cell_with(state, Reason.SCENE_COLLISION)))
+    hit = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
     found = ghost(hit)
     pairs = {(c.a, c.b) for c in hit.explanation.best.collisions}
     assert pairs
@@ -270,7 +287,7 @@ def test_the_ghost_shows_what_collides(bench):
     assert found.links() == {body.link for body in found.hits if body.body == "panda"}
     assert {body.body for body in found.others()} <= {o.name for o in state.scene.obstacles}
     assert found.others()
-    far = explained(bench, state.choose_cell(*cell_with(state, Reason.UNREACHABLE)))
+    far = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.UNREACHABLE)))
     assert ghost(far) is None
     assert "Out of reach" in candidates_html(far)
 
@@ -304,7 +321,7 @@ def bounds(points: np.ndarray) -> np.ndarray:
 
 def test_the_candidates_are_drawn_by_redundancy_and_branch(bench):
     state = opened()
-    hit = explained(bench, state.choose_cell(*cell_with(state, Reason.SCENE_COLLISION)))
+    hit = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
     cells = fates(hit.explanation)
     assert cells.shape[1] == len(hit.explanation.phi)
     best = {}
@@ -316,17 +333,17 @@ def test_the_candidates_are_drawn_by_redundancy_and_branch(bench):
     assert html.count("sg-ring") == 1
     assert candidate_line(hit.shown_candidate) in candidate_html(hit)
     assert "The best of" in grasp_html(hit)
-    assert "One of" in grasp_html(hit.choose_candidate(1))
+    assert "One of" in grasp_html(changes.choose_candidate(hit, 1))
 
 
 def test_names_in_verdicts_are_escaped(bench):
     state = opened()
-    hit = explained(bench, state.choose_cell(*cell_with(state, Reason.SCENE_COLLISION)))
+    hit = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
     evil = Body("<img src=x>", "<b>")
     shown_candidate = hit.shown_candidate
     collisions = tuple(c._replace(a=evil) for c in shown_candidate.collisions)
     first = replace(shown_candidate, collisions=collisions)
     explanation = replace(hit.explanation, candidates=(first, *hit.explanation.candidates[1:]))
-    hostile = map_view(hit, explained=replace(hit.map_view.explained, explanation=explanation))
+    hostile = with_view(hit, explained=replace(hit.map_view.explained, explanation=explanation))
     assert "<img src=x>" not in candidate_html(hostile)
     assert "&lt;img src=x&gt;" in candidate_html(hostile)

@@ -35,7 +35,7 @@ def scratch(tmp_path, monkeypatch) -> Path:
 @pytest.mark.parametrize("unit", UNITS)
 def test_a_mesh_is_measured_in_its_unit_and_leaves_no_file(unit, scratch):
     object_choice = from_mesh("my bottle.STL", stl(1 / UNITS[unit]), UNITS[unit])
-    assert (object_choice.name, object_choice.choice) == ("my bottle", "my bottle.STL (upload)")
+    assert (object_choice.name, object_choice.option) == ("my bottle", "my bottle.STL (upload)")
     h = np.linspace(0.01, BOTTLE.h_max - 0.01, 50)
     assert np.allclose(object_choice.profile.radius(h), BOTTLE.radius(h), atol=4e-4)
     assert object_choice.measurement is not None

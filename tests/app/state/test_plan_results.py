@@ -12,20 +12,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.compute import plan_service as plan_bench
+from app.compute import plan_service
 from app.compute.cache import SharedCache
 from app.compute.map_service import MapService
 from app.compute.plan_service import PLAN_LIMIT, PlanRequest, PlanService
 from app.html.readout import joint_values
+from app.render.playback import drawn_object_pose, playback_frame
 from app.render.prints import shown_prints
+from app.server.plan_actions import opened as plan_opened
+from app.state import changes, job_changes, plan_changes
 from app.state.plan_results import PlanResults
 from app.state.state import State
 from app.state.task_list import TaskList
 from symgrasp.errors import InputError, PlanError, SceneError, SymgraspError
+from symgrasp.files import SCENES_DIR
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.poses import pose_error
 from symgrasp.scene.scene import Scene
-from tests.app.state.test_state import opened, planned, small_map, with_plan
+from tests.app.state.test_state import opened, planned, results_of, small_map, with_plan
 from tests.conftest import load_small
 
 
@@ -35,51 +39,55 @@ def quiet(share: float) -> None:
 
 @pytest.fixture
 def plans():
-    bench = MapService(SharedCache("bottle_on_table"))
-    plans = PlanService(bench)
+    maps = MapService()
+    plans = PlanService(maps, (SCENES_DIR,))
     yield plans
     plans.close()
-    bench.close()
+    maps.close()
 
 
 # -- the tasks ------------------------------------------------------------------------------
 
 
 def test_the_objects_pose_becomes_a_task_whose_map_is_known():
-    state = opened().move(x=0.5).turn(0.3)
-    state = state.map_arrived(0, small_map("bottle_on_table", "pick", "panda", state.request.pose))
-    added = state.add_task()
+    state = changes.turn(changes.moved(opened(), x=0.5), 0.3)
+    state = job_changes.map_arrived(
+        state, 0, small_map("bottle_on_table", "pick", "panda", state.request.pose)
+    )
+    added = changes.add_task(state)
     assert list(added.scene.tasks) == ["pick", "task 2"]
     assert (added.task, added.arm, added.delta) == ("task 2", "panda", 0.3)
     assert np.allclose(added.T_world_object, state.T_world_object)
     assert added.scene.task("task 2").arms == ("panda",)
-    store = SharedCache("bottle_on_table")
-    store.keep(state.result)
-    known = store.map(added.request)
+    cache = SharedCache("bottle_on_table")
+    cache.keep(state.result)
+    known = cache.map(added.request)
     assert np.array_equal(known.map.reason, state.result.map.reason)
     assert (known.map.task, known.request) == ("task 2", added.request)
-    assert added.map_arrived(0, known).is_current
+    assert job_changes.map_arrived(added, 0, known).is_current
 
 
 def test_a_move_that_was_for_a_new_task_leaves_the_chosen_one_as_it_was_chosen():
     """Also where it had been moved to before."""
-    state = opened("pick_pour_place").choose_task("place").move(x=0.45).choose_task("pick")
-    state = state.choose_task("place").move(x=0.4).add_task()
+    state = changes.choose_task(
+        changes.moved(changes.choose_task(opened("pick_pour_place"), "place"), x=0.45), "pick"
+    )
+    state = changes.add_task(changes.moved(changes.choose_task(state, "place"), x=0.4))
     assert state.poses["place"].x == 0.45
     assert state.T_world_object[0, 3] == pytest.approx(0.4)
-    fresh = opened("pick_pour_place").move(x=0.4).add_task()
+    fresh = changes.add_task(changes.moved(opened("pick_pour_place"), x=0.4))
     assert "pick" not in fresh.poses
     assert fresh.T_world_object[0, 3] == pytest.approx(0.4)
 
 
 def test_a_wrong_name_is_told_without_the_file_that_the_tasks_came_from():
     with pytest.raises(InputError, match=r"^tasks: .*'pour': expected"):
-        opened("pick_pour_place").change_tasks(lambda tasks: tasks.renamed("pour"))
+        changes.change_tasks(opened("pick_pour_place"), lambda tasks: tasks.renamed("pour"))
 
 
 def test_the_maps_of_the_other_tasks_outlive_a_change_of_the_list():
     state = opened("pick_pour_place")
-    changed = state.change_tasks(lambda tasks: tasks.shifted(1))
+    changed = changes.change_tasks(state, lambda tasks: tasks.shifted(1))
     assert list(changed.scene.tasks) == ["pour", "pick", "place"]
     assert changed.scene is not state.scene
     assert changed.is_current
@@ -88,13 +96,14 @@ def test_the_maps_of_the_other_tasks_outlive_a_change_of_the_list():
 
 NAMES = st.sampled_from(["pick", "pour", "a", " b ", "", "x" * 101])
 EDITS = st.one_of(
-    st.builds(lambda by: lambda s: s.change_tasks(lambda t: t.shifted(by)), st.integers(-4, 4)),
-    st.builds(lambda name: lambda s: s.change_tasks(lambda t: t.renamed(name)), NAMES),
+    st.builds(lambda by: lambda s: changes.change_tasks(s, lambda t: t.shifted(by)), st.integers(-4, 4)),
+    st.builds(lambda name: lambda s: changes.change_tasks(s, lambda t: t.renamed(name)), NAMES),
     st.builds(
-        lambda k: lambda s: s.choose_task(list(s.scene.tasks)[k % len(s.scene.tasks)]), st.integers(0, 9)
+        lambda k: lambda s: changes.choose_task(s, list(s.scene.tasks)[k % len(s.scene.tasks)]),
+        st.integers(0, 9),
     ),
-    st.builds(lambda x: lambda s: s.move(x=x), st.sampled_from([0.4, 0.5])),
-    st.sampled_from([State.add_task, lambda s: s.change_tasks(TaskList.removed)]),
+    st.builds(lambda x: lambda s: changes.moved(s, x=x), st.sampled_from([0.4, 0.5])),
+    st.sampled_from([changes.add_task, lambda s: changes.change_tasks(s, TaskList.removed)]),
 )
 
 
@@ -137,13 +146,15 @@ def at(state: State, task: str) -> np.ndarray:
 def test_a_plan_for_other_tasks_is_dropped():
     state = with_plan("pick_pour_place", "sequential")
     for change in (TaskList.removed, lambda t: t.shifted(-1) if t.task != "pick" else t.shifted(1)):
-        changed = state.change_tasks(change)
+        changed = changes.change_tasks(state, change)
         assert changed.plan is None
         assert changed.step is None
-        assert changed.started(2, "Planning").change_tasks(TaskList.removed).busy is None
-    assert state.change_tasks(lambda t: t.renamed(t.task)) is state
+        assert (
+            changes.change_tasks(job_changes.started(changed, 2, "Planning"), TaskList.removed).busy is None
+        )
+    assert changes.change_tasks(state, lambda t: t.renamed(t.task)) is state
     with pytest.raises(SymgraspError, match="another task that stays"):
-        opened().change_tasks(TaskList.removed)
+        changes.change_tasks(opened(), TaskList.removed)
 
 
 # -- the play -------------------------------------------------------------------------------
@@ -152,91 +163,98 @@ def test_a_plan_for_other_tasks_is_dropped():
 @settings(deadline=None, max_examples=40)
 @given(st.floats(0, 2))
 def test_while_the_arms_are_played_the_object_stays_in_the_hand(position):
-    state = with_plan("pick_pour_place", "sequential").show_position(position)
+    state = plan_changes.show_position(with_plan("pick_pour_place", "sequential"), position)
     step = min(int(position + 0.5), 2)
     assert (state.step, state.task) == (step, ["pick", "pour", "place"][step])
-    hold = state.shown.holds[0]
+    hold = state.shown_task.holds[0]
     arm = state.scene.arm("panda")
     names = arm.robot.model.joint_names
     values = joint_values(state)["panda"]
     q = np.array([values[names.index(name)] for name in arm.joint_names])
     assert np.all(arm.lower <= q)
     assert np.all(q <= arm.upper)
-    in_hand = np.linalg.inv(arm.world_tool_pose(q)) @ state.T_world_seen
-    held = np.linalg.inv(hold.tool_pose.array()) @ state.shown.object_pose_turned.array()
+    in_hand = np.linalg.inv(arm.world_tool_pose(q)) @ drawn_object_pose(state)
+    held = np.linalg.inv(hold.tool_pose.array()) @ state.shown_task.object_pose_turned.array()
     assert np.allclose(in_hand, held, atol=1e-5)
 
 
 def test_the_play_passes_the_tasks_in_order_and_stops_at_the_end():
-    state = with_plan("pick_pour_place", "sequential").play_arms()
+    state = plan_changes.play_arms(with_plan("pick_pour_place", "sequential"))
     seen, positions = [], []
-    while state.plan_results.moving:
-        state = state.played(0.1)
+    while state.plan_results.playing:
+        state = plan_changes.played(state, 0.1)
         seen.append(state.task)
         positions.append(state.plan_results.position)
     assert list(dict.fromkeys(seen)) == ["pick", "pour", "place"]
     assert np.all(np.diff(positions) > 0)
     assert positions[-1] == 2
-    assert not state.motion
-    assert np.allclose(state.T_world_seen, state.T_world_object)
-    again = state.play_arms()
-    assert (again.plan_results.moving, again.plan_results.position, again.step) == ("arms", 0.0, 0)
-    assert not again.play_arms().plan_results.moving
+    assert not playback_frame(state)
+    assert np.allclose(drawn_object_pose(state), state.T_world_object)
+    again = plan_changes.play_arms(state)
+    assert (again.plan_results.playing, again.plan_results.position, again.step) == ("arms", 0.0, 0)
+    assert not plan_changes.play_arms(again).plan_results.playing
 
 
 def test_whoever_moves_on_stops_the_play():
-    playing = with_plan("pick_pour_place", "sequential").play_arms().played(0.3)
-    assert playing.motion
-    for move_on in (lambda s: s.turn(0.1), lambda s: s.choose(0.1, 0.0), lambda s: s.choose_task("place")):
+    playing = plan_changes.played(plan_changes.play_arms(with_plan("pick_pour_place", "sequential")), 0.3)
+    assert playback_frame(playing)
+    for move_on in (
+        lambda s: changes.turn(s, 0.1),
+        lambda s: changes.choose(s, 0.1, 0.0),
+        lambda s: changes.choose_task(s, "place"),
+    ):
         state = move_on(playing)
-        assert state.motion is None
-        stopped = state.played(0.1)
-        assert not stopped.plan_results.moving
+        assert playback_frame(state) is None
+        stopped = plan_changes.played(state, 0.1)
+        assert not stopped.plan_results.playing
         assert (stopped.task, stopped.delta, stopped.pick) == (state.task, state.delta, state.pick)
 
 
 def test_a_plan_of_one_task_has_nothing_to_play():
     state = with_plan("bottle_on_table", "sequential")
-    assert state.play_arms().plan_results.moving == ""
-    assert state.show_position(math.nan).step == 0
+    assert plan_changes.play_arms(state).plan_results.playing == ""
+    assert plan_changes.show_position(state, math.nan).step == 0
 
 
 # -- the list of plans ----------------------------------------------------------------------
 
 
 def test_all_solutions_are_listed_part_by_part_each_once(plans, monkeypatch):
-    monkeypatch.setattr(plan_bench, "LISTED", 3)
+    monkeypatch.setattr(plan_service, "LISTED", 3)
     scene = load_small("pick_pour_place", heights=24)
-    plan_results = plans.run(PlanRequest(scene, "sequential", "best", "panda"), PlanResults(), quiet)
+    request, service = PlanRequest(scene, "sequential", "best", "panda"), MapService()
+    maps, _ = service.maps(request.maps, {}, quiet)
+    service.close()
+    plan_results = plans.plan(request, maps, quiet).added_to(PlanResults(), maps)
     assert (len(plan_results.plans), plan_results.more) == (3, True)
-    state = State.of(scene, "").started(1, "").booked(1, plan_results)
+    state = plan_changes.show_results(State.of(scene, ""), plan_results)
     while state.plan_results.more:
         count = len(state.plan_results.plans)
-        state = state.started(2, "").listed(2, *plans.more(state.plan_results.maps, quiet))
-        assert state.plan_results.page in (count, count - 1)
+        state = plan_changes.more_listed(state, *plans.more(quiet))
+        assert state.plan_results.index in (count, count - 1)
     grasps = [
         (p.plan.tasks[0].holds[0].grasp.h, p.plan.tasks[0].holds[0].grasp.roll)
         for p in state.plan_results.plans
     ]
     allowed = np.logical_and.reduce([r.map.feasible.any(axis=2) for r in state.plan_results.maps.values()])
     assert len(grasps) == len(set(grasps)) == allowed.sum()
-    first = state.choose_plan(0)
+    first = plan_changes.choose_plan(state, 0)
     assert first.plan is plan_results.plans[0]
     assert (first.pick.h, first.step) == (grasps[0][0], 0)
 
 
 def test_no_common_grasp_is_told_with_what_would_help(plans):
     scene = load_small("pick_pour_place")
-    state = State.of(scene, "").choose_task("pour").move(z=1.2)
+    state = changes.moved(changes.choose_task(State.of(scene, ""), "pour"), z=1.2)
     order = PlanRequest(scene, "sequential", "best", "panda", state.poses)
-    plan_results = plans.run(order, PlanResults(), quiet)
+    plan_results = results_of(order)
     assert plan_results.plan is None
     assert plan_results.refusal.conflict.exclusions[0].tasks == ("pour",)
     assert set(plan_results.maps) == {(task, "panda") for task in scene.tasks}
-    shown = state.started(1, "").booked(1, plan_results)
+    shown = plan_changes.show_results(state, plan_results)
     assert shown.task == "pour"
     assert shown.problem == ""
-    assert shown.move(x=0.5).plan_results.refusal is None
+    assert changes.moved(shown, x=0.5).plan_results.refusal is None
 
 
 # -- climbing -------------------------------------------------------------------------------
@@ -249,16 +267,16 @@ def test_a_climb_is_replayed_with_both_hands_on_the_maps():
     exact, climbed = climb.exact.gaps[0], climb.found.gaps[0]
     assert exact is not None and climbed is not None
     assert exact >= climbed
-    state = state.play_climb()
+    state = plan_changes.play_climb(state)
     frames = [state.plan_results.frame]
-    while state.plan_results.moving:
-        state = state.played(0.1)
+    while state.plan_results.playing:
+        state = plan_changes.played(state, 0.1)
         frames.append(state.plan_results.frame)
     assert frames == sorted(set(frames)) or len(climb.steps) == 1
     assert frames[-1] == len(climb.steps) - 1
     assert climb.steps[-1].collisions == 0
     for frame, step in enumerate(climb.steps):
-        shown = state.show_frame(frame)
+        shown = plan_changes.show_frame(state, frame)
         left, right = shown_prints(shown)
         assert (left & right).sum() <= step.collisions  # prints go on beyond the object's ends
         values = joint_values(shown)
@@ -266,8 +284,8 @@ def test_a_climb_is_replayed_with_both_hands_on_the_maps():
             arm = shown.scene.arm(name)
             witness = shown.plan_results.maps["lift", name].map.witness(cell)
             assert np.array_equal(values[arm.robot.name], arm.robot_values(witness.q, witness.opening))
-    assert state.turn(0.1).climbed is None
-    assert state.show_step(0).climbed is None
+    assert changes.turn(state, 0.1).climb_step is None
+    assert plan_changes.show_step(state, 0).climb_step is None
 
 
 def test_the_gap_that_is_shown_is_that_of_the_planner():
@@ -296,11 +314,11 @@ def test_a_plan_from_a_file_brings_its_scene(plans, name, kind):
     found = plans.open(plan.to_json().encode(), "a.json", quiet)
     assert found.report.failures == ()
     assert found.report.checks > 10
-    state = opened("soda_can").opened(found.report, found.scene, found.plan)
+    state = plan_opened(opened("soda_can"), found, planned(name, kind).maps)
     assert (state.scene_name, state.scene.name) == ("a.json (upload)", name)
     assert state.plan.plan == plan
     assert state.is_current
-    assert state.shown == plan.tasks[0]
+    assert state.shown_task == plan.tasks[0]
     assert np.allclose(state.T_world_object, plan.tasks[0].object_pose_turned.array())
 
 
@@ -311,7 +329,7 @@ def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans)
     assert found.plan is None
     assert any("10.0" in failure or "0.01" in failure for failure in found.report.failures)
     before = with_plan("soda_can", "sequential")
-    state = before.opened(found.report, found.scene, found.plan)
+    state = plan_opened(before, found, {})
     assert state.scene is before.scene
     assert state.plan is before.plan
     assert state.plan_results.opened is found.report

@@ -1,0 +1,25 @@
+"""The grasps that are marked on pictures of a map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.state.state import State
+
+__all__ = ["Mark", "marks_of"]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A grasp drawn on a map: h (m), θ (rad), and what to call it."""
+
+    h: float
+    theta: float
+    label: str = ""
+
+
+def marks_of(state: State) -> list[Mark]:
+    """Return the grasps that are marked on the map: all of a plan's task, or the picked one."""
+    if state.shown_task and len(state.shown_task.holds) > 1:
+        return [Mark(hold.grasp.h, hold.grasp.theta, hold.arm) for hold in state.shown_task.holds]
+    return [Mark(state.pick.h, state.pick.theta)] if state.pick else []

@@ -1,0 +1,204 @@
+"""What widgets ask for besides plans: scenes, objects, hands, files, links."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+
+import viser
+
+from app.compute.cache import SharedCache
+from app.compute.compute_process import ComputeProcess
+from app.files.links import link_of
+from app.files.scene_files import read_scene, scene_yaml
+from app.render.map_picture import map_picture, picture_name
+from app.scene3d.visual_meshes import check_visuals
+from app.server.plan_actions import PlanActions
+from app.server.session_api import SessionApi
+from app.server.snapshot import snapshot_html
+from app.state import changes, job_changes
+from app.state.object_choice import OWN, ObjectChoice, check_size, from_library, from_mesh
+from app.state.page_link import Camera
+from app.state.state import State
+from app.state.uploaded_scene import UploadedScene
+from symgrasp.errors import SymgraspError
+from symgrasp.progress import Progress
+from symgrasp.scene.scene import Scene
+
+__all__ = ["Actions", "camera_of"]
+
+SceneWithObject = tuple[Scene, ObjectChoice | None]
+
+
+class Actions:
+    """What the widgets of one browser ask for; see `app.panels.actions.Actions`.
+
+    Args:
+        session: the browser's session.
+        client: the browser.
+        cache: what all sessions share.
+        process: computes for this one.
+        address: where the page was opened, without the query.
+    """
+
+    def __init__(
+        self,
+        session: SessionApi,
+        client: viser.ClientHandle,
+        cache: SharedCache,
+        process: ComputeProcess,
+        address: str,
+    ) -> None:
+        self._session, self._client, self._cache = session, client, cache
+        self._process, self._address = process, address
+        self.plans = PlanActions(session, process, cache)
+        self.change = session.change
+
+    # -- scene, object, hand ----------------------------------------------------------------
+
+    def open_scene(self, name: str) -> None:
+        """Load a scene by name, or show the uploaded one again."""
+        state = self._session.state
+        uploaded = state.uploaded_scene if state else None
+        known = uploaded.scene if uploaded and uploaded.option == name else None
+        self._session.submit(
+            f"Loading {name}",
+            lambda _: known or self._cache.scene(name),
+            lambda state, scene: changes.open_scene(state, scene, name),
+        )
+
+    def load_scene(self, name: str, content: bytes) -> None:
+        """Read an uploaded scene and show it."""
+
+        def run(progress: Progress) -> UploadedScene:
+            uploaded = read_scene(name, content, self._cache.folders)
+            self._process.check_tasks(uploaded.scene, progress)
+            check_visuals(uploaded.scene)
+            return uploaded
+
+        self._session.submit(f"Opening {name}", run, changes.open_upload)
+
+    def choose_object(self, option: str) -> None:
+        """Put another object into the scene."""
+        if state := self._session.state:
+            self._change_object(f"Loading {option}", partial(self._with_option, state, option))
+
+    def upload(self, name: str, content: bytes, scale: float) -> None:
+        """Measure a mesh and put the object into the scene."""
+        state = self._session.state
+        if state is None:
+            return
+        try:
+            check_size(name, content)
+        except SymgraspError as error:
+            self._fail(error)
+            return
+        self._change_object(f"Measuring {name}", lambda: _with_object(state, from_mesh(name, content, scale)))
+
+    def choose_hand(self, hand: str) -> None:
+        """Mount another hand on the chosen arm."""
+        state = self._session.state
+        if state is None:
+            return
+
+        def run() -> SceneWithObject:
+            scene = state.scene.with_hand(state.arm, hand)
+            check_visuals(scene)
+            return scene, state.object_choice
+
+        self._change_object(f"Mounting {hand}", run)
+
+    def _change_object(self, label: str, run: Callable[[], SceneWithObject]) -> None:
+        self._session.submit(
+            label, lambda _: run(), lambda state, found: changes.choose_object(state, *found)
+        )
+
+    def _with_option(self, state: State, option: str) -> SceneWithObject:
+        """Return the scene with its own object, the uploaded one, or one of the library."""
+        if option == OWN:
+            opened = self._as_opened(state)
+            return state.scene.with_object(opened.file.object.name, opened.profile), None
+        uploaded = state.uploaded_object
+        if uploaded and option == uploaded.option:
+            return _with_object(state, uploaded)
+        shared = None if state.shown_upload else self._cache.scene_with(state.scene_name, option)[1]
+        return _with_object(state, shared or from_library(option))
+
+    def _as_opened(self, state: State) -> Scene:
+        """Return the scene as it was opened, without what became of its object, hands and tasks since."""
+        return state.shown_upload or self._cache.scene(state.scene_name)
+
+    # -- computing --------------------------------------------------------------------------
+
+    def stop_or_retry(self) -> None:
+        """Stop the computation, the picture stays as it is; or begin again what was stopped."""
+
+        def stop_or_retry(state: State) -> State:
+            if state.busy:
+                return job_changes.stopped(state, state.busy.job_id)
+            return job_changes.retried(state)
+
+        self.change(stop_or_retry)
+
+    # -- files ------------------------------------------------------------------------------
+
+    def save_map(self, kind: str) -> None:
+        """Send the map as it is shown to the browser; see `app.render.map_picture.FORMATS`."""
+        state = self._session.state
+        if state is None:
+            return
+        try:
+            content = map_picture(state, kind)
+        except SymgraspError as error:
+            self._fail(error)
+            return
+        self._session.send(picture_name(state, kind), content)
+
+    def save_scene(self) -> None:
+        """Send the scene, as it was changed, to the browser."""
+        if state := self._session.state:
+            scene = state.moved_scene()
+            self._session.send(_file_name(scene.name, ".yaml"), scene_yaml(scene).encode())
+
+    def make_link(self) -> None:
+        """Put what is shown into an address."""
+
+        def make(state: State) -> State:
+            camera = camera_of(self._client)
+            address = f"{self._address}?{link_of(state, self._as_opened(state), camera)}"
+            return changes.linked(state, address, camera)
+
+        self.change(make)
+
+    def save_view(self) -> None:
+        """Draw the 3D view into a file, and send it to the browser."""
+        state = self._session.state
+        if state is None:
+            return
+        camera, fov = camera_of(self._client), self._client.camera.fov
+
+        def run(_: Progress) -> None:
+            html = snapshot_html(state, camera, fov)
+            self._session.send(_file_name(state.scene.name, ".html"), html.encode())
+
+        self._session.submit("Drawing the 3D view", run, lambda state, _: state)
+
+    def _fail(self, error: SymgraspError) -> None:
+        problem = str(error)
+        self.change(lambda state: job_changes.failed(state, problem))
+
+
+def camera_of(client: viser.ClientHandle) -> Camera:
+    """Return where a browser's camera stands and the point it looks at."""
+    camera = client.camera
+    return tuple(float(v) for v in (*camera.position, *camera.look_at))
+
+
+def _with_object(state: State, choice: ObjectChoice) -> SceneWithObject:
+    """Return the scene with an object in place of its own."""
+    return state.scene.with_object(choice.name, choice.profile), choice
+
+
+def _file_name(name: str, ending: str) -> str:
+    return re.sub(r"\W+", "_", name) + ending

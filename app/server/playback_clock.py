@@ -1,0 +1,40 @@
+"""When the playback of a page goes on, and by how much."""
+
+from __future__ import annotations
+
+from app.state.plan_changes import played
+from app.state.state import State
+
+__all__ = ["PlaybackClock"]
+
+INTERVAL = 0.05
+"""Time (s) between two pictures of what is played."""
+
+
+class PlaybackClock:
+    """Advances the playback of one session; not thread-safe, the session's lock guards it."""
+
+    def __init__(self) -> None:
+        self._last: float | None = None
+
+    def wait(self, state: State | None, now: float) -> float | None:
+        """Return how long (s) until the playback goes on, None while nothing is played.
+
+        Args:
+            state: what is shown.
+            now: the time (s), from any beginning.
+        """
+        if state is None or not state.plan_results.playing:
+            return None
+        return max(0.0, INTERVAL - (now - self._last)) if self._last is not None else 0.0
+
+    def advanced(self, state: State, now: float) -> State:
+        """Return the state with its playback where it is at a time (s), if it is due to go on."""
+        if not state.plan_results.playing:
+            self._last = None
+        elif self._last is None:  # it has just begun
+            self._last = now
+        elif now - self._last >= INTERVAL:
+            state = played(state, now - self._last)
+            self._last = now
+        return state

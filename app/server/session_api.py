@@ -1,0 +1,40 @@
+"""What the actions of a page need of its session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from app.state.state import State
+from symgrasp.progress import Progress
+
+__all__ = ["SessionApi"]
+
+
+class SessionApi(Protocol):
+    """A browser's session, as its actions use it."""
+
+    @property
+    def state(self) -> State | None:
+        """What is shown; None before the first scene is loaded."""
+        ...
+
+    def change(self, change: Callable[[State], State], origin: str = "") -> None:
+        """Apply a change to the state.
+
+        Args:
+            change: returns the new state, or raises a `SymgraspError`, which is shown.
+            origin: what changed it: widgets of that origin are not written back.
+        """
+
+    def submit(self, label: str, run: Callable[[Progress], Any], show: Callable[[State, Any], State]) -> None:
+        """Run a job in place of the one under way; nothing before the first scene is loaded.
+
+        Args:
+            label: what is computed, for the page.
+            run: computes, on the thread of the queue.
+            show: returns the state with the result, unless another job has taken this one's place.
+        """
+
+    def send(self, name: str, content: bytes) -> None:
+        """Send a file to the browser."""

@@ -1,0 +1,99 @@
+"""Maps and plans as the page computes them."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from app.compute import map_service
+from app.compute.map_service import MapService
+from app.compute.plan_service import PlanRequest
+from app.state import changes
+from app.state.requests import MapRequest
+from app.state.state import State
+from symgrasp.errors import Cancelled, SymgraspError
+from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.scene.scene import Scene
+from symgrasp.world import BulletWorld
+from tests.app.state.test_state import results_of, small_map
+from tests.conftest import load_small
+
+
+@pytest.fixture
+def maps():
+    maps = MapService()
+    yield maps
+    maps.close()
+
+
+def quiet(share: float) -> None:
+    """Progress that nobody watches."""
+
+
+def test_the_map_is_that_of_the_library(maps):
+    request = changes.moved(State.of(load_small("bottle_on_table"), ""), x=0.5).request
+    result = maps.map(request, quiet)
+    assert np.array_equal(result.map.reason, create_map(request.moved_scene(), "panda", "pick").reason)
+    assert np.allclose(result.map.T_world_object, request.T_world_object)
+
+
+def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(maps, monkeypatch):
+    worlds: list[Scene] = []
+
+    def counted(scene: Scene) -> BulletWorld:
+        worlds.append(scene)
+        return BulletWorld(scene)
+
+    monkeypatch.setattr(map_service, "BulletWorld", counted)
+    bottle, can = load_small("bottle_on_table"), load_small("soda_can")
+    moved = changes.moved(State.of(bottle, ""), x=0.5)
+    for scene in (bottle, moved.moved_scene(), pickle.loads(pickle.dumps(bottle))):
+        maps.map(State.of(scene, "").request, quiet)
+    assert worlds == [bottle]
+    others = [can, can.with_object("other", bottle.profile), can.with_settings(margin=0.01)]
+    for scene in others:
+        maps.map(State.of(scene, "").request, quiet)
+    assert worlds == [bottle, *others]
+
+
+def test_progress_may_stop_it(maps):
+    def stop(share: float) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        maps.map(changes.moved(State.of(load_small("bottle_on_table"), ""), x=0.51).request, stop)
+
+
+def test_what_the_object_is_inside_of_is_named_with_the_depth(maps):
+    state = changes.moved(State.of(load_small("bottle_on_table"), ""), z=-0.03)
+    assert maps.map(state.request, quiet).contacts == ("bottle is 30 mm inside table",)
+    beside = changes.moved(State.of(load_small("bottle_on_table"), ""), x=0.62, y=-0.26)
+    (contact,) = maps.map(beside.request, quiet).contacts
+    assert contact.startswith("bottle is ")
+    assert contact.endswith(" mm inside parcel")
+    assert maps.map(State.of(load_small("bottle_on_table"), "").request, quiet).contacts == ()
+
+
+def test_plans_follow_the_objects_that_were_moved():
+    scene = load_small("pick_pour_place")
+    state = changes.moved(State.of(scene, ""), y=-0.3)
+    results = results_of(PlanRequest(scene, "sequential", "best", "panda", state.poses))
+    result = results.plan
+    assert result
+    assert result.plan.tasks[0].object_pose.position[1] == pytest.approx(-0.3)
+    assert results.maps["pick", "panda"].request == state.request
+    assert results.maps["pour", "panda"].request == MapRequest(scene, "panda", "pour")
+
+
+def test_one_arm_is_not_enough_for_the_bimanual_planner():
+    with pytest.raises(SymgraspError, match="two or more arms"):
+        results_of(PlanRequest(load_small("bottle_on_table"), "bimanual", name="pick"))
+
+
+def test_a_known_map_is_not_computed_again(maps, monkeypatch):
+    known = small_map("soda_can", "pick", "panda")
+    monkeypatch.setattr(MapMaker, "map", None)
+    found, _ = maps.maps([known.request], {("pick", "panda"): known}, quiet)
+    assert found == {("pick", "panda"): known}
