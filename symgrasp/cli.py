@@ -172,7 +172,7 @@ def _map(args: argparse.Namespace) -> int:
     task = scene.task(args.task)
     arm = scene.arm(args.arm or task.arms[0])
     with _computing(f"map of {task.name}") as progress:
-        the_map = create_map(scene, arm.name, task.name, progress=progress)
+        the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress)
     cells = the_map.reason.size
     print(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
     for reason, count in the_map.counts().items():
@@ -187,15 +187,15 @@ def _map(args: argparse.Namespace) -> int:
 def _explain(args: argparse.Namespace) -> int:
     from symgrasp.feasibility.create import MapMaker
     from symgrasp.reason import Reason
-    from symgrasp.world import BulletWorld
+    from symgrasp.world import open_world
 
     scene = _checked(args.scene)
     task = scene.task(args.task)
     arm = scene.arm(args.arm or task.arms[0])
     row, column = scene.manifold.cell(args.h, math.radians(args.theta))
-    with BulletWorld(scene) as world, _computing("candidates") as progress:
+    with open_world(scene) as world, _computing("candidates") as progress:
         cell = (args.roll // 180, row, column)
-        found = MapMaker(world, scene).explain(arm.name, task, cell, progress=progress)
+        found = MapMaker(world).explain(arm.name, task, cell, progress=progress)
     h, theta = 100 * scene.manifold.h[row], _deg(scene.manifold.theta[column])
     print(
         f"{scene.name}: {task.name} with {arm.name}, the cell at "
@@ -207,9 +207,8 @@ def _explain(args: argparse.Namespace) -> int:
     counts = [f"{count} {reason.label}" for reason, count in found.counts().items()]
     text = f"{len(found.candidates)} candidates: {', '.join(counts)}" if counts else "no candidates"
     print(f"{text}; {found.unreachable} of {len(found.phi)} redundancy samples have none")
-    for furthest in found.candidates:
-        phi = _deg(furthest.phi)
-        print(f"  φ {phi:7.1f}°  branch {furthest.branch}  {furthest.reason.label:18}  {furthest.why}")
+    for c in found.candidates:
+        print(f"  φ {_deg(c.phi):7.1f}°  branch {c.branch}  {c.reason.label:18}  {c.why}")
     return 0
 
 
@@ -297,8 +296,8 @@ def _verify(args: argparse.Namespace) -> int:
         report = verify(plan, progress)
     for failure in report.failures:
         print(failure)
-    furthest = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
-    print(f"{report.checks} statements checked: {furthest}")
+    result = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
+    print(f"{report.checks} statements checked: {result}")
     return 0 if report.holds else 1
 
 

@@ -21,7 +21,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import rotation_z
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
-from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks
+from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks, open_world
 
 __all__ = ["MapService"]
 
@@ -104,7 +104,7 @@ class MapService:
         if old and old.world.scene.map_sha256 == scene.map_sha256:
             return old
         self.close()
-        self._maker = MapMaker(BulletWorld(scene), scene)
+        self._maker = MapMaker(open_world(scene))
         return self._maker
 
 

@@ -30,7 +30,7 @@ def handprints() -> None:
     scene = Scene.load("log_two_robots")
     task, grid = scene.task(), scene.manifold
     arms = [scene.arm(name) for name in task.arms]
-    maps = {arm.name: create_map(scene, arm.name) for arm in arms}
+    maps = {(task.name, arm.name): create_map(scene, arm=arm.name) for arm in arms}
     trace: list[ClimbStep] = []
     plan_bimanual(scene, maps=maps, method="hill_climb", seed=SEED, trace=trace)
     climb = [step for step in trace if step.restart == trace[-1].restart]
@@ -45,7 +45,7 @@ def handprints() -> None:
         colors = np.where(index[..., None] > 0, PRINTS[index] / 255, WOOD)
         bodies = [object_body(scene.profile, task.T_world_object, cells_paint(grid, colors))]
         for color, arm, cell in zip(PRINTS[1:], arms, step.cells, strict=False):
-            witness = maps[arm.name].witness(cell)
+            witness = maps[task.name, arm.name].witness(cell)
             assert witness, "hands climb over feasible cells"
             values = arm.robot_values(witness.q, witness.opening)
             hand = robot(arm.robot, values, arm.hand.links)

@@ -25,7 +25,7 @@ from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
-from symgrasp.world import BulletWorld
+from symgrasp.world import BulletWorld, open_world
 
 __all__ = ["against_others", "boxes", "growth", "process", "run", "turning"]
 
@@ -104,10 +104,10 @@ def against_others(scenes: Sequence[str], rounds: int) -> Iterator[Figure]:
 def _race(scene: Scene, rounds: int) -> _Race:
     task = scene.task()
     arm = scene.arm(task.arms[0])
-    with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+    with open_world(scene) as world:
+        maker = MapMaker(world)
         m = maker.map(arm.name, task)  # compiles what is not compiled yet
-        build = [_time(lambda: ExactEngine(world, scene, arm, scene.manifold)) for _ in range(3)]
+        build = [_time(lambda: ExactEngine(world, arm, scene.manifold)) for _ in range(3)]
         tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(
             task.T_world_object, arm.hand.finger_depth
         )
@@ -235,8 +235,8 @@ class _Quick:
         self._scene = scene or Scene.load("bottle_on_table").with_settings(**(settings or GRID))
 
     def __enter__(self) -> _Quick:
-        self._world = BulletWorld(self._scene)
-        self._maker = MapMaker(self._world, self._scene)
+        self._world = open_world(self._scene)
+        self._maker = MapMaker(self._world)
         self.map()
         return self
 

@@ -30,7 +30,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld, Collision, NearBodies
+from symgrasp.world import BulletWorld, Collision, NearBodies, open_world
 
 __all__ = ["long_sequence", "run", "several_hands", "without_the_manifold"]
 
@@ -57,9 +57,9 @@ def long_sequence(tasks: int, runs: int) -> Iterator[Figure]:
     times = []
     for _ in range(runs):
         turns = rng.integers(0, 96, tasks) * scene.manifold.dtheta
-        sequence = {(k, "arm"): maps[k % len(maps)].shift(turn) for k, turn in enumerate(turns)}
+        visits = [{"arm": maps[k % len(maps)].shift(turn)} for k, turn in enumerate(turns)]
         start = perf_counter()
-        search = HoldingSearch(sequence, [["arm"]] * tasks, PrintGaps([], scene.manifold))
+        search = HoldingSearch(visits, PrintGaps([], scene.manifold))
         found = next(search.best_first())
         for k in range(tasks):
             search.turns(found.cells, k)[0]
@@ -83,12 +83,10 @@ def without_the_manifold(runs: int) -> Iterator[Figure]:
     scene = Scene.load("pick_pour_place")
     tasks = list(scene.tasks.values())
     with _CountingWorld(scene) as world:
+        maker = MapMaker(world)
         start = perf_counter()
-        maps = {
-            (k, "arm"): create_map(scene, task=t.name, method="reference", world=world)
-            for k, t in enumerate(tasks)
-        }
-        search = HoldingSearch(maps, [["arm"]] * len(tasks), PrintGaps([], scene.manifold))
+        visits = [{"arm": maker.map(None, task, method="reference")} for task in tasks]
+        search = HoldingSearch(visits, PrintGaps([], scene.manifold))
         next(search.best_first())
         with_maps = perf_counter() - start
         budget = world.checks
@@ -131,7 +129,7 @@ def _sample_grasps(
             world.set_object(T_world_object)
             tool = grasp_to_tool(T_world_object, h, theta, roll, arm.hand.standoff(radius))
             candidates = checker.candidates(T_base_world @ tool, arm.hand.opening(radius))
-            return any(c.fate == Reason.FEASIBLE for c in candidates)
+            return any(c.reason == Reason.FEASIBLE for c in candidates)
 
         if all(feasible(task.T_world_object) for task in tasks):
             return True
@@ -160,7 +158,7 @@ def several_hands(pairs: int) -> Iterator[Figure]:
         [("log_two_robots", "lift"), ("handover_between_robots", "hand over")]
     ):
         scene = Scene.load(name).with_settings(redundancy=8)
-        with BulletWorld(scene) as world:
+        with open_world(scene) as world:
             arms = [world.scene.arm(arm) for arm in scene.task(task).arms]
             start = perf_counter()
             gaps = PrintGaps(arms, scene.manifold)
@@ -196,7 +194,7 @@ def _said(results: Sequence[_Pair]) -> Iterator[Figure]:
 
 def _random_pairs(world: BulletWorld, task: Task, rng: np.random.Generator) -> Iterator[list[FeasibilityMap]]:
     """Yield maps of two arms, an object pose for every four of them."""
-    maker = MapMaker(world, world.scene)
+    maker = MapMaker(world)
     while True:
         move = rotation_z(rng.uniform(-0.3, 0.3)) @ translation(rng.uniform(-0.12, 0.12, 3))
         moved = replace(task, T_world_object=move @ task.T_world_object)
@@ -227,9 +225,7 @@ def _compare(
     world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap], gaps: PrintGaps, seed: int
 ) -> _Pair:
     start = perf_counter()
-    names = [arm.name for arm in arms]
-    keyed = {(0, name): m for name, m in zip(names, maps, strict=True)}
-    search = HoldingSearch(keyed, [names], gaps)
+    search = HoldingSearch([{arm.name: m for arm, m in zip(arms, maps, strict=True)}], gaps)
     found = next(iter(FreePlacements(search, [ConfigurationFinder(world, arms, maps)])), None)
     exact_time = perf_counter() - start
     start = perf_counter()

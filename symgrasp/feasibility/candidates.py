@@ -1,4 +1,4 @@
-"""The candidate configurations of one tool pose, and the fate of each in PyBullet.
+"""The candidate configurations of one tool pose, and the check of each in PyBullet.
 
 Lines 5 to 9 of Algorithm 1: every redundancy sample, every branch of the closed form, inside the
 limits, free of collision, and free along the straight retreat where the scene asks for one.
@@ -29,7 +29,7 @@ class Candidate(NamedTuple):
         phi: redundancy value (rad).
         sample: its index.
         branch: branch of the closed form.
-        fate: the stage at which it failed, or FEASIBLE.
+        reason: the stage at which it failed, or FEASIBLE.
         collision: the deepest collision of that stage, None where it is not a collision.
     """
 
@@ -37,12 +37,12 @@ class Candidate(NamedTuple):
     phi: float
     sample: int
     branch: int
-    fate: Reason
+    reason: Reason
     collision: Collision | None
 
 
 class CheckResult(NamedTuple):
-    """What became of a candidate inside the limits.
+    """What the check of a candidate inside the joint limits found.
 
     Attributes:
         reason: the stage at which it failed, or FEASIBLE.
@@ -58,15 +58,15 @@ class CheckResult(NamedTuple):
 
 
 class CandidateChecker:
-    """Decides the candidates of an arm in a world, whose object must be in place.
+    """Checks candidate configurations of an arm in a world, whose object must be in place.
 
     Args:
         world: where collisions are asked.
         arm: the arm.
         ik: its inverse kinematics.
         approach: length (m) of the straight retreat against the approach that must be free too.
-        near: says what could be in the way at joint values (n,) that reach a tool pose (4, 4) in the
-            frame of the robot's base, for those who know; all is asked about if None.
+        near: returns the bodies that may collide at joint values (n,) that reach a tool pose (4, 4) in
+            the frame of the robot's base; only those are checked. All bodies are checked if None.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class CandidateChecker:
         self._retreat = retreat_distances(approach).tolist()
 
     def candidates(self, T_base_tool: Array, opening: float) -> Iterator[Candidate]:
-        """Yield the candidates of a tool pose (4, 4), by φ, then by branch, each decided as it is asked for.
+        """Yield the candidates of a tool pose (4, 4), by φ, then by branch, each checked when asked for.
 
         Args:
             T_base_tool: tool pose in the frame of the robot's base.
@@ -90,13 +90,20 @@ class CandidateChecker:
         solutions = self.ik.solve(T_base_tool)
         for k, q in enumerate(solutions.q):
             sample, branch = int(solutions.sample[k]), int(solutions.branch[k])
-            fate, collision = Reason.JOINT_LIMITS, None
+            reason, collision = Reason.JOINT_LIMITS, None
             if solutions.inside[k]:
-                fate, collision, *_ = self.fate(T_base_tool, q, sample, opening)
-            yield Candidate(q, float(self.ik.phi[sample]), sample, branch, fate, collision)
+                reason, collision, *_ = self.check(T_base_tool, q, sample, opening)
+            yield Candidate(q, float(self.ik.phi[sample]), sample, branch, reason, collision)
 
-    def fate(self, T_base_tool: Array, q: Array, sample: int, opening: float) -> CheckResult:
-        """Return at which stage a candidate inside the limits fails, or FEASIBLE."""
+    def check(self, T_base_tool: Array, q: Array, sample: int, opening: float) -> CheckResult:
+        """Check a candidate inside the joint limits for collisions, at the grasp and along the retreat.
+
+        Args:
+            T_base_tool: tool pose (4, 4) in the frame of the robot's base.
+            q: (n,) joint values that reach it.
+            sample: their redundancy sample, which the retreat keeps.
+            opening: opening (m) of the hand.
+        """
         collision = self._collision(T_base_tool, q, opening)
         if collision:
             return CheckResult(collision.reason, collision, 0.0, q)

@@ -1,43 +1,48 @@
-"""The maps of a scene: by the exact engine, or as Algorithm 1 is written; and their cells explained."""
+"""Compute the feasibility maps of a scene, by the exact engine or Algorithm 1, and explain their cells."""
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+import math
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from symgrasp.errors import InputError
 from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.exact import ExactEngine
-from symgrasp.feasibility.explain import Explanation, explain
+from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import ClosedFormIK, solver_for
-from symgrasp.object.manifold import Manifold
+from symgrasp.object.manifold import ROLLS, Manifold, wrap
 from symgrasp.progress import Progress
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld
+from symgrasp.world import BulletWorld, open_world
 
-__all__ = ["MapMaker", "Method", "create_map"]
+__all__ = ["MapMaker", "Method", "create_map", "explain"]
 
 Method = Literal["exact", "reference"]
 """How a map is computed: both give the same feasible cells."""
 
 
 class MapMaker:
-    """Computes maps of one scene, and keeps what belongs to its arms, obstacles and grid.
+    """Computes maps of one scene, and keeps what depends on its arms, obstacles and grid alone.
 
-    Moving or turning the object rebuilds nothing of that.
+    A map for another pose of the object rebuilds nothing of that.
 
     Args:
-        world: a world of the scene's robots, obstacles and object.
-        scene: the scene, for its arms and settings.
+        world: a world of the scene. Its arms, its settings and its default task are those of the maps.
+
+    Attributes:
+        world: that world.
+        scene: the world's scene.
     """
 
-    def __init__(self, world: BulletWorld, scene: Scene) -> None:
-        self.world, self.scene = world, scene
+    def __init__(self, world: BulletWorld) -> None:
+        self.world, self.scene = world, world.scene
         self._engines: dict[str, ExactEngine | None] = {}
         self._solvers: dict[str, ClosedFormIK] = {}
 
@@ -51,13 +56,12 @@ class MapMaker:
         progress: Progress | None = None,
     ) -> FeasibilityMap:
         """Compute a map; see `create_map`. The task need not be one of the scene's."""
-        the_task = task if isinstance(task, Task) else self.scene.task(task)
-        the_arm = self.scene.arm(arm or the_task.arms[0])
+        the_arm, the_task = self._chosen(arm, task)
         grid = manifold or self.scene.manifold
         engine = self._engine(the_arm, grid) if method == "exact" else None
         if engine:
             return engine.map(the_task, grid, progress)
-        return create_map_reference(self.world, self.scene, the_arm, the_task, grid, progress)
+        return create_map_reference(self.world, the_arm, the_task, grid, progress)
 
     def explain(
         self,
@@ -68,7 +72,7 @@ class MapMaker:
         manifold: Manifold | None = None,
         progress: Progress | None = None,
     ) -> Explanation:
-        """Say what becomes of every candidate of a cell; see `symgrasp.feasibility.explain.explain`.
+        """Check every candidate of a cell; see `symgrasp.feasibility.explain.explain_cell`.
 
         Args:
             arm: name of the arm; the task's first if None.
@@ -77,12 +81,16 @@ class MapMaker:
             manifold: another grid than the scene's.
             progress: told the finished share; may raise `Cancelled`.
         """
-        the_task = task if isinstance(task, Task) else self.scene.task(task)
-        the_arm = self.scene.arm(arm or the_task.arms[0])
+        the_arm, the_task = self._chosen(arm, task)
         if the_arm.name not in self._solvers:
             self._solvers[the_arm.name] = solver_for(the_arm, self.scene.settings.redundancy)
         ik, grid = self._solvers[the_arm.name], manifold or self.scene.manifold
-        return explain(self.world, the_arm, ik, the_task, grid, Cell(*cell), progress)
+        return explain_cell(self.world, the_arm, ik, the_task, grid, Cell(*cell), progress)
+
+    def _chosen(self, arm: str | None, task: Task | str | None) -> tuple[Arm, Task]:
+        """Return an arm and a task: the scene's first task, and the task's first arm, where none is named."""
+        chosen = task if isinstance(task, Task) else self.scene.task(task)
+        return self.scene.arm(arm or chosen.arms[0]), chosen
 
     def _engine(self, arm: Arm, grid: Manifold) -> ExactEngine | None:
         """Return an arm's engine for a grid's heights, or None where the engine does not know the arm."""
@@ -90,41 +98,90 @@ class MapMaker:
         if known and not np.array_equal(known.manifold.h, grid.h):
             known = None
         if known is None and ExactEngine.knows(arm):
-            known = ExactEngine(self.world, self.scene, arm, grid)
+            known = ExactEngine(self.world, arm, grid)
         self._engines[arm.name] = known
         return known
 
 
 def create_map(
     scene: Scene,
-    arm: str | None = None,
-    task: str | None = None,
     *,
+    task: str | None = None,
+    arm: str | None = None,
     method: Method = "exact",
     manifold: Manifold | None = None,
-    world: BulletWorld | None = None,
     progress: Progress | None = None,
 ) -> FeasibilityMap:
-    """Compute the feasibility map of an arm and a task.
+    """Compute the feasibility map of a task and an arm.
+
+    For several maps of one scene, `MapMaker` keeps the world and the engines between them.
 
     Args:
         scene: the scene.
-        arm: name of the arm; the task's first if None.
         task: name of the task; the scene's first if None.
+        arm: name of the arm; the task's first if None.
         method: ``exact`` is the fast engine, for arms whose closed form it knows; ``reference`` is
             Algorithm 1 of the paper, and what ``exact`` does for other arms. The feasible cells are
             the same, and so are the reasons up to JOINT_LIMITS; the engine's witnesses have the
             largest clearance that it found, the reference's are the first.
         manifold: another grid than the scene's.
-        world: a world of this scene's robots, obstacles and object to use again; one is made if None.
         progress: told the finished share; may raise `Cancelled`.
 
     Raises:
         SceneError: there is no such arm or task.
         UrdfError: the arm has no closed-form inverse kinematics.
     """
-    the_task = scene.task(task)
-    the_arm = scene.arm(arm or the_task.arms[0])
-    with nullcontext(world) if world else BulletWorld(scene) as used:
-        maker = MapMaker(used, scene)
-        return maker.map(the_arm.name, the_task, method=method, manifold=manifold, progress=progress)
+    with open_world(scene) as world:
+        found = MapMaker(world).map(arm, task, method=method, manifold=manifold, progress=progress)
+    return replace(found, shown_in=scene)
+
+
+def explain(
+    scene: Scene,
+    h: float,
+    theta: float,
+    roll: float = 0.0,
+    task: str | None = None,
+    arm: str | None = None,
+    progress: Progress | None = None,
+) -> Explanation:
+    """Explain whether a grasp is feasible, and if not, why: every candidate configuration is checked.
+
+    The grasp is that of the cell of the map in which it lies, at the cell's centre.
+
+    Args:
+        scene: the scene.
+        h: height (m) along the object's axis.
+        theta: angle (rad) around it, in the object's frame.
+        roll: turn (rad) of the hand about its approach: 0 or π.
+        task: name of the task; the scene's first if None.
+        arm: name of the arm; the task's first if None.
+        progress: told the finished share; may raise `Cancelled`.
+
+    Returns:
+        The candidates, best first, and the reason that the map has for the cell. Printed, it is a
+        line for each candidate.
+
+    Raises:
+        SceneError: there is no such arm or task.
+        InputError: the height is not on the object, or the roll is neither 0 nor π.
+        UrdfError: the arm has no closed-form inverse kinematics.
+    """
+    if not math.isfinite(theta):
+        raise InputError("explain", "theta (rad)", theta, "a number")
+    row, column = scene.manifold.cell(h, theta)
+    cell = Cell(_roll_index(roll), row, column)
+    with open_world(scene) as world:
+        return MapMaker(world).explain(arm, task, cell, progress=progress)
+
+
+def _roll_index(roll: float) -> int:
+    """Return the index of a roll (rad) on maps.
+
+    Raises:
+        InputError: it is neither 0 nor π, whole turns aside.
+    """
+    apart = [abs(float(wrap(roll - known))) for known in ROLLS]
+    if not min(apart) < 1e-6:  # NaN is not, either
+        raise InputError("explain", "roll (rad)", roll, "0 or π")
+    return apart.index(min(apart))

@@ -23,6 +23,7 @@ from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.ik import SphericalIK, solver_for
 from symgrasp.ik.retreat import retreat_distances
 from symgrasp.object.manifold import ROLLS, Manifold
@@ -31,7 +32,6 @@ from symgrasp.progress import Progress
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
-from symgrasp.scene.scene import Scene
 from symgrasp.world import Body, BulletWorld, Collision, NearBodies
 
 __all__ = ["ExactEngine"]
@@ -40,32 +40,43 @@ PARTS = 4
 """Parts of a search for each thread, so that none waits long for the last."""
 
 TELL = 0.05
-"""Time (s) after which progress is told, and may cancel: rows are searched in bites of about that long."""
+"""Time (s) after which progress is told, and may cancel: rows are searched in parts of about that long."""
 
 _ALL_CORES = threading.Lock()
 """Of numba's thread pools, one does not bear two parallel searches at once, and none is faster for it."""
 
 
-class _StaticBodies(NamedTuple):
-    """What is so whatever the arm does.
+class _FixedBodies(NamedTuple):
+    """How close the bodies are that the arm does not move: the same for every candidate of a map.
 
     Attributes:
-        gap: distance (m) of the bodies that it does not move at least, at most `CLEARANCE_LIMIT`.
-        blocked: a collision of them, which spoils every candidate.
+        gap: distance (m) that they have at least, at most `CLEARANCE_LIMIT`.
+        collision: their deepest collision, which every candidate shares; None where there is none.
     """
 
     gap: float
-    blocked: Collision | None
+    collision: Collision | None
+
+
+class _Bodies(NamedTuple):
+    """What the pieces of the engine's geometry are called in a map.
+
+    Attributes:
+        number: (P,) body of each piece in the map's list of names.
+        reason: (P,) what a collision with the piece is called.
+    """
+
+    number: np.ndarray
+    reason: np.ndarray
 
 
 class ExactEngine:
     """Computes the maps of one arm in one scene, for any pose of the object.
 
-    What belongs to the scene (pieces, their tree, the robot's geometry) is built once.
+    Pieces, their tree and the robot's geometry are built once.
 
     Args:
         world: a world of the scene's robots, obstacles and object.
-        scene: the scene, for its settings.
         arm: the arm.
         manifold: the grid; maps may be asked for others with the same heights.
 
@@ -74,24 +85,25 @@ class ExactEngine:
         NotImplementedError: the arm is not of the kinds the engine knows; see `knows`.
     """
 
-    def __init__(self, world: BulletWorld, scene: Scene, arm: Arm, manifold: Manifold) -> None:
-        self.world, self.scene, self.arm, self.manifold = world, scene, arm, manifold
-        ik = solver_for(arm, scene.settings.redundancy)
+    def __init__(self, world: BulletWorld, arm: Arm, manifold: Manifold) -> None:
+        self.world, self.arm, self.manifold = world, arm, manifold
+        self._settings = world.scene.settings
+        ik = solver_for(arm, self._settings.redundancy)
         if not isinstance(ik, SphericalIK) or not supports(arm):
             raise NotImplementedError(f"arm {arm.name}: not of a kind that the exact engine knows")
         self.ik = ik
         radii = manifold.profile.radius(manifold.h)
         self._opening = np.array([arm.hand.opening(float(r)) for r in radii])
-        self._fit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
+        self._misfit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
         self._order = _spread(len(ik.phi))
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
         self._scratch = new_scratch(self._geometry.pose, self._geometry.solids, arm.dof)
-        # How far off pairs are of which the arm moves neither; those with the object are asked for every map.
-        self._reach = max(CLEARANCE_LIMIT, scene.settings.margin)
+        # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
+        self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.near(arm, self._reach)
-        self._resting = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._rests(c)]
+        self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
     @staticmethod
     def knows(arm: Arm) -> bool:
@@ -118,61 +130,89 @@ class ExactEngine:
         grid = manifold or self.manifold
         if not np.array_equal(grid.h, self.manifold.h):
             raise ValueError("the exact engine was built for a grid with other heights")
+        self._place_object(task.T_world_object)
+        draft = MapDraft(self.arm, grid, self._opening, self.ik.phi)
+        for row, misfit in enumerate(self._misfit):
+            if misfit is not None:
+                draft.reason[:, row] = misfit
         T_base_tool = inverse(self.arm.robot.T_world_base) @ grid.tool_poses(
             task.T_world_object, self.arm.hand.finger_depth
         )
-        world = self.world
-        world.margin = self.scene.settings.margin
-        world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
-        world.set_object(task.T_world_object)
-        arm_geometry, scratch = self._geometry, self._scratch
-        scratch.pose[arm_geometry.body.objects] = pose_rows(axis_frame(task.T_world_object))
-        for k in arm_geometry.body.objects:
-            box_of(arm_geometry.solids.size, scratch.pose, k, scratch.box[k])
-        draft = MapDraft(self, grid)
-        still = self._still()
-        rows = np.array([row for row, stage in enumerate(self._fit) if stage is None], dtype=np.int64)
-        first, bite = 0, 1
+        self._search_rows(draft, T_base_tool, progress)
+        self.world.set_arms(())
+        return draft.finish(self.world.scene.name, task)
+
+    def _place_object(self, T_world_object: Array) -> None:
+        """Put the object at a pose (4, 4) in both worlds, PyBullet's and the engine's; the arm at home."""
+        self.world.margin = self._settings.margin
+        self.world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
+        self.world.set_object(T_world_object)
+        geometry, scratch = self._geometry, self._scratch
+        scratch.pose[geometry.body.objects] = pose_rows(axis_frame(T_world_object))
+        for k in geometry.body.objects:
+            box_of(geometry.solids.size, scratch.pose, k, scratch.box[k])
+
+    def _search_rows(self, draft: MapDraft, T_base_tool: Array, progress: Progress | None) -> None:
+        """Fill the rows at which the hand fits, some at a time so that progress is told often enough."""
+        fixed, bodies = self._fixed_bodies(), self._bodies(draft)
+        rows = np.array([row for row, misfit in enumerate(self._misfit) if misfit is None], dtype=np.int64)
+        first, count = 0, 1
         while first < len(rows):
             start = perf_counter()
-            part = rows[first : first + bite]
-            for _ in self._search(draft, part, T_base_tool, still):
+            part = rows[first : first + count]
+            for _ in self._search(draft, bodies, part, T_base_tool, fixed):
                 if progress and perf_counter() - start > TELL:
                     progress(first / len(rows))  # PyBullet takes its time: here one may cancel, too
             first += len(part)
             if progress:
                 progress(first / len(rows))
-            # Rows differ, so bites grow with care; what is found does not depend on them.
-            bite = max(1, min(2 * bite, int(len(part) * TELL / (perf_counter() - start))))
-        world.set_arms(())
+            # Rows differ in cost, so parts at most double; what is found does not depend on their size.
+            count = max(1, min(2 * count, int(len(part) * TELL / (perf_counter() - start))))
         if progress and not len(rows):
             progress(1.0)
-        return draft.finish(task)
 
-    def _still(self) -> _StaticBodies:
-        """Say how far apart the bodies are that the arm does not move: it is the same for all candidates."""
-        found = self.world.near(self.arm, self._reach, (self.scene.file.object.name,))
-        gap, blocked = CLEARANCE_LIMIT, None
-        for c in [*self._resting, *filter(self._rests, found)]:
+    def _fixed_bodies(self) -> _FixedBodies:
+        """Measure the bodies that the arm does not move, with the object where it is now."""
+        with_object = self.world.near(self.arm, self._reach, (self.world.scene.file.object.name,))
+        gap, deepest = CLEARANCE_LIMIT, None
+        for c in [*self._fixed_pairs, *filter(self._is_fixed, with_object)]:
             distance = self._reach - c.depth
             gap = min(gap, distance - HIT_BAND)
             depth = self.world.margin_for(c.reason) - distance
-            if depth > 0 and (blocked is None or depth > blocked.depth):
-                blocked = c._replace(depth=depth)
-        return _StaticBodies(max(gap, 0.0), blocked)
+            if depth > 0 and (deepest is None or depth > deepest.depth):
+                deepest = c._replace(depth=depth)
+        return _FixedBodies(max(gap, 0.0), deepest)
 
-    def _rests(self, c: Collision) -> bool:
-        """Whether a pair is one of the robot's own bodies of which the arm moves none."""
+    def _is_fixed(self, c: Collision) -> bool:
+        """Whether a pair involves the arm's robot, but no link that the arm moves."""
         name = self.arm.robot.name
         own = [body.link for body in (c.a, c.b) if body.body == name]
         return bool(own) and not self._geometry.moving.intersection(own)
 
+    def _bodies(self, draft: MapDraft) -> _Bodies:
+        """Name all pieces in a map."""
+        names = self._geometry.names
+        return _Bodies(
+            np.array([draft.body_index(str(name)) for name in names]),
+            np.array([self._collision_reason(name) for name in names]),
+        )
+
+    def _collision_reason(self, hit: Body) -> Reason:
+        """Return what the arm's collision with a body is called."""
+        scene = self.world.scene
+        if hit.body == self.arm.robot.name:
+            return Reason.SELF_COLLISION
+        if hit.body in scene.robots:
+            return Reason.ROBOT_COLLISION
+        return Reason.OBJECT_COLLISION if hit.body == scene.file.object.name else Reason.SCENE_COLLISION
+
     def _search(
         self,
         draft: MapDraft,
+        bodies: _Bodies,
         rows: np.ndarray,
         T_base_tool: Array,
-        still: _StaticBodies,
+        fixed: _FixedBodies,
     ) -> Iterator[None]:
         """Search some rows of the map; pause after every cell that PyBullet decided."""
         goals = search.SearchInput(
@@ -180,10 +220,10 @@ class ExactEngine:
             T_world_base=self._T_world_base,
             T_base_tool=np.ascontiguousarray(T_base_tool[:, rows].reshape(-1, 4, 4)),
             row=np.tile(rows, len(ROLLS)),
-            retreat=-retreat_distances(self.scene.settings.approach),
-            margin=float(self.scene.settings.margin),
-            clearance=still.gap,
-            blocked=still.blocked is not None,
+            retreat=-retreat_distances(self._settings.approach),
+            margin=float(self._settings.margin),
+            clearance=fixed.gap,
+            blocked=fixed.collision is not None,
             parts=PARTS * numba.get_num_threads(),
         )
         with _ALL_CORES:
@@ -196,9 +236,9 @@ class ExactEngine:
                 goals,
                 self.arm.dof,
             )
-        roll, row, column = np.indices((len(ROLLS), len(rows), draft.grid.angles)).reshape(3, -1)
+        roll, row, column = np.indices((len(ROLLS), len(rows), draft.manifold.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
-        draft.take(found, cells, still.blocked)
+        _record(draft, bodies, found, cells, fixed)
         for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.open_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             self._decide(draft, cell, goals.T_base_tool[i], self._listed(found, int(i), goals.T_base_tool[i]))
@@ -216,46 +256,36 @@ class ExactEngine:
     def _decide(
         self, draft: MapDraft, cell: tuple[int, ...], T_base_tool: Array, listed: list[tuple[Array, int, int]]
     ) -> None:
-        """Let PyBullet decide the candidates of an open cell, against what their boxes do not rule out."""
+        """Let PyBullet check the candidates of an open cell, against the bodies near enough to collide."""
         near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
-        checker = CandidateChecker(self.world, self.arm, self.ik, self.scene.settings.approach, near)
+        checker = CandidateChecker(self.world, self.arm, self.ik, self._settings.approach, near)
         before: Collision | None = None
         for q, sample, branch in listed:
-            draft.asked += 1
-            fate, collision, *_ = checker.fate(T_base_tool, q, sample, float(self._opening[cell[1]]))
-            if fate == Reason.FEASIBLE:
-                draft.feasible(cell, q, sample, branch)
+            reason, collision, *_ = checker.check(T_base_tool, q, sample, float(self._opening[cell[1]]))
+            if reason == Reason.FEASIBLE:
+                draft.record_feasible(cell, q, sample, branch)
                 return
-            if fate > draft.reason[cell]:
-                draft.collides(cell, fate, collision)
-            if collision and self._fixed(collision):
+            if reason > draft.reason[cell]:
+                draft.record_failure(cell, reason, collision)
+            if collision and self._with_tool(collision):
                 if before and _same(before, collision):
-                    return  # and it would be for all others, because the tool pose alone decides it
+                    return  # all others collide like that too, because the tool pose alone decides it
                 before = collision
 
     def _near(self, q: Array, T_base_tool: Array, row: int) -> NearBodies:
-        """Return what is near the arm: all else is certified free."""
-        arm_geometry, scratch = self._geometry, self._scratch
-        place_hand(arm_geometry.body, arm_geometry.solids, scratch, self._T_world_base, T_base_tool, row)
-        place_arm(arm_geometry.body, arm_geometry.solids, scratch, q)
-        near, pairs = (
-            np.zeros(len(arm_geometry.names), dtype=bool),
-            np.zeros(len(arm_geometry.pairs), dtype=bool),
-        )
-        mark_near(
-            arm_geometry.body,
-            arm_geometry.solids.size,
-            arm_geometry.tree,
-            scratch,
-            self.world.margin + FREE_BAND,
-            near,
-            pairs,
-        )
-        bodies = {arm_geometry.names[k].body for k in np.flatnonzero(near)}
-        return bodies | {arm_geometry.pairs[k] for k in np.flatnonzero(pairs)}
+        """Return the bodies near the arm at joint values (n,); all others are certified free."""
+        geometry, scratch = self._geometry, self._scratch
+        body, size = geometry.body, geometry.solids.size
+        place_hand(body, geometry.solids, scratch, self._T_world_base, T_base_tool, row)
+        place_arm(body, geometry.solids, scratch, q)
+        near = np.zeros(len(geometry.names), dtype=bool)
+        pairs = np.zeros(len(geometry.pairs), dtype=bool)
+        mark_near(body, size, geometry.tree, scratch, self.world.margin + FREE_BAND, near, pairs)
+        bodies = {geometry.names[k].body for k in np.flatnonzero(near)}
+        return bodies | {geometry.pairs[k] for k in np.flatnonzero(pairs)}
 
-    def _fixed(self, collision: Collision) -> bool:
-        """Whether a collision is one of bodies that the tool pose alone places."""
+    def _with_tool(self, collision: Collision) -> bool:
+        """Whether the tool pose alone decides a collision: no link but those fixed to the tool moves."""
         name = self.arm.robot.name
         own = [body.link for body in (collision.a, collision.b) if body.body == name]
         return self._geometry.with_tool.issuperset(link for link in own if link in self._geometry.moving)
@@ -265,98 +295,46 @@ def _same(a: Collision, b: Collision) -> bool:
     return (a.a, a.b) == (b.a, b.b) and min(a.depth, b.depth) > 1e-6 and abs(a.depth - b.depth) < 1e-7
 
 
-class MapDraft:
-    """The arrays of a map while it is being computed."""
+def _record(
+    draft: MapDraft,
+    bodies: _Bodies,
+    found: search.SearchResult,
+    cells: tuple[np.ndarray, ...],
+    fixed: _FixedBodies,
+) -> None:
+    """Write down what the search found for m cells, before PyBullet decides the open ones.
 
-    def __init__(self, engine: ExactEngine, grid: Manifold) -> None:
-        dof, shape = engine.arm.dof, (len(ROLLS), grid.heights, grid.angles)
-        self.engine, self.grid = engine, grid
-        self.asked = 0
-        self.reason = np.zeros(shape, dtype=np.uint8)
-        for row, stage in enumerate(engine._fit):
-            self.reason[:, row] = Reason.UNREACHABLE if stage is None else stage
-        self.q = np.full((*shape, dof), np.nan)
-        self.sample = np.full(shape, -1, dtype=np.int16)
-        self.branch = np.full(shape, -1, dtype=np.int16)
-        self.pair = np.full((*shape, 2), -1, dtype=np.int16)
-        self.depth = np.full(shape, np.nan)
-        self.clearance = np.full(shape, np.nan)
-        names = engine._geometry.names
-        self.bodies = list(dict.fromkeys(str(name) for name in names))
-        index = {name: k for k, name in enumerate(self.bodies)}
-        self._body = np.array([index[str(name)] for name in names])
-        self._reason = np.array([self._collision(name) for name in names])
+    Args:
+        draft: the map.
+        bodies: what its pieces are called.
+        found: for each of m cells.
+        cells: rolls, rows and columns (m,) of these cells.
+        fixed: the bodies that the arm does not move: where they collide, they are what spoils a cell.
+    """
 
-    def _collision(self, hit: Body) -> Reason:
-        """Return what a collision with a body is called."""
-        scene = self.engine.scene
-        if hit.body == self.engine.arm.robot.name:
-            return Reason.SELF_COLLISION
-        if hit.body in scene.robots:
-            return Reason.ROBOT_COLLISION
-        return Reason.OBJECT_COLLISION if hit.body == scene.file.object.name else Reason.SCENE_COLLISION
+    def those(chosen: np.ndarray) -> tuple[np.ndarray, ...]:
+        return tuple(part[chosen] for part in cells)
 
-    def take(
-        self, found: search.SearchResult, cells: tuple[np.ndarray, ...], blocked: Collision | None
-    ) -> None:
-        status, pair, depth, q, pick, clearance = found[:6]
-        self.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, Reason.UNREACHABLE)
-        at = tuple(part[status == search.FEASIBLE] for part in cells)
-        self.reason[at] = Reason.FEASIBLE
-        self.q[at] = q[status == search.FEASIBLE]
-        self.sample[at], self.branch[at] = pick[status == search.FEASIBLE].T
-        self.clearance[at] = clearance[status == search.FEASIBLE]
-        hit = (status == search.HIT) | (status == search.BLOCKED)
-        named = hit & (pair[:, 0] >= 0)
-        at = tuple(part[named] for part in cells)
-        self.reason[at] = self._reason[pair[named, 1]]
-        self.pair[at] = self._body[pair[named]]
-        self.depth[at] = depth[named]
-        self.reason[tuple(part[status == search.BLOCKED] for part in cells)] = Reason.APPROACH_BLOCKED
-        if blocked is not None:
-            for cell in zip(*(part[hit] for part in cells), strict=True):
-                self.collides(cell, blocked.reason, blocked)
-
-    def feasible(self, cell: tuple[int, ...], q: Array, sample: int, branch: int) -> None:
-        self.reason[cell], self.clearance[cell] = Reason.FEASIBLE, 0.0
-        self.q[cell], self.sample[cell], self.branch[cell] = q, sample, branch
-        self.pair[cell], self.depth[cell] = -1, np.nan
-
-    def collides(self, cell: tuple[int, ...], reason: Reason, collision: Collision | None) -> None:
-        self.reason[cell] = reason
-        self.pair[cell], self.depth[cell] = -1, np.nan
-        if collision:
-            for body in map(str, collision[1:3]):
-                if body not in self.bodies:
-                    self.bodies.append(body)
-            self.pair[cell] = [self.bodies.index(str(body)) for body in collision[1:3]]
-            self.depth[cell] = collision.depth
-
-    def finish(self, task: Task) -> FeasibilityMap:
-        engine = self.engine
-        return FeasibilityMap(
-            scene=engine.scene.name,
-            arm=engine.arm.name,
-            task=task.name,
-            T_world_object=task.T_world_object,
-            manifold=self.grid,
-            reason=self.reason,
-            q=self.q,
-            sample=self.sample,
-            branch=self.branch,
-            clearance=self.clearance,
-            phi=engine.ik.phi,
-            opening=engine._opening,
-            bodies=tuple(self.bodies),
-            pair=self.pair,
-            depth=self.depth,
-        )
+    status = found.status
+    draft.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, Reason.UNREACHABLE)
+    feasible = status == search.FEASIBLE
+    sample, branch = found.pick[feasible].T
+    draft.record_feasible(those(feasible), found.q[feasible], sample, branch, found.clearance[feasible])
+    blocked = status == search.BLOCKED
+    hit = (status == search.HIT) | blocked
+    named = hit & (found.pair[:, 0] >= 0)
+    draft.reason[those(named)] = bodies.reason[found.pair[named, 1]]
+    draft.record_pairs(those(named), bodies.number[found.pair[named]], found.depth[named])
+    draft.reason[those(blocked)] = Reason.APPROACH_BLOCKED
+    if fixed.collision is not None:
+        for cell in zip(*those(hit), strict=True):
+            draft.record_failure(cell, fixed.collision.reason, fixed.collision)
 
 
 def _spread(count: int) -> np.ndarray:
     """Return the indices below ``count``, each far from those before it (van der Corput's sequence).
 
-    Neighbouring redundancy values mostly share their fate, so the next try should be elsewhere.
+    Neighbouring redundancy values mostly fail for the same reason, so the next try should be elsewhere.
     """
     order: dict[int, None] = {}
     k = 0

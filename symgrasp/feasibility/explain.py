@@ -1,4 +1,4 @@
-"""Every candidate of one cell, and what becomes of each in PyBullet: a map's verdict, taken apart."""
+"""Every candidate configuration of one cell, checked in PyBullet: why a map says what it says."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.feasibility.candidates import CandidateChecker, CheckResult
+from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
 from symgrasp.feasibility.fit import fit
 from symgrasp.ik import ClosedFormIK
@@ -23,7 +23,7 @@ from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.world import BulletWorld, Collision
 
-__all__ = ["CandidateResult", "Explanation", "LimitViolation", "RetreatFailure", "explain"]
+__all__ = ["CandidateResult", "Explanation", "LimitViolation", "RetreatFailure", "explain_cell"]
 
 
 class RetreatFailure(StrEnum):
@@ -60,7 +60,7 @@ class LimitViolation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CandidateResult:
-    """A candidate configuration of a cell and its fate.
+    """A candidate configuration of a cell, and what its check found.
 
     Attributes:
         reason: the stage at which it failed, or FEASIBLE.
@@ -68,11 +68,11 @@ class CandidateResult:
         phi: redundancy value (rad).
         sample: its index.
         branch: branch of the closed form.
-        beyond: the joints outside their limits, furthest first; for JOINT_LIMITS.
+        violations: the joints outside their limits, furthest first; for JOINT_LIMITS.
         collisions: all pairs that are closer than they may be, those of the stage first, deepest
             first; for a collision, and for one on the retreat.
         retreat: how far (m) from the grasp the retreat ended, the whole length if FEASIBLE.
-        lost: why the arm could not follow the retreat, None where it could.
+        failure: why the arm could not follow the retreat, None where it could.
         ended: (n,) joint values where it ended: those of the collisions.
         clearance: distance (m) at the grasp of all pairs that are checked at least, at most
             `CLEARANCE_LIMIT`; for FEASIBLE, else None.
@@ -115,12 +115,12 @@ class CandidateResult:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """What becomes of all candidates of a cell.
+    """All candidates of a cell, checked.
 
     Attributes:
         cell: the cell.
         reason: what Algorithm 1 says of it.
-        verdicts: its candidates, best first: the furthest stage, then the closest to being free.
+        candidates: its candidates, best first: the furthest stage, then the closest to being free.
             Empty where the hand rules the cell out, and out of reach.
         phi: (K,) redundancy samples (rad), with candidates or without.
         opening: opening of the hand (m).
@@ -134,6 +134,15 @@ class Explanation:
     opening: float
     T_world_tool: Array
 
+    def __str__(self) -> str:
+        """The reason, how many candidates have which, and a line for each."""
+        counts = ", ".join(f"{count} {reason.label}" for reason, count in self.counts().items())
+        lines = [f"{self.reason.label}: {len(self.candidates)} candidates{counts and ': ' + counts}"]
+        for c in self.candidates:
+            phi = math.degrees(c.phi)
+            lines.append(f"  φ {phi:7.1f}°  branch {c.branch}  {c.reason.label:18}  {c.why}")
+        return "\n".join(lines)
+
     @property
     def best(self) -> CandidateResult | None:
         """The candidate that came furthest."""
@@ -144,15 +153,15 @@ class Explanation:
         """Number of redundancy samples at which no configuration reaches the tool pose."""
         if self.reason < Reason.UNREACHABLE:
             return 0
-        return len(self.phi) - len({furthest.sample for furthest in self.candidates})
+        return len(self.phi) - len({c.sample for c in self.candidates})
 
     def counts(self) -> dict[Reason, int]:
         """Return how many candidates each reason has, the furthest first."""
-        reasons = [furthest.reason for furthest in self.candidates]  # already in that order
+        reasons = [c.reason for c in self.candidates]  # already in that order
         return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
 
-def explain(
+def explain_cell(
     world: BulletWorld,
     arm: Arm,
     ik: ClosedFormIK,
@@ -161,7 +170,7 @@ def explain(
     cell: Cell,
     progress: Progress | None = None,
 ) -> Explanation:
-    """Judge every candidate of one cell, past the first that is feasible.
+    """Check every candidate of one cell, also those after the first feasible one.
 
     Args:
         world: a world of the scene's robots, obstacles and object; it stays as it is.
@@ -172,62 +181,83 @@ def explain(
         cell: the cell.
         progress: told the finished share; may raise `Cancelled`.
     """
-    settings = world.scene.settings
     tools = manifold.tool_poses(task.T_world_object, arm.hand.finger_depth)
-    h = manifold.h[cell.row]
+    h = float(manifold.h[cell.row])
     opening = arm.hand.opening(float(manifold.profile.radius(h)))
-    stage, candidates = fit(arm.hand, manifold.profile, h), []
-    if stage is None:
+    reason, candidates = fit(arm.hand, manifold.profile, h), []
+    if reason is None:
+        T_base_tool = inverse(arm.robot.T_world_base) @ tools[cell]
         with world.kept():
-            world.margin = settings.margin
+            world.margin = world.scene.settings.margin
             world.set_arms(())
             world.set_object(task.T_world_object)
-            checker = CandidateChecker(world, arm, ik, settings.approach)
-            T_base_tool = inverse(arm.robot.T_world_base) @ tools
-            candidates = list(_verdicts(checker, T_base_tool[cell], opening, progress))
-        candidates.sort(key=CandidateResult._rank)
-        stage = candidates[0].reason if candidates else Reason.UNREACHABLE
+            checker = CandidateChecker(world, arm, ik, world.scene.settings.approach)
+            candidates = sorted(_results(checker, T_base_tool, opening, progress), key=CandidateResult._rank)
+        reason = candidates[0].reason if candidates else Reason.UNREACHABLE
     if progress and not candidates:
         progress(1.0)
-    return Explanation(cell, stage, tuple(candidates), ik.phi, opening, tools[cell])
+    return Explanation(cell, reason, tuple(candidates), ik.phi, opening, tools[cell])
 
 
-def _verdicts(
+def _results(
     checker: CandidateChecker, T_base_tool: Array, opening: float, progress: Progress | None
 ) -> Iterator[CandidateResult]:
+    """Yield the checked candidates of a tool pose (4, 4), by φ, then by branch."""
     solutions = checker.ik.solve(T_base_tool)
-    for k, q in enumerate(solutions.q):
+    for k, (q, inside) in enumerate(zip(solutions.q, solutions.inside, strict=True)):
         sample, branch = int(solutions.sample[k]), int(solutions.branch[k])
-        phi = float(checker.ik.phi[sample])
-        violations, collisions, failure, clearance = (), (), None, None
-        fate = CheckResult(Reason.JOINT_LIMITS, None, 0.0, q)
-        if not solutions.inside[k]:
-            violations = _violations(checker.arm, q)
+        if inside:
+            yield _checked(checker, T_base_tool, q, sample, branch, opening)
         else:
-            fate = checker.fate(T_base_tool, q, sample, opening)
-            if fate.collision:
-                checker.world.set_arm(checker.arm, fate.q, opening)
-                collisions = tuple(checker.world.arm_collisions(checker.arm))
-            elif fate.reason == Reason.APPROACH_BLOCKED:
-                failure = _failure(checker.ik, retreated(T_base_tool, fate.retreat), sample)
-            else:
-                checker.world.set_arm(checker.arm, q, opening)
-                clearance = checker.world.clearance(checker.arm, CLEARANCE_LIMIT)
-        yield CandidateResult(
-            fate.reason,
-            q,
-            phi,
-            sample,
-            branch,
-            violations,
-            collisions,
-            fate.retreat,
-            failure,
-            fate.q,
-            clearance,
-        )
+            yield _outside_limits(checker, q, sample, branch)
         if progress:
             progress((k + 1) / len(solutions.q))
+
+
+def _outside_limits(checker: CandidateChecker, q: Array, sample: int, branch: int) -> CandidateResult:
+    return CandidateResult(
+        reason=Reason.JOINT_LIMITS,
+        q=q,
+        phi=float(checker.ik.phi[sample]),
+        sample=sample,
+        branch=branch,
+        violations=_violations(checker.arm, q),
+        collisions=(),
+        retreat=0.0,
+        failure=None,
+        ended=q,
+        clearance=None,
+    )
+
+
+def _checked(
+    checker: CandidateChecker, T_base_tool: Array, q: Array, sample: int, branch: int, opening: float
+) -> CandidateResult:
+    """Check a candidate inside the limits, and ask the world for what the check alone does not say."""
+    world, arm = checker.world, checker.arm
+    check = checker.check(T_base_tool, q, sample, opening)
+    collisions, failure, clearance = (), None, None
+    if check.collision:
+        world.set_arm(arm, check.q, opening)
+        collisions = tuple(world.arm_collisions(arm))
+    elif check.reason == Reason.APPROACH_BLOCKED:
+        failure = _failure(checker.ik, retreated(T_base_tool, check.retreat), sample)
+    else:
+        world.set_arm(arm, q, opening)
+        clearance = world.clearance(arm, CLEARANCE_LIMIT)
+    return CandidateResult(
+        reason=check.reason,
+        q=q,
+        phi=float(checker.ik.phi[sample]),
+        sample=sample,
+        branch=branch,
+        violations=(),
+        collisions=collisions,
+        retreat=check.retreat,
+        failure=failure,
+        ended=check.q,
+        clearance=clearance,
+    )
 
 
 def _violations(arm: Arm, q: Array) -> tuple[LimitViolation, ...]:

@@ -21,6 +21,7 @@ from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, rotation_z
 from symgrasp.reason import Reason
+from symgrasp.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,6 +56,7 @@ class FeasibilityMap:
         pair: (R, H, A, 2) int16 into ``bodies``: what hits what, for a cell whose reason is a
             collision, of the candidate that came closest to being free; -1 elsewhere.
         depth: (R, H, A) how much closer (m) than allowed that pair is, NaN elsewhere.
+        shown_in: the scene, for `show`; it is not saved, so a map from a file has None.
     """
 
     scene: str
@@ -72,6 +74,7 @@ class FeasibilityMap:
     bodies: tuple[str, ...]
     pair: np.ndarray
     depth: Array
+    shown_in: Scene | None = None
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:

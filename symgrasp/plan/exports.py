@@ -97,7 +97,7 @@ def _region(plan: Plan, scene: Scene, hold: Hold) -> dict[str, Any]:
 
 
 def _height_range(scene: Scene, arm: Arm, hold: Hold) -> tuple[float, float]:
-    """Return the heights (m) around a grasp, inside its margin, where the same hand posture holds."""
+    """Return the heights (m) around a grasp, inside its margin, that the same opening can hold."""
     profile, hand, h = scene.profile, arm.hand, hold.grasp.h
     radius = float(profile.radius(h))
 

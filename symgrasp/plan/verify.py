@@ -24,7 +24,7 @@ from symgrasp.progress import Progress
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld
+from symgrasp.world import BulletWorld, open_world
 
 __all__ = ["Report", "verify"]
 
@@ -82,7 +82,7 @@ def verify(plan: Plan, progress: Progress | None = None) -> Report:
         report.expect(joints == robot.model.joint_names, f"robots: {name} has {robot.model.joint_names}")
     report.expect(set(plan.robots) == set(scene.robots), f"robots: the scene has {sorted(scene.robots)}")
     _check_order(plan, scene, report)
-    with BulletWorld(scene) as world:
+    with open_world(scene) as world:
         _check_grasps_stay(plan, world, report)
         holds = [(k, task, hold) for k, task in enumerate(plan.tasks) for hold in task.holds]
         parts = len(plan.tasks) + len(holds)
@@ -304,4 +304,4 @@ def _feasible(
     tool = inverse(arm.robot.T_world_base) @ _tool_of(arm, T, h, theta, roll > 1.0, radius)
     world.set_object(T)
     candidates = checker.candidates(tool, arm.hand.opening(radius))
-    return any(c.fate == Reason.FEASIBLE for c in candidates)
+    return any(c.reason == Reason.FEASIBLE for c in candidates)

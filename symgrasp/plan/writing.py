@@ -24,7 +24,7 @@ class Held(NamedTuple):
     """An arm that holds the object in a task.
 
     Attributes:
-        posture: its configuration.
+        configuration: its joint values and hand opening.
         map: its map of the task.
         cell: where on that map it holds.
         grasp: the same on the turned object, so the grasp itself.

@@ -52,7 +52,7 @@ class ConfigurationFinder:
         return witnesses(self.arms, self.maps, cells)
 
     def find(self, cells: Sequence[Cell], *, every: bool = True) -> list[ArmConfiguration] | None:
-        """Return postures, one an arm, that are free together, or None if there are none.
+        """Return configurations, one an arm, that are free together, or None if there are none.
 
         Args:
             cells: a feasible cell for every arm.
@@ -83,7 +83,7 @@ class ConfigurationFinder:
         tool = grasp_to_tool(m.T_world_object, h, theta, ROLLS[cell.roll], standoff)
         opening = float(m.opening[cell.row])
         candidates = self._checker(k).candidates(inverse(arm.robot.T_world_base) @ tool, opening)
-        return [ArmConfiguration(arm, c.q, opening) for c in candidates if c.fate == Reason.FEASIBLE]
+        return [ArmConfiguration(arm, c.q, opening) for c in candidates if c.reason == Reason.FEASIBLE]
 
     def _make_checker(self, k: int) -> CandidateChecker:
         settings = self.world.scene.settings

@@ -18,11 +18,11 @@ __all__ = ["FreePlacement", "FreePlacements", "Step"]
 
 
 class Step(NamedTuple):
-    """A task that is settled.
+    """A task with everything decided.
 
     Attributes:
         turn: columns that the object is turned by.
-        postures: of the task's arms, free together.
+        configurations: of the task's arms, free together.
         cells: where on its map each arm's grasp is then.
     """
 
@@ -46,7 +46,7 @@ class FreePlacement(NamedTuple):
 
 
 class _Attempt(NamedTuple):
-    """A placement that waits for its next best turns; the smallest is the most promising, then the first."""
+    """A placement whose next best turns are still to be tried; the smallest is the most promising one."""
 
     loss: float
     number: int
@@ -64,7 +64,7 @@ class FreePlacements:
 
     Args:
         search: the search for placements.
-        desks: finds the configurations of each task.
+        finders: find the configurations of each task, in order.
         progress: called now and then; may raise `Cancelled`.
 
     Attributes:
@@ -75,7 +75,7 @@ class FreePlacements:
         self, search: HoldingSearch, finders: Sequence[ConfigurationFinder], progress: Progress | None = None
     ) -> None:
         self.tried = 0
-        self._search, self._desks, self._progress = search, finders, progress
+        self._search, self._finders, self._progress = search, finders, progress
 
     def __iter__(self) -> Iterator[FreePlacement]:
         """Yield them; lazily, as finding one may take a while."""
@@ -111,7 +111,7 @@ class FreePlacements:
                 return
 
     def _is_listed(self, holding: Holding, listed: Sequence[FreePlacement]) -> bool:
-        angles = self._desks[0].maps[0].manifold.angles
+        angles = self._finders[0].maps[0].manifold.angles
         return len(holding.cells) > 1 and any(_near(holding.cells, p.grasps, angles) for p in listed)
 
     def _settle(self, holding: Holding) -> Iterator[tuple[float, list[Step] | None]]:
@@ -134,7 +134,7 @@ class FreePlacements:
 
     def _step(self, k: int, grasps: Sequence[Cell], turn: int) -> Step | None:
         """Return task k with the object at a turn, or None if nothing is free there."""
-        finder = self._desks[k]
+        finder = self._finders[k]
         angles = finder.maps[0].manifold.angles
         held = {run.arm: cell for run, cell in zip(self._search.holds, grasps, strict=True) if k in run.tasks}
         cells = [held[arm.name].turned(turn, angles) for arm in finder.arms]

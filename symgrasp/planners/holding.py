@@ -12,7 +12,7 @@ tasks, and one task with a hold for every arm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
@@ -74,7 +74,7 @@ class Turn(NamedTuple):
     clearance: float
 
 
-def hold_runs(tasks: Sequence[Sequence[str]]) -> list[HoldRun]:
+def hold_runs(tasks: Sequence[Collection[str]]) -> list[HoldRun]:
     """Return the holds of a sequence, in the order in which they begin.
 
     Args:
@@ -90,7 +90,7 @@ def hold_runs(tasks: Sequence[Sequence[str]]) -> list[HoldRun]:
     return holds
 
 
-def turn_groups(tasks: Sequence[Sequence[str]]) -> list[list[int]]:
+def turn_groups(tasks: Sequence[Collection[str]]) -> list[list[int]]:
     """Return the tasks, as indices, in groups that have one turn: nobody holds on within a group.
 
     Args:
@@ -109,8 +109,8 @@ class HoldingSearch:
     """Finds grasps for all holds of a sequence, completely and best first.
 
     Args:
-        maps: (index of the task, name of the arm) → map, all over the same grid.
-        tasks: for every task the names of the arms in it.
+        visits: for every visit of a task, in order, arm → its map there; all over the same grid. A task
+            is visited twice where the object is grasped anew in it.
         gaps: the gaps between the prints of the holds' arms, in the order of the holds.
 
     Raises:
@@ -123,21 +123,21 @@ class HoldingSearch:
 
     def __init__(
         self,
-        maps: Mapping[tuple[int, str], FeasibilityMap],
-        tasks: Sequence[Sequence[str]],
+        visits: Sequence[Mapping[str, FeasibilityMap]],
         gaps: PrintGaps,
     ) -> None:
-        check_same_grid(list(maps.values()))
-        self.holds, self.groups, self.gaps = hold_runs(tasks), turn_groups(tasks), gaps
-        self._maps = maps
-        self._shape = next(iter(maps.values())).feasible.shape
+        maps = [m for visit in visits for m in visit.values()]
+        check_same_grid(maps)
+        self.holds, self.groups, self.gaps = hold_runs(visits), turn_groups(visits), gaps
+        self._visits = visits
+        self._shape = maps[0].feasible.shape
         # By group and hold: margins (L, A) by line and column, the smallest of its tasks'.
         self._margins: dict[tuple[int, int], Array] = {}
         for g, group in enumerate(self.groups):
             for k in group:
                 for h, hold in enumerate(self.holds):
                     if k in hold.tasks:
-                        m = maps[k, hold.arm]
+                        m = visits[k][hold.arm]
                         margin = np.where(m.feasible, surface_margin(m), -1.0).reshape(-1, self._shape[2])
                         known = self._margins.get((g, h))
                         self._margins[g, h] = margin if known is None else np.minimum(known, margin)
@@ -185,7 +185,7 @@ class HoldingSearch:
         found: dict[tuple[int, int], Array] = {}
         for g, h in self._margins:
             tasks = [k for k in self.groups[g] if k in self.holds[h].tasks]
-            own = [self._maps[k, self.holds[h].arm].clearance.reshape(-1, self._shape[2]) for k in tasks]
+            own = [self._visits[k][self.holds[h].arm].clearance.reshape(-1, self._shape[2]) for k in tasks]
             found[g, h] = np.min(own, axis=0)
         return found
 

@@ -1,4 +1,4 @@
-"""From a scene to plans: maps, a planner, and what it decided written down.
+"""Plan a scene: compute the maps, run a planner, and write down what it decided.
 
 Every exact planner lists all its solutions, best first and lazily; the best plan is the first.
 """
@@ -18,13 +18,14 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan, Planner
 from symgrasp.plan.writing import write_plan
 from symgrasp.planners.bimanual import Climb, ClimbStep
-from symgrasp.planners.solving import Maps, climb, first_grasp, holdings, with_regrasps
+from symgrasp.planners.solving import Visit, climb, first_grasp, holdings, with_regrasps
 from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld
+from symgrasp.world import BulletWorld, open_world
 
 __all__ = [
+    "MapsByKey",
     "Plans",
     "bimanual_plans",
     "handover_plans",
@@ -41,11 +42,14 @@ SequentialMethod = Literal["best", "first", "regrasp"]
 Plans = Generator[Plan]
 """Plans, made when asked for, best first; `close` it when no more are wanted."""
 
+MapsByKey = Mapping[tuple[str, str], FeasibilityMap]
+"""(name of the task, name of the arm) → map: the one key of maps."""
+
 
 def plan_sequential(
     scene: Scene,
     arm: str | None = None,
-    maps: Mapping[str, FeasibilityMap] | None = None,
+    maps: MapsByKey | None = None,
     method: SequentialMethod = "best",
     progress: Progress | None = None,
 ) -> Plan:
@@ -54,7 +58,7 @@ def plan_sequential(
     Args:
         scene: the scene.
         arm: the arm; the first task's if None.
-        maps: task → map of that arm; computed where missing.
+        maps: (task, arm) → map; computed where missing.
         method: ``best`` is the grasp with the largest margin in its worst task, ``first`` is
             Algorithm 2 as printed, ``regrasp`` the fewest grasps that serve the whole sequence,
             with the object set down in between.
@@ -67,19 +71,17 @@ def plan_sequential(
     if method == "best":
         return _best(sequential_plans(scene, arm, maps, progress))
     name, tasks = _tasks_alone(scene, arm)
-    with BulletWorld(scene) as world:
-        all_maps = _maps_by_task(world, tasks, name, maps, progress)
-        if method == "first":
-            entries = first_grasp(world, tasks, all_maps, name)
-        else:
-            entries = with_regrasps(world, tasks, all_maps, name)
+    with open_world(scene) as world:
+        visits = _visits(world, tasks, maps, progress)
+        planner = first_grasp if method == "first" else with_regrasps
+        entries = planner(world, visits, name)
     return write_plan(scene, "sequential", Planner(algorithm=method), entries)
 
 
 def sequential_plans(
     scene: Scene,
     arm: str | None = None,
-    maps: Mapping[str, FeasibilityMap] | None = None,
+    maps: MapsByKey | None = None,
     progress: Progress | None = None,
 ) -> Plans:
     """List the plans with one grasp for all tasks that an arm does alone, best first.
@@ -87,27 +89,30 @@ def sequential_plans(
     One for every height and roll that serves all tasks, each with its best turns: in the order of
     `common_grasps`. Arguments and errors are those of `plan_sequential`.
     """
-    name, tasks = _tasks_alone(scene, arm)
-    with BulletWorld(scene) as world:
-        all_maps = _maps_by_task(world, tasks, name, maps, progress)
-        for entries, _ in holdings(world, tasks, all_maps, progress):
+    _, tasks = _tasks_alone(scene, arm)
+    with open_world(scene) as world:
+        visits = _visits(world, tasks, maps, progress)
+        for entries, _ in holdings(world, visits, progress):
             yield write_plan(scene, "sequential", Planner(algorithm="best"), entries)
 
 
 def sequential_maps(
     scene: Scene, arm: str | None = None, progress: Progress | None = None
-) -> dict[str, FeasibilityMap]:
-    """Return task → map for all tasks that an arm does alone, as `sequential_plans` takes them."""
-    name, tasks = _tasks_alone(scene, arm)
-    with BulletWorld(scene) as world:
-        maps = _maps_by_task(world, tasks, name, None, progress)
-    return {task.name: maps[k, name] for k, task in enumerate(tasks)}
+) -> dict[tuple[str, str], FeasibilityMap]:
+    """Return (task, arm) → map for all tasks that an arm does alone, in order.
+
+    Arguments and errors are those of `plan_sequential`.
+    """
+    _, tasks = _tasks_alone(scene, arm)
+    with open_world(scene) as world:
+        visits = _visits(world, tasks, None, progress)
+    return {(visit.task.name, arm): m for visit in visits for arm, m in visit.maps.items()}
 
 
 def plan_bimanual(
     scene: Scene,
     task: str | None = None,
-    maps: Mapping[str, FeasibilityMap] | None = None,
+    maps: MapsByKey | None = None,
     method: BimanualMethod = "exact",
     seed: int = 0,
     limits: Climb | None = None,
@@ -119,7 +124,7 @@ def plan_bimanual(
     Args:
         scene: the scene.
         task: a task that several arms do together; the first such task if None.
-        maps: arm → map of that task; computed where missing.
+        maps: (task, arm) → map; computed where missing.
         method: ``exact`` finds the placement with the largest gap and margins for which the whole
             robots are free, or proves that there is none on this grid; ``hill_climb`` is
             Algorithm 3.
@@ -135,16 +140,16 @@ def plan_bimanual(
     if method == "exact":
         return _best(bimanual_plans(scene, task, maps, progress))
     the_task = _task_together(scene, task)
-    with BulletWorld(scene) as world:
-        all_maps = _maps_by_arm(world, the_task, maps, progress)
-        entry, planner = climb(world, the_task, all_maps, seed, limits or Climb(), progress, trace)
+    with open_world(scene) as world:
+        (visit,) = _visits(world, [the_task], maps, progress)
+        entry, planner = climb(world, visit, seed, limits or Climb(), progress, trace)
     return write_plan(scene, "bimanual", planner, [entry])
 
 
 def bimanual_plans(
     scene: Scene,
     task: str | None = None,
-    maps: Mapping[str, FeasibilityMap] | None = None,
+    maps: MapsByKey | None = None,
     progress: Progress | None = None,
 ) -> Plans:
     """List the placements of all arms of a task, best first; neighbouring cells count as one.
@@ -152,15 +157,15 @@ def bimanual_plans(
     Arguments and errors are those of `plan_bimanual`.
     """
     the_task = _task_together(scene, task)
-    with BulletWorld(scene) as world:
-        all_maps = _maps_by_arm(world, the_task, maps, progress)
-        for entries, planner in holdings(world, [the_task], all_maps, progress):
+    with open_world(scene) as world:
+        visits = _visits(world, [the_task], maps, progress)
+        for entries, planner in holdings(world, visits, progress):
             yield write_plan(scene, "bimanual", planner, entries)
 
 
 def plan_handover(
     scene: Scene,
-    maps: Mapping[tuple[str, str], FeasibilityMap] | None = None,
+    maps: MapsByKey | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Find grasps for all tasks of a scene in order, whichever arms hold the object in each.
@@ -182,7 +187,7 @@ def plan_handover(
 
 def handover_plans(
     scene: Scene,
-    maps: Mapping[tuple[str, str], FeasibilityMap] | None = None,
+    maps: MapsByKey | None = None,
     progress: Progress | None = None,
 ) -> Plans:
     """List the plans for all tasks of a scene in order, best first; neighbouring cells count as one.
@@ -195,15 +200,13 @@ def handover_plans(
         if not still and not set(before.arms) & set(after.arms):
             expected = f"an arm that carries the object there from task {before.name!r}"
             raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
-    index = {task.name: k for k, task in enumerate(tasks)}
-    known = {(index[task], arm): m for (task, arm), m in (maps or {}).items()}
-    with BulletWorld(scene) as world:
+    with open_world(scene) as world:
         for before, after in pairwise(tasks):
             if not set(before.arms) & set(after.arms) and not world.rests(before.T_world_object):
                 expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
                 raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
-        all_maps = _all_maps(world, tasks, known, progress)
-        for entries, planner in holdings(world, tasks, all_maps, progress):
+        visits = _visits(world, tasks, maps, progress)
+        for entries, planner in holdings(world, visits, progress):
             yield write_plan(scene, "handover", planner, entries)
 
 
@@ -233,29 +236,20 @@ def _task_together(scene: Scene, task: str | None) -> Task:
     return found
 
 
-def _maps_by_task(
-    world: BulletWorld,
-    tasks: Sequence[Task],
-    arm: str,
-    known: Mapping[str, FeasibilityMap] | None,
-    progress: Progress | None,
-) -> Maps:
-    have = {(k, arm): known[task.name] for k, task in enumerate(tasks) if known and task.name in known}
-    return _all_maps(world, tasks, have, progress)
-
-
-def _maps_by_arm(
-    world: BulletWorld, task: Task, known: Mapping[str, FeasibilityMap] | None, progress: Progress | None
-) -> Maps:
-    return _all_maps(world, [task], {(0, arm): m for arm, m in (known or {}).items()}, progress)
-
-
-def _all_maps(world: BulletWorld, tasks: Sequence[Task], known: Maps, progress: Progress | None) -> Maps:
-    """Return the maps of all arms in all tasks, computing those that are not known."""
-    keys = [(k, arm) for k, task in enumerate(tasks) for arm in task.arms]
-    maker = MapMaker(world, world.scene)
-    maps: dict[tuple[int, str], FeasibilityMap] = {}
-    for done, (k, arm) in enumerate(keys):
-        step = (lambda share, done=done: progress((done + share) / len(keys))) if progress else None
-        maps[k, arm] = known.get((k, arm)) or maker.map(arm, tasks[k], progress=step)
-    return maps
+def _visits(
+    world: BulletWorld, tasks: Sequence[Task], known: MapsByKey | None, progress: Progress | None
+) -> list[Visit]:
+    """Visit every task once, with the maps of all its arms; those that are not known are computed."""
+    total = sum(len(task.arms) for task in tasks)
+    maker = MapMaker(world)
+    visits: list[Visit] = []
+    done = 0
+    for task in tasks:
+        maps: dict[str, FeasibilityMap] = {}
+        for arm in task.arms:
+            step = (lambda share, done=done: progress((done + share) / total)) if progress else None
+            given = (known or {}).get((task.name, arm))
+            maps[arm] = given or maker.map(arm, task, progress=step)
+            done += 1
+        visits.append(Visit(task, maps))
+    return visits

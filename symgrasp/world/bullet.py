@@ -245,10 +245,6 @@ class BulletWorld:
         """Put a robot at home."""
         self._set(robot, self.scene.robots[robot].home)
 
-    def set_robot(self, robot: str, values: ArrayLike) -> None:
-        """Put all joints (n,) of a robot, in the order of its model's ``joint_names``."""
-        self._set(robot, np.array(values, dtype=float))
-
     @contextmanager
     def kept(self) -> Iterator[None]:
         """Leave robots, object and margin as they were before the ``with`` block."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from symgrasp.errors import SceneError
 from symgrasp.scene.scene import Scene
-from symgrasp.world.bullet import BulletWorld
+from symgrasp.world.opening import open_world
 
 __all__ = ["RESTING_DEPTH", "check_tasks"]
 
@@ -18,7 +18,7 @@ def check_tasks(scene: Scene) -> None:
     Raises:
         SceneError: it is not; names both bodies and the depth.
     """
-    with BulletWorld(scene) as world:
+    with open_world(scene) as world:
         for i, task in enumerate(scene.tasks.values()):
             world.set_object(task.T_world_object)
             holders = [scene.arm(name).robot.name for name in task.arms]

@@ -93,7 +93,7 @@ def test_brute_force_agrees_with_the_map(name):
     task = scene.task()
     arm = scene.arm(task.arms[0])
     with BulletWorld(scene) as world:
-        m = MapMaker(world, scene).map()
+        m = MapMaker(world).map()
         brute = BruteForce(world, arm, solver_for(arm, scene.settings.redundancy), task.T_world_object)
         tools = m.manifold.tool_poses(task.T_world_object, arm.hand.finger_depth)
         T = inverse(arm.robot.T_world_base) @ tools

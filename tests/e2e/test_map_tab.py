@@ -51,7 +51,7 @@ def pick(page: GraspPage, m: FeasibilityMap, reason: Reason) -> Explanation:
     page.number("θ (°)", float(np.rad2deg(m.manifold.theta[column])))
     with BulletWorld(BOTTLE) as world:
         cell = (RollChoice.EITHER.roll(m, row, column), row, column)
-        return MapMaker(world, BOTTLE).explain("panda", "pick", cell)
+        return MapMaker(world).explain("panda", "pick", cell)
 
 
 def reds(view: np.ndarray) -> int:

@@ -127,7 +127,7 @@ def test_an_infeasible_cell_says_why(open_page, bottle_map):
     page.number("θ (°)", np.rad2deg(bottle_map.manifold.theta[column]))
     roll = RollChoice.EITHER.roll(bottle_map, row, column)
     with BulletWorld(BOTTLE) as world:
-        best = MapMaker(world, BOTTLE).explain("panda", "pick", (roll, row, column)).best
+        best = MapMaker(world).explain("panda", "pick", (roll, row, column)).best
     assert best
     assert best.collisions[0].b.body in ("table", "parcel", "lamp")
     expect(page.text("panda cannot hold it here: hits an obstacle. The best of")).to_be_visible()
@@ -356,7 +356,7 @@ def test_another_hand_is_mounted_where_the_scene_mounts_one(open_page):
     expect(page.text("The hand pr2 fits from ")).to_be_visible()
     page.expect_title("· iiwa")
     changed = Scene.load("log_iiwa_and_panda").with_hand("iiwa", "pr2")
-    assert np.array_equal(page.picture(), drawn(create_map(changed, "iiwa", "lift")))
+    assert np.array_equal(page.picture(), drawn(create_map(changed, task="lift", arm="iiwa")))
     page.choose("Object", "log_70mm")  # into the scene with the other hand
     expect(page.text("the log_70mm turns")).to_be_visible()
     expect(page.page.get_by_label("Hand", exact=True)).to_have_value("pr2")

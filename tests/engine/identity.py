@@ -1,4 +1,4 @@
-"""What it means that two ways of computing a map agree, with PyBullet as the judge of both."""
+"""What it means that two ways of computing a map agree, as PyBullet says of both."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def _check_witness(
     witness = m.witness(cell)
     assert witness is not None
     assert np.allclose(arm.tool_pose(witness.q), T_base_tool, atol=TOLERANCE)
-    fate = checker.fate(T_base_tool, witness.q, witness.sample, witness.opening)
-    assert fate.reason == Reason.FEASIBLE
+    result = checker.check(T_base_tool, witness.q, witness.sample, witness.opening)
+    assert result.reason == Reason.FEASIBLE
     world.set_arm(arm, witness.q, witness.opening)
     assert 0 <= witness.clearance <= world.clearance(arm, 0.1) + TOLERANCE
 
@@ -85,11 +85,11 @@ def _check_collision(
     solutions = checker.ik.solve(T_base_tool)
     inside = np.flatnonzero(solutions.inside)
     if reason == Reason.APPROACH_BLOCKED:
-        fates = (
-            checker.fate(T_base_tool, solutions.q[k], int(solutions.sample[k]), opening).reason
+        reasons = (
+            checker.check(T_base_tool, solutions.q[k], int(solutions.sample[k]), opening).reason
             for k in inside
         )
-        assert reason in fates
+        assert reason in reasons
         return
     names = {m.bodies[k] for k in m.pair[cell]}
     for k in inside:

@@ -68,7 +68,7 @@ def test_bounds_enclose_what_pybullet_measures(name):
     with BulletWorld(scene) as world:
         arms = scene.task().arms
         for arm_name in arms:
-            engine = ExactEngine(world, scene, scene.arm(arm_name), scene.manifold)
+            engine = ExactEngine(world, scene.arm(arm_name), scene.manifold)
             for _ in range(60 // len(arms)):
                 compared += compare(engine, world, rng)
     assert compared > 100

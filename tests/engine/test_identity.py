@@ -24,7 +24,7 @@ def test_shipped_scenes_have_the_same_maps_at_full_grid(name):
     """Every task with every arm that holds the object in it."""
     scene = Scene.load(name)
     with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+        maker = MapMaker(world)
         for task in scene.tasks.values():
             for arm in task.arms:
                 exact = maker.map(arm, task)
@@ -49,7 +49,7 @@ def check(content):
     scene = Scene.from_content(content)
     task = scene.task()
     with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+        maker = MapMaker(world)
         for arm in task.arms:
             exact = maker.map(arm, task)
             assert_same(exact, maker.map(arm, task, method="reference"))

@@ -8,7 +8,7 @@ import pytest
 from symgrasp.errors import Cancelled, MapError
 from symgrasp.feasibility import exact
 from symgrasp.feasibility.cell import Cell
-from symgrasp.feasibility.create import create_map
+from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import ClosedFormIK
 from symgrasp.object.manifold import ROLLS
@@ -33,7 +33,7 @@ def test_shipped_scenes_have_feasible_and_infeasible_cells(name):
     scene = load_small(name)
     for task in scene.tasks.values():
         for arm in task.arms:
-            m = create_map(scene, arm, task.name)
+            m = create_map(scene, task=task.name, arm=arm)
             assert m.feasible.any()
             assert not m.feasible.all()
 
@@ -200,7 +200,7 @@ def test_the_other_robot_is_an_obstacle():
     arm = scene.arm("right")
     moved = type(arm)(arm.name, stretched, arm.tool, arm.hand)
     blocked = replace(scene, robots={**scene.robots, "right": stretched}, arms={**scene.arms, "right": moved})
-    before, after = create_map(scene, "left"), create_map(blocked, "left")
+    before, after = create_map(scene, arm="left"), create_map(blocked, arm="left")
     assert (after.reason == Reason.ROBOT_COLLISION).any()
     assert not (after.feasible & ~before.feasible).any()
 
@@ -234,16 +234,16 @@ def test_a_cancelled_map_leaves_no_trace(method, monkeypatch):
 
     with BulletWorld(scene) as world:
         with pytest.raises(Cancelled):
-            create_map(scene, "left", method=method, world=world, progress=stop)
-        again = create_map(scene, "right", method=method, world=world)
-    assert np.array_equal(again.reason, create_map(scene, "right", method=method).reason)
+            MapMaker(world).map("left", method=method, progress=stop)
+        again = MapMaker(world).map("right", method=method)
+    assert np.array_equal(again.reason, create_map(scene, arm="right", method=method).reason)
 
 
 def test_a_world_can_be_used_again():
     scene = load_small("pick_pour_place")
     with BulletWorld(scene) as world:
         for task in scene.tasks:
-            shared = create_map(scene, task=task, world=world)
+            shared = MapMaker(world).map(task=task)
             assert np.array_equal(shared.reason, create_map(scene, task=task).reason)
 
 

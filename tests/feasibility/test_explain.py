@@ -43,7 +43,7 @@ def test_the_best_candidate_is_the_reason_of_both_maps(name, approach):
     scene = load_small(name, 6, 12, 6).with_settings(approach=approach)
     task = list(scene.tasks.values())[-1]
     with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+        maker = MapMaker(world)
         for arm in task.arms:
             reference = maker.map(arm, task, method="reference")
             exact = maker.map(arm, task)
@@ -67,7 +67,7 @@ def agrees_with_exact(found: Explanation, exact: FeasibilityMap, cell: Cell) -> 
 
 
 def assert_consistent(found: Explanation, world: BulletWorld, arm: Arm) -> None:
-    """What a verdict says is so, asked of URDF and PyBullet anew; the order is best first."""
+    """What is said of a candidate is so, asked of URDF and PyBullet anew; the order is best first."""
     T_base_tool = inverse(arm.robot.T_world_base) @ found.T_world_tool
     reasons = [v.reason for v in found.candidates]
     assert reasons == sorted(reasons, reverse=True)
@@ -97,23 +97,23 @@ def assert_consistent(found: Explanation, world: BulletWorld, arm: Arm) -> None:
         ask_pybullet(next(v for v in found.candidates if v.reason == reason), world, arm, found)
 
 
-def ask_pybullet(furthest, world: BulletWorld, arm: Arm, found: Explanation) -> None:
+def ask_pybullet(v, world: BulletWorld, arm: Arm, found: Explanation) -> None:
     with world.kept():
         world.margin = world.scene.settings.margin
-        world.set_arms([(arm, furthest.ended, found.opening)])
+        world.set_arms([(arm, v.ended, found.opening)])
         world.set_object(explained_pose(world))
         first = world.first_collision(arm)
-        if furthest.reason == Reason.JOINT_LIMITS or furthest.failure:
+        if v.reason == Reason.JOINT_LIMITS or v.failure:
             return
-        if furthest.collisions:
-            assert first == furthest.collisions[0]
+        if v.collisions:
+            assert first == v.collisions[0]
             parked = world.collisions([arm])  # what stands still counts there as well
             names = {(frozenset((c.a, c.b)), c.reason, c.depth) for c in parked}
-            assert {(frozenset((c.a, c.b)), c.reason, c.depth) for c in furthest.collisions} <= names
+            assert {(frozenset((c.a, c.b)), c.reason, c.depth) for c in v.collisions} <= names
         else:
             assert first is None
-            world.set_arms([(arm, furthest.q, found.opening)])
-            assert furthest.clearance == world.clearance(arm, CLEARANCE_LIMIT)
+            world.set_arms([(arm, v.q, found.opening)])
+            assert v.clearance == world.clearance(arm, CLEARANCE_LIMIT)
 
 
 def explained_pose(world: BulletWorld) -> np.ndarray:
@@ -127,7 +127,7 @@ def test_candidates_are_those_of_eaik():
     ik = ClosedFormIK(arm, 6)
     unreachable = 0
     with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+        maker = MapMaker(world)
         for cell in some_cells(maker.map()):
             found = maker.explain(None, None, cell)
             if found.reason < Reason.UNREACHABLE:
@@ -152,7 +152,7 @@ def test_retreats_end_for_every_cause():
     causes = set()
     ik, T_base_world = ClosedFormIK(scene.arm(), 6), inverse(scene.arm().robot.T_world_base)
     with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+        maker = MapMaker(world)
         m = maker.map(method="reference")
         for index in np.argwhere(m.reason == Reason.APPROACH_BLOCKED)[::3]:
             found = maker.explain(None, None, Cell(*map(int, index)))
@@ -171,7 +171,7 @@ def test_retreats_end_for_every_cause():
 def test_the_world_stays_as_it_was():
     scene = load_small("log_two_robots", 4, 8, 4)
     with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+        maker = MapMaker(world)
         cell = Cell(*map(int, np.argwhere(maker.map().feasible)[0]))
         left, right = scene.arm("left"), scene.arm("right")
         T = translation([0, 0, 0.05]) @ scene.task().T_world_object
@@ -194,7 +194,7 @@ def test_a_cell_of_another_grid_and_task():
     """The task need not be the scene's, the grid neither; progress ends at one."""
     scene = load_small("bottle_on_table", 6, 12, 4)
     with BulletWorld(scene) as world:
-        maker = MapMaker(world, scene)
+        maker = MapMaker(world)
         task = replace(scene.task(), T_world_object=translation([0.45, 0.1, 0.0]))
         grid = scene.manifold.shift(0.1)[0]
         m = maker.map(None, task, manifold=grid)
@@ -209,7 +209,7 @@ def test_on_the_command_line(capsys):
     scene = Scene.load("bottle_on_table")
     grid, arm = scene.manifold, scene.arm()
     with BulletWorld(scene) as world:
-        m = MapMaker(world, scene).map()
+        m = MapMaker(world).map()
     for reason in (Reason.FEASIBLE, Reason.JOINT_LIMITS, Reason.SCENE_COLLISION, Reason.SURFACE_TOO_STEEP):
         roll, row, column = np.argwhere(m.reason == reason)[0]
         where = ["--h", str(grid.h[row]), "--theta", str(math.degrees(grid.theta[column]))]

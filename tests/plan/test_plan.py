@@ -261,7 +261,7 @@ def test_files_that_are_no_plans(change, field, tmp_path):
 def test_methods():
     """The first grasp is Algorithm 2's, the best has the larger worst margin, and all can be replayed."""
     scene = load_small("pick_pour_place", 12, 24, 8)
-    maps = {task: create_map(scene, task=task) for task in scene.tasks}
+    maps = {(task, "panda"): create_map(scene, task=task) for task in scene.tasks}
     first, best = (plan_sequential(scene, maps=maps, method=m) for m in ("first", "best"))
 
     def worst(plan):
@@ -276,14 +276,15 @@ def test_methods():
 def test_a_regrasp_where_one_grasp_does_not_do():
     """Pick only low, pour only high: set down at the place, where both are feasible."""
     scene = load_small("pick_pour_place", 12, 24, 8)
-    maps = {task: create_map(scene, task=task) for task in scene.tasks}
+    maps = {(task, "panda"): create_map(scene, task=task) for task in scene.tasks}
 
     def only(task, rows):
-        reason = np.full_like(maps[task].reason, Reason.UNREACHABLE)
-        reason[:, rows] = maps[task].reason[:, rows]
-        return replace(maps[task], reason=reason)
+        m = maps[task, "panda"]
+        reason = np.full_like(m.reason, Reason.UNREACHABLE)
+        reason[:, rows] = m.reason[:, rows]
+        return {(task, "panda"): replace(m, reason=reason)}
 
-    maps |= {"pick": only("pick", slice(0, 6)), "pour": only("pour", slice(6, 12))}
+    maps |= only("pick", slice(0, 6)) | only("pour", slice(6, 12))
     with pytest.raises(ConflictError, match="no grasp serves pick and pour") as caught:
         plan_sequential(scene, maps=maps)
     assert caught.value.conflict.regrasps == (Shared(("pick",), "place"), Shared(("pour", "place"), None))

@@ -135,7 +135,8 @@ def moves(a: ClimbStep, b: ClimbStep, angles: int) -> int:
 def test_a_climb_can_be_replayed():
     """Every iteration of every restart: one hand moves by one cell at most, the last has no collisions."""
     scene = load_small("log_two_robots", 20, 24, 6)
-    maps = {arm: create_map(scene, arm) for arm in scene.task().arms}
+    task = scene.task()
+    maps = {(task.name, arm): create_map(scene, arm=arm) for arm in task.arms}
     for seed in range(100):
         trace: list[ClimbStep] = []
         plan = plan_bimanual(scene, maps=maps, method="hill_climb", seed=seed, trace=trace)

@@ -82,8 +82,7 @@ def random_maps(seed: int, count: int, density: float):
 def together(maps) -> HoldingSearch:
     """The search for several hands in one task."""
     names = [f"arm {k}" for k in range(len(maps))]
-    keyed = {(0, name): m for name, m in zip(names, maps, strict=True)}
-    return HoldingSearch(keyed, [names], small()[2])
+    return HoldingSearch([dict(zip(names, maps, strict=True))], small()[2])
 
 
 def apart(cells) -> float:
@@ -185,7 +184,7 @@ def test_sequences_by_trying_all_grasps(seed, tasks, density):
                 if reached <= best:
                     break
             best = max(best, reached)
-    search = HoldingSearch(maps, tasks, gaps)
+    search = HoldingSearch([{arm: maps[k, arm] for arm in arms} for k, arms in enumerate(tasks)], gaps)
     found = next(search.best_first(), None)
     assert (found is not None and found.score >= 0) == (best >= 0)
     if found and best >= 0:
@@ -215,7 +214,7 @@ def test_wide_open_maps_by_brute_force(count):
             others = np.minimum(pairs[second][:, None], pairs[second])
             best = max(best, min(pairs[first, second], np.minimum(reached, others).max()))
     names = [str(k) for k in range(count)]
-    search = HoldingSearch({(0, name): everything for name in names}, [names], gaps)
+    search = HoldingSearch([dict.fromkeys(names, everything)], gaps)
     found = next(search.best_first())
     assert found.score == pytest.approx(best)
     assert best > 0
@@ -242,8 +241,7 @@ def test_four_hands_by_trying_all(seed, density):
         reached = np.minimum(reached, gap.reshape([len(cells[k]) if k in (a, b) else 1 for k in range(4)]))
     best = reached.max(initial=-1.0)
     names = [str(k) for k in range(4)]
-    keyed = {(0, name): m for name, m in zip(names, maps, strict=True)}
-    found = next(HoldingSearch(keyed, [names], gaps).best_first(), None)
+    found = next(HoldingSearch([dict(zip(names, maps, strict=True))], gaps).best_first(), None)
     assert (found is not None and found.score >= 0) == (best >= 0)
     if found and best >= 0:
         assert found.score == pytest.approx(best)
@@ -260,10 +258,10 @@ def test_the_work_grows_with_the_number_of_tasks():
             nonlocal count
             count += event in ("call", "c_call")
 
-        maps = {(k, "a"): m for k in range(tasks)}
+        visits = [{"a": m}] * tasks
         sys.setprofile(note)
         try:
-            search = HoldingSearch(maps, [["a"]] * tasks, small()[2])
+            search = HoldingSearch(visits, small()[2])
             found = next(search.best_first())
             assert all(search.turns(found.cells, k) for k in range(tasks))
         finally:
@@ -288,7 +286,7 @@ def test_hands_that_pass_each_other_come_last(seed):
         gap = table.gaps[table.row[a.roll * 24 + a.row, b.roll * 24 + b.row], (b.column - a.column) % 8]
         if gap == PASSING:
             expected.add(difference((a, b)))
-    found = list(HoldingSearch({(0, "a"): maps[0], (0, "b"): maps[1]}, [["a", "b"]], gaps).best_first())
+    found = list(HoldingSearch([{"a": maps[0], "b": maps[1]}], gaps).best_first())
     passing = [h for h in found if h.score < 0]
     assert {difference(h.cells) for h in passing} == expected
     assert len(passing) == len(expected)
@@ -371,8 +369,8 @@ def test_an_object_that_stands_is_not_turned():
     assert turn_groups([["a"], ["b"], ["b"], ["a"]]) == [[0, 1], [2, 3]]
     one, other = np.zeros((2, 2, 6, 8), dtype=bool)
     one[0, 2, 3] = other[1, 3, 5] = True
-    keyed = {(0, "a"): map_of(one, grid=small()[1]), (1, "b"): map_of(other, grid=small()[1])}
-    search = HoldingSearch(keyed, [["a"], ["b"]], small()[2])
+    visits = [{"a": map_of(one, grid=small()[1])}, {"b": map_of(other, grid=small()[1])}]
+    search = HoldingSearch(visits, small()[2])
     (found,) = search.best_first()
     (turn,) = search.turns(found.cells, 0)
     assert [c.turned(turn.columns, 8) for c in found.cells] == [Cell(0, 2, 3), Cell(1, 3, 5)]
@@ -408,9 +406,7 @@ def test_three_hands_on_one_log():
     arms = [*scene.arms.values(), scene.arm("left")]
     everything = map_of(np.ones((2, 10, 8), dtype=bool), grid=scene.manifold)
     names = ["a", "b", "c"]
-    search = HoldingSearch(
-        {(0, name): everything for name in names}, [names], PrintGaps(arms, scene.manifold)
-    )
+    search = HoldingSearch([dict.fromkeys(names, everything)], PrintGaps(arms, scene.manifold))
     (holding,) = islice(search.best_first(), 1)
     prints = [a.handprint(scene.manifold, c.row, c.roll) for a, c in zip(arms, holding.cells, strict=True)]
     assert print_overlap(prints, [c.column for c in holding.cells]) == 0

@@ -100,8 +100,7 @@ def test_first_common_grasp_by_brute_force(maps):
 @settings(max_examples=100, deadline=None)
 def test_best_common_grasp_by_brute_force(maps):
     """No other height, roll and choice of angles has a better worst margin, or clearance of equal ones."""
-    keyed = {(k, "arm"): m for k, m in enumerate(maps)}
-    search = HoldingSearch(keyed, [["arm"]] * len(maps), no_gaps())
+    search = HoldingSearch([{"arm": m} for m in maps], no_gaps())
     best = (0.0, 0.0)
     for roll, row in product(range(2), range(5)):
         radius = float(GRID.profile.radius(GRID.h[row]))

@@ -16,7 +16,7 @@ from app.state.state import State
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld
+from symgrasp.world import BulletWorld, open_world
 from tests.app.state.test_state import results_of, small_map
 from tests.conftest import load_small
 
@@ -35,7 +35,7 @@ def quiet(share: float) -> None:
 def test_the_map_is_that_of_the_library(maps):
     request = changes.moved(State.of(load_small("bottle_on_table"), ""), x=0.5).request
     result = maps.map(request, quiet)
-    assert np.array_equal(result.map.reason, create_map(request.moved_scene(), "panda", "pick").reason)
+    assert np.array_equal(result.map.reason, create_map(request.moved_scene(), task="pick", arm="panda").reason)
     assert np.allclose(result.map.T_world_object, request.T_world_object)
 
 
@@ -44,9 +44,9 @@ def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(maps, mo
 
     def counted(scene: Scene) -> BulletWorld:
         worlds.append(scene)
-        return BulletWorld(scene)
+        return open_world(scene)
 
-    monkeypatch.setattr(map_service, "BulletWorld", counted)
+    monkeypatch.setattr(map_service, "open_world", counted)
     bottle, can = load_small("bottle_on_table"), load_small("soda_can")
     moved = changes.moved(State.of(bottle, ""), x=0.5)
     for scene in (bottle, moved.moved_scene(), pickle.loads(pickle.dumps(bottle))):

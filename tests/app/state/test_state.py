@@ -40,7 +40,7 @@ angle = st.floats(-math.pi, math.pi)
 @cache
 def small_map(name: str, task: str, arm: str, pose: ObjectPose | None = None) -> MapResult:
     request = MapRequest(load_small(name), arm, task, pose)
-    return MapResult(request, create_map(request.moved_scene(), arm, task))
+    return MapResult(request, create_map(request.moved_scene(), task=task, arm=arm))
 
 
 def opened(name: str = "bottle_on_table") -> State:
