@@ -35,7 +35,9 @@ def quiet(share: float) -> None:
 def test_the_map_is_that_of_the_library(maps):
     request = changes.moved(State.of(load_small("bottle_on_table"), ""), x=0.5).request
     result = maps.map(request, quiet)
-    assert np.array_equal(result.map.reason, create_map(request.moved_scene(), task="pick", arm="panda").reason)
+    assert np.array_equal(
+        result.map.reason, create_map(request.moved_scene(), task="pick", arm="panda").reason
+    )
     assert np.allclose(result.map.T_world_object, request.T_world_object)
 
 

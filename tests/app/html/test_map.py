@@ -38,7 +38,7 @@ def pictures(html: str, alt: str) -> list[np.ndarray]:
 
 
 def picture(state) -> np.ndarray:
-    (found,) = pictures(map_html(state.map, state.roll), "map")
+    (found,) = pictures(map_html(state.map, state.map_view.roll), "map")
     return found
 
 

@@ -74,7 +74,7 @@ def test_all_that_is_shown_of_a_cell_belongs_to_one_roll(view):
 
 @pytest.mark.parametrize("view", ColorBy)
 def test_turning_the_object_only_rolls_any_view(view):
-    state = with_view(opened(), view=view)
+    state = with_view(opened(), color_by=view)
     grid = state.scene.manifold
     before = cell_colors(state, state.map)
     turned = changes.turn(state, 3 * grid.dtheta)
@@ -110,7 +110,7 @@ def test_the_print_of_the_picked_grasp_lies_around_it():
 
 @pytest.mark.parametrize("view", [ColorBy.REASON, ColorBy.CLEARANCE])
 def test_the_picture_of_the_map_is_a_file(view):
-    state = with_view(changes.turn(opened(), 0.3), view=view)
+    state = with_view(changes.turn(opened(), 0.3), color_by=view)
     row, column = cell_with(state, Reason.FEASIBLE)
     state = with_view(changes.choose_cell(state, row, column), handprint=True)
     assert Image.open(io.BytesIO(map_picture(state, "PNG"))).width > 400
@@ -147,7 +147,7 @@ def test_the_comparison_counts_what_differs(bench):
     keep = np.ones(state.map.reason.shape, dtype=bool)
     keep[tuple(np.argwhere(state.result.map.feasible)[0])] = False
     wrong = state.result.map.masked(keep)
-    assert bench.check(state.next_request, wrong, quiet).differing == 1
+    assert bench.compare(state.next_request, wrong, quiet).differing == 1
 
 
 def test_the_comparison_follows_the_slider():
