@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures bench
+.PHONY: app test figures schemas bench
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -29,6 +29,9 @@ $(VENV)/dev.stamp: pyproject.toml | $(BIN)/python
 
 figures: $(VENV)/dev.stamp  ## make the pictures of the README and docs/ again
 	$(BIN)/python -m docs.figures $(ARGS)
+
+schemas: $(VENV)/dev.stamp  ## write the JSON Schemas of the file formats again
+	$(BIN)/python -m docs.schemas
 
 bench: $(VENV)/dev.stamp  ## measure, and write the README's table of times (minutes)
 	$(BIN)/symgrasp bench --out docs/bench.json

@@ -17,7 +17,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 
 __all__ = ["PAGES", "Block", "Step", "blocks", "commands", "refresh", "run", "shown"]
 

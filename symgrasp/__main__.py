@@ -2,6 +2,6 @@
 
 import sys
 
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 
 sys.exit(main())

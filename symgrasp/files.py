@@ -15,12 +15,23 @@ import yaml
 
 __all__ = ["SCENES_DIR", "file_sha256", "package_dir", "parse_yaml", "resolve", "write_atomically"]
 
-SCENES_DIR = Path(__file__).resolve().parent.parent / "static_scenes"
-"""The shipped scenes and their meshes; beside the package, in a checkout and when installed."""
+_PACKAGE = Path(__file__).resolve().parent
+
+SCENES = "static_scenes"
+"""Name of the folder of the shipped scenes, and of the package in ``package://static_scenes/…``."""
+
+SCENES_DIR = (_PACKAGE if (_PACKAGE / SCENES).is_dir() else _PACKAGE.parent) / SCENES
+"""The shipped scenes and their meshes: inside this package where it is installed, beside it in a checkout."""
 
 
 def package_dir(name: str) -> Path | None:
-    """Return the folder of an importable Python package without importing it, or None."""
+    """Return the folder of an importable Python package without importing it, or None.
+
+    ``static_scenes``, which files refer to as a package, is the folder of the shipped scenes wherever
+    that is.
+    """
+    if name == SCENES:
+        return SCENES_DIR
     if "." in name:  # finding a package inside another would import the other
         return None
     try:

@@ -9,7 +9,7 @@ from pathlib import Path
 from numba import njit
 
 import symgrasp
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 from symgrasp.compiling import COMPILING, SOURCES, telling_of_compiling
 
 PROGRAM = """

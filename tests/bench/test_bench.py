@@ -10,7 +10,7 @@ import pytest
 from symgrasp import bench
 from symgrasp.bench import maps, planners
 from symgrasp.bench.brute import BruteForce
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.ik import solver_for
 from symgrasp.poses import inverse

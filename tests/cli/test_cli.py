@@ -13,8 +13,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from symgrasp.cli import main
+from docs.schemas import schemas
+from symgrasp.cli import export
+from symgrasp.cli.main import main
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan, plan_schema
 from symgrasp.scene.scene import Scene
 from tests.conftest import SHIPPED, write_scene
@@ -30,6 +33,10 @@ def test_scenes_lists_what_ships(capsys):
     assert main(["scenes"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == SHIPPED
+
+
+def test_every_format_of_plans_can_be_asked_for():
+    assert set(export.FORMATS) == set(EXPORTS)
 
 
 @pytest.mark.parametrize("ending", ["npz", "png", "svg", "json"])
@@ -84,11 +91,12 @@ def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):
 def test_schemas_are_schemas(name, capsys):
     assert main(["schema", name]) == 0
     printed = capsys.readouterr().out
+    assert printed == schemas()[name], "make schemas"
     schema = json.loads(printed)
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["properties"]["schema_version"]["const"] == 1
     shipped = resources.files("symgrasp") / "schemas" / f"{name}.schema.json"
-    assert shipped.read_text(encoding="utf-8") == printed, f"symgrasp schema {name} > {shipped}"
+    assert shipped.read_text(encoding="utf-8") == printed
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 from symgrasp.errors import Cancelled
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
 from symgrasp.feasibility.create import MapMaker

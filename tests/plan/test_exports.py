@@ -9,7 +9,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 from symgrasp.object.manifold import grasp_to_tool
 from symgrasp.plan.exports import to_csv, to_trajectories, to_tsr
 from symgrasp.poses import pose_error, rotation_z, translation

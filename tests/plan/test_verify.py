@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 from symgrasp.errors import PlanError
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify

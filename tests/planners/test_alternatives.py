@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 from symgrasp.errors import Cancelled, PlanError
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import create_map

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.cli import main
+from symgrasp.cli.main import main
 from symgrasp.errors import UrdfError
 from symgrasp.files import resolve
 from symgrasp.poses import from_rotation, rpy

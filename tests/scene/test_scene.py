@@ -14,7 +14,7 @@ from symgrasp.poses import from_position_rpy, translation
 from symgrasp.robot.hand import HANDS
 from symgrasp.scene.format import scene_schema
 from symgrasp.scene.scene import Scene
-from symgrasp.scene.shipped import shipped_scenes
+from symgrasp.scene.shipped import list_scenes, shipped_scenes
 from tests.conftest import SHIPPED, write_scene
 
 
@@ -31,6 +31,11 @@ def test_shipped_scenes_fit_the_schema(name):
     assert Scene.load(path).sha256 == Scene.load(name).sha256
     assert Scene.load(name).name == name
     assert path.read_text().startswith("# ")  # what it shows, and where its numbers come from
+
+
+def test_the_list_of_scenes_says_what_their_files_say():
+    assert list_scenes() == {name: Scene.load(name).file.description for name in SHIPPED}
+    assert all(list_scenes().values())
 
 
 def test_defaults(content, tmp_path):

@@ -12,7 +12,7 @@ import sys
 
 import pytest
 
-from app.__main__ import serve
+from app.server.serve import serve
 from app.html.readout import grasp_html, map_title, notes_html, solution_html, status_html
 from app.state import changes, job_changes
 from app.state.requests import MapResult

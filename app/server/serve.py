@@ -1,0 +1,72 @@
+"""Serving the page until it is interrupted."""
+
+from __future__ import annotations
+
+import errno
+import socket
+import sys
+import threading
+import warnings
+
+from app.compute.cache import SharedCache
+from app.compute.warm_up import compute_first_map
+from app.server.lobby import open_lobby
+from symgrasp.compiling import COMPILING, telling_of_compiling
+from symgrasp.errors import InputError
+
+__all__ = ["serve"]
+
+
+def serve(scene: str, host: str, port: int) -> None:
+    """Serve the page until interrupted; the address is printed once it listens.
+
+    Args:
+        scene: the scene to open with, a shipped name or a file.
+        host: address to listen on.
+        port: port to listen on; never another one.
+
+    Raises:
+        InputError: the scene is unusable or the port is not free.
+    """
+    _check_free(host, port)
+    cache = _warm_cache(scene)
+    # A browser may leave while something is drawn for it.
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
+    try:
+        with open_lobby(cache, host, port):
+            shown = f"[{host}]" if ":" in host else host
+            print(f"symgrasp: http://{shown}:{port}", flush=True)
+            threading.Event().wait()
+    except OSError as error:  # taken meanwhile
+        raise _busy(port, (error.strerror or str(error)).lower()) from error
+    except KeyboardInterrupt:
+        print("\nsymgrasp: stopped", flush=True)
+
+
+def _warm_cache(scene: str) -> SharedCache:
+    """Return the cache with the first map in it, so that whoever opens the page finds it there."""
+    with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
+        cache = SharedCache(scene)
+        compute_first_map(cache)
+    return cache
+
+
+def _check_free(host: str, port: int) -> None:
+    if not 0 < port < 65536:
+        raise InputError("command line", "--port", port, "a port from 1 to 65535")
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except (socket.gaierror, UnicodeError) as error:
+        raise InputError("command line", "--host", host, "an address of this machine") from error
+    with socket.socket(family, kind) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(address)
+        except OSError as error:
+            if error.errno == errno.EADDRNOTAVAIL:
+                raise InputError("command line", "--host", host, "an address of this machine") from error
+            raise _busy(port, (error.strerror or str(error)).lower()) from error
+
+
+def _busy(port: int, reason: str) -> InputError:
+    return InputError("command line", "--port", port, f"a free port ({reason}); choose another with --port")

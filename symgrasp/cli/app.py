@@ -1,0 +1,27 @@
+"""``symgrasp app``: start the page."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+
+from symgrasp.cli.shared import Commands, add_command, add_scene
+
+__all__ = ["add_parser", "run"]
+
+
+def add_parser(commands: Commands) -> None:
+    """Add the command to the parser."""
+    command = add_command(commands, "app", run, "Start the page and print its address.")
+    add_scene(command, optional=True)
+    command.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
+    command.add_argument("--port", type=int, default=8080, help="port to listen on (default: %(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve the page until interrupted; return the exit status."""
+    from symgrasp.page import import_page
+
+    logging.basicConfig(level=logging.WARNING, format="symgrasp: %(message)s")
+    import_page("server.serve").serve(args.scene, host=args.host, port=args.port)
+    return 0

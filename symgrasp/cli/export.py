@@ -1,0 +1,31 @@
+"""``symgrasp export``: write a plan for another tool."""
+
+from __future__ import annotations
+
+import argparse
+
+from symgrasp.cli.shared import Commands, add_command, add_out, add_plan, check_out, write_out
+
+__all__ = ["FORMATS", "add_parser", "run"]
+
+FORMATS = ("csv", "trajectory", "tsr")
+"""The keys of `symgrasp.plan.exports.EXPORTS`, which takes long to import."""
+
+
+def add_parser(commands: Commands) -> None:
+    """Add the command to the parser."""
+    command = add_command(commands, "export", run, "Write a plan in the format of another tool.")
+    command.add_argument("format", choices=FORMATS)
+    add_plan(command)
+    add_out(command, "the file to write", required=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the plan in the other format; return the exit status."""
+    check_out(args.out)
+
+    from symgrasp.plan.exports import EXPORTS
+    from symgrasp.plan.plan import Plan
+
+    write_out(args.out, EXPORTS[args.format](Plan.load(args.plan)).encode())
+    return 0

@@ -1,0 +1,69 @@
+"""``symgrasp map``: compute a feasibility map."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING
+
+from symgrasp.cli.shared import (
+    Commands,
+    add_command,
+    add_out,
+    add_scene,
+    add_task_and_arm,
+    check_out,
+    chosen,
+    progress_of,
+    write_out,
+)
+from symgrasp.errors import InputError, one_of
+
+if TYPE_CHECKING:
+    from symgrasp.feasibility.map import FeasibilityMap
+
+__all__ = ["add_parser", "run"]
+
+ENDINGS = (".npz", ".png", ".svg", ".json")
+
+
+def add_parser(commands: Commands) -> None:
+    """Add the command to the parser."""
+    text = "Compute a feasibility map and count its cells by reason."
+    command = add_command(commands, "map", run, text)
+    add_scene(command)
+    add_task_and_arm(command)
+    add_out(command, "write the map: .npz, .png, .svg or .json")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute the map, print its counts and write it if asked to; return the exit status."""
+    check_out(args.out)
+    if args.out and args.out.suffix not in ENDINGS:
+        raise InputError("command line", "--out", str(args.out), "an ending: " + one_of(ENDINGS))
+
+    from symgrasp.feasibility.create import create_map
+
+    scene, task, arm = chosen(args)
+    with progress_of(f"map of {task.name}") as progress:
+        the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress)
+    cells = the_map.reason.size
+    print(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
+    for reason, count in the_map.counts().items():
+        print(f"  {reason.label:20} {count:6}  {100 * count / cells:5.1f} %")
+    if args.out:
+        write_out(args.out, _content(the_map, args.out.suffix))
+    return 0
+
+
+def _content(the_map: FeasibilityMap, ending: str) -> bytes:
+    """Return what a file of this ending holds."""
+    from symgrasp.feasibility.pictures import to_svg
+
+    if ending == ".png":
+        return the_map._repr_png_()
+    if ending == ".svg":
+        return to_svg(the_map.plot())
+    if ending == ".json":
+        return (json.dumps(the_map.to_dict(), allow_nan=False) + "\n").encode()
+    return the_map.to_npz()

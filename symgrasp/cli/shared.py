@@ -1,0 +1,170 @@
+"""What several commands have in common: options, checks of their values, and progress on a terminal.
+
+The modules of the commands import packages that take long to load (numpy, numba, pydantic, PyBullet,
+viser) inside the functions that need them, so that ``--help`` and wrong options are answered at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from symgrasp.errors import InputError
+
+if TYPE_CHECKING:
+    from symgrasp.robot.robot import Arm
+    from symgrasp.scene.parts import Task
+    from symgrasp.scene.scene import Scene
+
+__all__ = [
+    "Commands",
+    "add_command",
+    "add_out",
+    "add_plan",
+    "add_scene",
+    "add_task_and_arm",
+    "check_out",
+    "checked_scene",
+    "chosen",
+    "progress_of",
+    "whole",
+    "write_out",
+]
+
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+"""What `argparse.ArgumentParser.add_subparsers` returns."""
+
+DEFAULT_SCENE = "bottle_on_table"
+
+
+def add_command(
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], text: str
+) -> argparse.ArgumentParser:
+    """Add a command to the parser.
+
+    Args:
+        commands: where to add it.
+        name: what is typed to run it.
+        run: does the command's work and returns its exit status.
+        text: one line of help.
+
+    Returns:
+        The command's own parser, for its options.
+    """
+    command = commands.add_parser(name, help=text, description=text)
+    command.set_defaults(run=run)
+    return command
+
+
+def add_scene(command: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """Add the argument SCENE; one that is optional has a default."""
+    text = "name of a shipped scene, or a .yaml file"
+    command.add_argument(
+        "scene", metavar="SCENE", help=text, nargs="?" if optional else None, default=DEFAULT_SCENE
+    )
+
+
+def add_plan(command: argparse.ArgumentParser) -> None:
+    """Add the argument PLAN, a file that is read."""
+    command.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
+
+
+def add_task_and_arm(command: argparse.ArgumentParser) -> None:
+    """Add ``--task`` and ``--arm``, which `chosen` reads."""
+    command.add_argument("--task", metavar="NAME", help="task (default: the first)")
+    command.add_argument("--arm", metavar="NAME", help="arm (default: the task's first)")
+
+
+def add_out(
+    command: argparse.ArgumentParser, text: str, *, option: str = "--out", required: bool = False
+) -> None:
+    """Add an option that names a file to write."""
+    command.add_argument(option, metavar="FILE", type=Path, required=required, help=text)
+
+
+def whole(lowest: int) -> Callable[[str], int]:
+    """Return the type of an option that takes a whole number, from the lowest on."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < lowest:
+            raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from {lowest} on")
+        return int(text)
+
+    return read
+
+
+def check_out(out: Path | None) -> None:
+    """Check, before anything is computed, that a file can be written if one is asked for.
+
+    Raises:
+        InputError: its folder does not exist, or it is a folder itself.
+    """
+    if out is None:
+        return
+    if not out.parent.is_dir():
+        raise InputError("command line", "--out", str(out), f"a file in an existing folder, not {out.parent}")
+    if out.is_dir():
+        raise InputError("command line", "--out", str(out), "a file, not a folder")
+
+
+def write_out(out: Path, content: bytes) -> None:
+    """Write a file in one piece and say so."""
+    from symgrasp.files import write_atomically
+
+    with write_atomically(out) as file:
+        file.write(content)
+    print(f"written to {out}")
+
+
+def checked_scene(name: str) -> Scene:
+    """Load a scene and check that its tasks can be computed.
+
+    Args:
+        name: of a shipped scene, or of a file.
+
+    Raises:
+        SymgraspError: the scene is unusable, or the object collides with something in a task.
+    """
+    from symgrasp.scene.scene import Scene
+    from symgrasp.world import check_tasks
+
+    scene = Scene.load(name)
+    check_tasks(scene)
+    return scene
+
+
+def chosen(args: argparse.Namespace) -> tuple[Scene, Task, Arm]:
+    """Return what SCENE, ``--task`` and ``--arm`` mean.
+
+    Raises:
+        SymgraspError: as `checked_scene`; or the scene has no such task or arm.
+    """
+    scene = checked_scene(args.scene)
+    task = scene.task(args.task)
+    return scene, task, scene.arm(args.arm or task.arms[0])
+
+
+@contextmanager
+def progress_of(what: str) -> Iterator[Callable[[float], None] | None]:
+    """Tell about a computation inside the ``with`` block.
+
+    If code is compiled meanwhile, stderr says so.
+
+    Args:
+        what: is being computed.
+
+    Yields:
+        A callback that shows a percentage; None where stderr is no terminal.
+    """
+    from symgrasp.compiling import COMPILING, telling_of_compiling
+
+    def show(share: float) -> None:
+        end = "\n" if share >= 1 else ""
+        print(f"\r{what}: {100 * share:3.0f} %", end=end, file=sys.stderr, flush=True)
+
+    with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
+        yield show if sys.stderr.isatty() else None
