@@ -11,27 +11,41 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
-__all__ = ["import_page"]
+from symgrasp.errors import SymgraspError
+
+__all__ = ["page_module", "page_package"]
 
 _FOLDER = Path(__file__).resolve().parent.parent
 _NAME = "symgrasp_app" if (_FOLDER / "symgrasp_app").is_dir() else "app"
 
 
-def import_page(module: str) -> ModuleType:
-    """Import a module of the page that belongs to this package, whatever else is named ``app``.
+def page_package() -> str:
+    """Return the name under which the page's package can be imported.
 
-    Args:
-        module: its name inside the page's package, such as ``server.serve``.
+    What else is named ``app`` is passed by: if the path leads there first, the folder of the page comes
+    before it from now on. The processes that the page starts get this path and import the page again.
 
     Raises:
-        ImportError: the page is not there, or another package of its name is imported already.
+        SymgraspError: the page is not installed, or another package of its name is imported already.
     """
     if not _is_ours():
-        # On the path, because the processes that the page starts get this path and import it again.
         sys.path.insert(0, str(_FOLDER))
         if not _is_ours():
-            raise ImportError(f"no page of symgrasp in {_FOLDER / _NAME}, or another {_NAME!r} is in use")
-    return import_module(f"{_NAME}.{module}")
+            del sys.path[0]
+            raise SymgraspError(f"the package of the page is not installed, or another {_NAME!r} is in use")
+    return _NAME
+
+
+def page_module(name: str) -> ModuleType:
+    """Import a module of the page's package.
+
+    Args:
+        name: of the module in the package, such as ``server.serve``.
+
+    Raises:
+        SymgraspError: as `page_package`.
+    """
+    return import_module(f"{page_package()}.{name}")
 
 
 def _is_ours() -> bool:

@@ -8,21 +8,22 @@ from types import ModuleType
 
 import pytest
 
-from symgrasp.page import import_page
+from symgrasp.errors import SymgraspError
+from symgrasp.page import page_module
 
 PROGRAM = """
 import multiprocessing
-from symgrasp.page import import_page
+from symgrasp.page import page_module
 
 if __name__ == "__main__":
-    palette = import_page("render.palette")
+    palette = page_module("render.palette")
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         print(pool.apply(palette.rgb, ("#ff0000",)))
 """
 
 
 def test_it_is_the_folder_beside_the_library():
-    assert import_page("render.palette").__name__ == "app.render.palette"
+    assert page_module("render.palette").__name__ == "app.render.palette"
 
 
 def test_a_package_of_the_same_name_in_the_way_is_passed_by(tmp_path):
@@ -40,9 +41,10 @@ def test_a_package_of_the_same_name_in_the_way_is_passed_by(tmp_path):
 def test_a_package_of_the_same_name_in_use_is_an_error(monkeypatch):
     foreign = ModuleType("app")
     monkeypatch.setitem(sys.modules, "app", foreign)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    with pytest.raises(ImportError, match="another 'app' is in use"):
-        import_page("render.palette")
+    path = [*sys.path]
+    with pytest.raises(SymgraspError, match="another 'app' is in use"):
+        page_module("render.palette")
+    assert sys.path == path
 
 
 def test_the_page_s_own_command_is_the_command_app():

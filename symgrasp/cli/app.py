@@ -20,8 +20,8 @@ def add_parser(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page until interrupted; return the exit status."""
-    from symgrasp.page import import_page
+    from symgrasp.page import page_module
 
     logging.basicConfig(level=logging.WARNING, format="symgrasp: %(message)s")
-    import_page("server.serve").serve(args.scene, host=args.host, port=args.port)
+    page_module("server.serve").serve(args.scene, host=args.host, port=args.port)
     return 0
