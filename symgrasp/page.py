@@ -1,11 +1,11 @@
-"""Finding the page's package, which this package runs but does not import otherwise.
-
-In a checkout it is the folder ``app`` beside this package; a wheel holds it as ``symgrasp_app``.
-"""
+"""The package of the page, which nothing here may import until it is asked for, and showing what it draws."""
 
 from __future__ import annotations
 
 import sys
+import tempfile
+import webbrowser
+from html import escape
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,10 +13,13 @@ from types import ModuleType
 
 from symgrasp.errors import SymgraspError
 
-__all__ = ["page_module", "page_package"]
+__all__ = ["in_notebook", "page_module", "page_package", "show_html", "show_picture"]
 
 _FOLDER = Path(__file__).resolve().parent.parent
 _NAME = "symgrasp_app" if (_FOLDER / "symgrasp_app").is_dir() else "app"
+
+FRAME_HEIGHT = 480
+"""Height (px) of a 3D view in a notebook."""
 
 
 def page_package() -> str:
@@ -55,3 +58,50 @@ def _is_ours() -> bool:
     except ValueError:  # loaded without saying from where
         return False
     return bool(spec and spec.origin and Path(spec.origin).resolve() == _FOLDER / _NAME / "__init__.py")
+
+
+def in_notebook() -> bool:
+    """Whether this is a Jupyter kernel, which can display pictures and pages."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return getattr(shell, "kernel", None) is not None
+
+
+def show_picture(png: bytes, name: str) -> None:
+    """Display a picture in a notebook; elsewhere write it to a file and print where.
+
+    Args:
+        png: the picture.
+        name: what it shows, for the file.
+    """
+    if in_notebook():
+        from IPython.display import Image, display
+
+        display(Image(png))
+    else:
+        print(f"{name}: {_written(png, name, '.png').as_uri()}")
+
+
+def show_html(document: str, name: str) -> None:
+    """Display an HTML document in a notebook; elsewhere write it to a file, print where, and open it.
+
+    Args:
+        document: the document; it needs no other file.
+        name: what it shows, for the file.
+    """
+    if in_notebook():
+        from IPython.display import HTML, display
+
+        frame = f'<iframe srcdoc="{escape(document)}" width="100%" height="{FRAME_HEIGHT}"></iframe>'
+        display(HTML(f"<div>{frame}</div>"))
+    else:
+        address = _written(document.encode(), name, ".html").as_uri()
+        print(f"{name} in 3D: {address}")
+        webbrowser.open(address)
+
+
+def _written(content: bytes, name: str, ending: str) -> Path:
+    """Write a file that outlives this program, and return its path."""
+    stem = "".join(c if c.isalnum() else "_" for c in name)
+    with tempfile.NamedTemporaryFile(prefix=f"{stem}_", suffix=ending, delete=False) as file:
+        file.write(content)
+    return Path(file.name)

@@ -14,10 +14,10 @@ import symgrasp
 REPOSITORY = Path(symgrasp.__file__).parent.parent
 
 ROOMS = [
-    "symgrasp.errors", "symgrasp.progress", "symgrasp.files", "symgrasp.compiling", "symgrasp.poses",
-    "symgrasp.meshes", "symgrasp.reason", "symgrasp.object", "symgrasp.robot", "symgrasp.ik",
-    "symgrasp.scene", "symgrasp.world", "symgrasp.engine", "symgrasp.feasibility", "symgrasp.plan",
-    "symgrasp.planners", "symgrasp.bench", "symgrasp.page", "symgrasp.cli", "symgrasp.__main__",
+    "symgrasp.errors", "symgrasp.progress", "symgrasp.files", "symgrasp.page", "symgrasp.compiling",
+    "symgrasp.poses", "symgrasp.meshes", "symgrasp.reason", "symgrasp.object", "symgrasp.robot",
+    "symgrasp.ik", "symgrasp.scene", "symgrasp.world", "symgrasp.engine", "symgrasp.feasibility",
+    "symgrasp.plan", "symgrasp.planners", "symgrasp.bench", "symgrasp.cli", "symgrasp.__main__",
     "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute", "app.panels",
     "app.server", "app.__main__",
 ]  # fmt: skip

@@ -36,7 +36,7 @@ from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
-__all__ = ["PLAN_LIMIT", "OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService"]
+__all__ = ["PLAN_LIMIT", "OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService", "plan_result"]
 
 PLAN_LIMIT = 5_000_000
 """Largest plan file (bytes) that is read."""
@@ -169,7 +169,7 @@ class PlanService:
                 return _climb(request, scene, maps, progress)
             if request.method in ("first", "regrasp"):
                 plan = plan_sequential(scene, request.name, maps, request.method, progress)
-                return PlanOutcome(request.kind, (_result(plan, scene),))
+                return PlanOutcome(request.kind, (plan_result(plan, scene),))
             self._progress, self._scene = progress, scene
             self._list = self._new_list(request, scene, maps)
             plans, more = self._next()
@@ -209,7 +209,7 @@ class PlanService:
         keys = dict.fromkeys((task.name, hold.arm) for task in plan.tasks for hold in task.holds)
         requests = [MapRequest(scene, arm, task) for task, arm in keys]
         self._maps.maps(requests, {}, lambda share: progress((1 + share) / 2))
-        return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), _result(plan, scene))
+        return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene))
 
     def _new_list(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:
         def tell(share: float) -> None:
@@ -226,7 +226,7 @@ class PlanService:
         if self._list is None or self._scene is None:
             return (), False
         scene = self._scene
-        plans = tuple(_result(plan, scene) for plan in islice(self._list, LISTED))
+        plans = tuple(plan_result(plan, scene) for plan in islice(self._list, LISTED))
         more = len(plans) == LISTED
         if not more:
             self.close()
@@ -241,11 +241,11 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
         plan = plan_bimanual(
             scene, request.name, maps, "hill_climb", request.seed, progress=progress, trace=steps
         )
-        found = _result(plan, scene)
+        found = plan_result(plan, scene)
     except NoPlanError as error:
         refusal = Refusal(str(error))
     try:
-        exact = _result(plan_bimanual(scene, request.name, maps, progress=progress), scene)
+        exact = plan_result(plan_bimanual(scene, request.name, maps, progress=progress), scene)
     except NoPlanError as error:
         refusal = Refusal(str(error))
     arms = request.tasks[0].arms
@@ -255,8 +255,8 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
     return PlanOutcome(request.kind, refusal=refusal, climb=climb)
 
 
-def _result(plan: Plan, scene: Scene) -> PlanResult:
-    """Return a plan with the prints of its hands and the gaps between them."""
+def plan_result(plan: Plan, scene: Scene) -> PlanResult:
+    """Return a plan of a scene with the prints of its hands and the gaps between them."""
     prints = tuple({h.arm: _print(scene, h) for h in task.holds} for task in plan.tasks)
     return PlanResult(plan, prints, tuple(_gap(scene, task) for task in plan.tasks))
 

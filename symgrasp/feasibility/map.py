@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symgrasp.errors import MapError, ProfileError
+from symgrasp import page
+from symgrasp.errors import MapError, ProfileError, SymgraspError
 from symgrasp.feasibility import pictures
 from symgrasp.feasibility.cell import Cell, Margin, Witness
 from symgrasp.feasibility.color_by import ColorBy, color_map
@@ -21,10 +23,11 @@ from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, rotation_z
 from symgrasp.reason import Reason
-from symgrasp.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from symgrasp.scene.scene import Scene
 
 __all__ = ["FeasibilityMap"]
 
@@ -175,17 +178,41 @@ class FeasibilityMap:
             found = np.nan
         return np.where(self.feasible, found, np.nan)
 
-    def plot(self, view: ColorBy = ColorBy.REASON) -> Figure:
-        """Draw both rolls of the map with axes, a legend and counts, or the scale of the values."""
+    def plot(self, view: ColorBy = ColorBy.REASON, marks: Sequence[tuple[float, float]] = ()) -> Figure:
+        """Draw both rolls of the map with axes, a legend and counts, or the scale of the values.
+
+        Args:
+            view: what the colours stand for.
+            marks: grasps (h, θ) (m, rad) to circle.
+        """
         m = self.manifold
         title = f"{self.scene} · {self.task} · {self.arm}"
         coloured = color_map(view, self.reason, self.values(view))
         heights = (m.profile.h_min, m.profile.h_max)
-        return pictures.draw_map(coloured, heights, m.theta_start, title, ("roll 0°", "roll 180°"))
+        return pictures.draw_map(coloured, heights, m.theta_start, title, ("roll 0°", "roll 180°"), marks)
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows."""
         return pictures.to_png(self.plot())
+
+    def show(self) -> None:
+        """Show the picture of the map, and the object and the arm in 3D.
+
+        A notebook displays both. Elsewhere they are written to files in the system's temporary folder,
+        whose addresses are printed, and the 3D view is opened in a browser. A map that was loaded
+        from a file does not know its scene, so its picture is all there is.
+        """
+        name = f"{self.scene}, {self.task} with {self.arm}"
+        page.show_picture(self._repr_png_(), name)
+        if self.shown_in is None:
+            print(f"{name}: no 3D view, because the map does not know its scene")
+            return
+        try:
+            document = page.page_module("server.notebook").map_html(self, self.shown_in)
+        except (ImportError, SymgraspError) as error:
+            print(f"{name}: no 3D view: {error}")
+        else:
+            page.show_html(document, name)
 
     def _meta(self) -> dict[str, Any]:
         return {

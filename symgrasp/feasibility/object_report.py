@@ -65,6 +65,9 @@ class ObjectReport:
             text.append(f"  {hand + ' holds it':20} {where}")
         return text
 
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
     def plot(self) -> Figure:
         """Draw the profile and, for an object from a mesh, the map of its deviations."""
         return pictures.draw_object(self.profile.points, self.measurement, self.name)

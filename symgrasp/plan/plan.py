@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from symgrasp.errors import PlanError
+from symgrasp import page
+from symgrasp.errors import PlanError, SymgraspError
+from symgrasp.feasibility.pictures import to_png
 from symgrasp.files import write_atomically
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.scene.format import describe
@@ -133,6 +135,37 @@ class Plan(_Part):
         """Write the plan, in one piece."""
         with write_atomically(Path(path)) as file:
             file.write(self.to_json().encode())
+
+    def show(self) -> None:
+        """Show on the maps of its tasks where the arms hold, and the arms at the object in 3D.
+
+        A notebook displays both. Elsewhere they are written to files in the system's temporary folder,
+        whose addresses are printed, and the 3D view is opened in a browser.
+
+        Raises:
+            SymgraspError: the scene in the plan is unusable.
+        """
+        from symgrasp.feasibility.create import MapMaker  # reading plans takes no physics
+        from symgrasp.scene.scene import Scene
+        from symgrasp.world import open_world
+
+        scene = Scene.from_content(self.scene.content, "plan: scene.content")
+        with open_world(scene) as world:
+            maker = MapMaker(world)
+            keys = dict.fromkeys((task.name, hold.arm) for task in self.tasks for hold in task.holds)
+            maps = {(task, arm): maker.map(arm, task) for task, arm in keys}
+        for task in self.tasks:
+            for hold in task.holds:
+                seen = maps[task.name, hold.arm].shift(task.delta)
+                png = to_png(seen.plot(marks=[(hold.grasp.h, hold.grasp.theta)]))
+                page.show_picture(png, f"{self.scene.name}, {task.name} with {hold.arm}")
+        name = f"{self.scene.name}, {self.kind} plan"
+        try:
+            document = page.page_module("server.notebook").plan_html(self, scene, maps)
+        except (ImportError, SymgraspError) as error:
+            print(f"{name}: no 3D view: {error}")
+        else:
+            page.show_html(document, name)
 
     @staticmethod
     def load(path: str | Path) -> Plan:

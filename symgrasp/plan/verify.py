@@ -12,6 +12,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -52,6 +53,15 @@ class Report:
         """Whether every statement holds."""
         return self.checks > 0 and not self.failures
 
+    def __bool__(self) -> bool:
+        """Whether every statement holds, so that a report can be asserted."""
+        return self.holds
+
+    def __str__(self) -> str:
+        """One line a failure, and one that sums up."""
+        result = "the plan holds" if self.holds else f"{len(self.failures)} do not hold"
+        return "\n".join([*self.failures, f"{self.checks} statements checked: {result}"])
+
     def expect(self, ok: bool | np.bool_, failure: str) -> bool:
         """Note one statement; ``failure`` says what is wrong where it does not hold."""
         self.checks += 1
@@ -60,13 +70,20 @@ class Report:
         return bool(ok)
 
 
-def verify(plan: Plan, progress: Progress | None = None) -> Report:
+def verify(plan: Plan | str | Path, progress: Progress | None = None) -> Report:
     """Check every statement of a plan; see the module's text for what that takes.
 
     Args:
-        plan: the plan.
+        plan: the plan, or the path of its file.
         progress: told the finished share; may raise `Cancelled`.
+
+    Returns:
+        What was checked and what does not hold; true where all of it holds.
+
+    Raises:
+        PlanError: the file is missing or is not a plan.
     """
+    plan = plan if isinstance(plan, Plan) else Plan.load(plan)
     report = Report()
     canonical = json.dumps(plan.scene.content, sort_keys=True).encode()
     digest = hashlib.sha256(canonical).hexdigest()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import yaml
 from scipy.spatial import ConvexHull
 
 from symgrasp.errors import UrdfError
+from symgrasp.files import resolve
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, from_rotation, inverse, quat_wxyz, rpy
 from symgrasp.robot.assembly import Frame
@@ -21,7 +23,7 @@ from symgrasp.robot.model import RobotModel
 __all__ = ["hand_yaml", "measure_hand"]
 
 STEPS = 65
-"""Postures from closed to open at which the fingers are measured."""
+"""Steps from closed to open at which the fingers are measured."""
 
 TIP = 0.010
 """Where the tool frame is put (m) behind the ends of the fingers, half a usual pad, if no link says."""
@@ -43,17 +45,20 @@ TABLE_ERROR = 2.5e-4
 """By how much (m) the opening may differ from what the table of a joint says."""
 
 
-def measure_hand(model: RobotModel, tool: str | None = None) -> Hand:
+def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand:
     """Measure a parallel hand.
 
     Args:
-        model: the hand's URDF, or that of a robot with the hand on it.
+        urdf: the hand's URDF, or that of a robot with the hand on it: loaded, a path, or
+            ``package://<python package>/<path>``.
         tool: a link fixed to the palm, needed where a robot has several hands. Where it lies
             before the palm, its origin becomes that of the tool frame; the axes are measured.
 
     Raises:
-        UrdfError: there is no such link, or nothing that opens and closes like a parallel hand.
+        UrdfError: the URDF is unusable, there is no such link, or nothing that opens and closes like a
+            parallel hand.
     """
+    model = urdf if isinstance(urdf, RobotModel) else _load(urdf)
     anatomy = find_anatomy(model, tool)
     gripper = find_gripper(model, anatomy)
     palm, fingers = solid_links(model, anatomy.palm), solid_links(model, *gripper.sides)
@@ -75,6 +80,13 @@ def measure_hand(model: RobotModel, tool: str | None = None) -> Hand:
         tool=_tool_frame(model, T, anatomy.base, tool),
         urdf=str(model.path.resolve()) if anatomy.alone else None,
     )
+
+
+def _load(reference: str | Path) -> RobotModel:
+    path = resolve(str(reference), Path())
+    if path is None:
+        raise UrdfError(reference, "urdf", str(reference), "an existing URDF file")
+    return RobotModel(path)
 
 
 def hand_yaml(hand: Hand) -> str:
@@ -176,7 +188,7 @@ def _finger_depth(gripper: Gripper, T_base_tool: Array, palm: float) -> float:
 
 
 def _openings(gripper: Gripper, T_base_tool: Array, depth: float) -> tuple[Array, Array]:
-    """Return postures (m,) from where the fingers touch to fully open, and the openings (m,) there."""
+    """Return steps (m,) from where the fingers touch to fully open, and the openings (m,) there."""
     steps = np.linspace(0.0, 1.0, STEPS)
     gaps = np.array([gripper.gap(t, T_base_tool, depth) for t in steps])
     first = int(np.argmax(gaps > 0))

@@ -23,7 +23,7 @@ from symgrasp.scene.map_content import map_content
 from symgrasp.scene.parts import Obstacle, Task
 from symgrasp.scene.shipped import shipped_scenes
 
-__all__ = ["Scene"]
+__all__ = ["Scene", "load_scene"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,6 +242,20 @@ class Scene:
         except ValidationError as error:
             raise SceneError("map settings", *describe(error, changes)) from None
         return replace(self, file=self.file.model_copy(update={"map": settings}))
+
+
+def load_scene(scene: str | Path | Mapping[str, Any]) -> Scene:
+    """Load a scene.
+
+    Args:
+        scene: the name of a shipped scene, the path of a .yaml file, or the content of such a file; files
+            that a content refers to are found from the current folder.
+
+    Raises:
+        SceneError: no such scene, not YAML, or a field is wrong.
+        UrdfError, MeshError, ProfileError: a file that the scene refers to is unusable.
+    """
+    return Scene.from_content(scene) if isinstance(scene, Mapping) else Scene.load(scene)
 
 
 def _sha256(content: Mapping[str, Any]) -> str:

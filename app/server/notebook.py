@@ -1,0 +1,67 @@
+"""The 3D view of a map or a plan as one HTML document, for notebooks and scripts: what viser writes down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from html import escape
+
+from app.compute.plan_service import plan_result
+from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
+from app.server.snapshot import snapshot_html
+from app.state import changes
+from app.state.plan_changes import show_results, show_step
+from app.state.plan_results import PlanResults
+from app.state.requests import MapRequest, MapResult
+from app.state.state import State
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.plan.plan import Plan
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+
+__all__ = ["map_html", "plan_html"]
+
+ASPECT = 1.6
+"""Width by height that the view is framed for."""
+
+HEIGHT = 400
+"""Height (px) of the view of each task of a plan."""
+
+
+def map_html(m: FeasibilityMap, scene: Scene) -> str:
+    """Draw a map on the object, with the arm at home.
+
+    Args:
+        m: the map, of a task of the scene.
+        scene: the scene; the object is shown in the map's pose.
+    """
+    grid = m.manifold
+    scene = scene.with_settings(heights=grid.heights, angles=grid.angles)
+    scene = scene.with_task(Task(m.task, scene.task(m.task).arms, m.T_world_object))
+    state = changes.choose_arm(changes.choose_task(State.of(scene, scene.name), m.task), m.arm)
+    return _drawn(replace(state, result=MapResult(state.request, m)))
+
+
+def plan_html(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap]) -> str:
+    """Draw every task of a plan: the turned object, and the arms that hold it.
+
+    Args:
+        plan: the plan.
+        scene: its scene.
+        maps: (task, arm) → map, of every task and arm of the plan.
+    """
+    known = {(task, arm): MapResult(MapRequest(scene, arm, task), m) for (task, arm), m in maps.items()}
+    results = PlanResults().found(plan.kind, (plan_result(plan, scene),), known, more=False)
+    state = show_results(State.of(scene, scene.name), results)
+    views = [
+        f"<h3>{escape(task.name)}</h3>"
+        f'<iframe srcdoc="{escape(_drawn(show_step(state, step)))}" width="100%" height="{HEIGHT}"></iframe>'
+        for step, task in enumerate(plan.tasks)
+    ]
+    return "<!DOCTYPE html><meta charset='utf-8'>" + "".join(views)
+
+
+def _drawn(state: State) -> str:
+    view = viewpoint(state.scene, state.T_world_object)
+    camera = (*view.camera(ASPECT).tolist(), *view.look_at.tolist())
+    return snapshot_html(state, camera, FIELD_OF_VIEW)
