@@ -68,7 +68,7 @@ def create_map_reference(
 
 
 def _decide(draft: MapDraft, cell: Cell, candidates: Iterable[Candidate]) -> None:
-    """Record what the candidates of a cell say about it."""
+    """Record a cell as feasible, or why the furthest of its candidates fails."""
     reason, best = furthest(candidates)
     if best is not None and reason == Reason.FEASIBLE:
         draft.record_feasible(cell, best.q, best.sample, best.branch)

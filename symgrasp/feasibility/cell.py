@@ -1,4 +1,4 @@
-"""Cells of a map, and what is known of a feasible one."""
+"""Cells of a map, and the witness and margins of a feasible one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["CLEARANCE_LIMIT", "Cell", "Margin", "Witness"]
 
 
 CLEARANCE_LIMIT = 0.05
-"""Clearances above this (m) are all the same."""
+"""Clearances are measured up to this distance (m)."""
 
 
 class Cell(NamedTuple):

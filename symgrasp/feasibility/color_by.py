@@ -1,4 +1,4 @@
-"""What a map can be coloured by: the reasons, or a value with its scale; all suit the colour-blind."""
+"""Colouring a map by its reasons, or by a value with a scale; all colours suit the colour-blind."""
 
 from __future__ import annotations
 
@@ -95,15 +95,15 @@ class ColoredMap:
     scale: Scale | None = None
 
 
-def color_map(view: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap:
+def color_map(color_by: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap:
     """Colour a map.
 
     Args:
-        view: what its colours stand for.
+        color_by: what its colours stand for.
         reason: (..., H, A) of `Reason`.
-        values: (..., H, A) what a view with a unit shows, in that unit; NaN where there is none.
+        values: (..., H, A) values in the unit of ``color_by``; NaN where there is none.
     """
-    if view is ColorBy.REASON:
+    if color_by is ColorBy.REASON:
         colors = np.array([_channels(r.color) for r in Reason], dtype=np.uint8)
         counts = np.bincount(reason.ravel(), minlength=len(Reason))
         swatches = [Swatch(r.color, r.label, int(counts[r])) for r in reversed(Reason) if counts[r]]
@@ -111,7 +111,7 @@ def color_map(view: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap:
     feasible = reason == Reason.FEASIBLE
     count = int(np.count_nonzero(feasible))
     rest = feasible.size - count
-    if view is ColorBy.FEASIBLE:
+    if color_by is ColorBy.FEASIBLE:
         swatches = (
             Swatch(_hex(FEASIBLE), "feasible", count),
             Swatch(_hex(INFEASIBLE), "not feasible", rest),
@@ -125,7 +125,7 @@ def color_map(view: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap:
     at = np.linspace(0, len(SCALE) - 1, STEPS)
     ramp = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=-1)
     colors = np.vstack([[NONE], np.round(ramp)]).astype(np.uint8)
-    scale = Scale(f"{view} ({view.unit})", high, colors[1:])
+    scale = Scale(f"{color_by} ({color_by.unit})", high, colors[1:])
     index = np.where(known, steps, 0).astype(np.uint8)
     return ColoredMap(index, colors, (Swatch(_hex(NONE), "not feasible", rest),), scale)
 

@@ -241,10 +241,14 @@ class ExactEngine:
         _record(draft, bodies, found, cells, fixed)
         for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.open_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
-            self._decide(draft, cell, goals.T_base_tool[i], self._listed(found, int(i), goals.T_base_tool[i]))
+            self._decide(
+                draft, cell, goals.T_base_tool[i], self._undecided(found, int(i), goals.T_base_tool[i])
+            )
             yield
 
-    def _listed(self, found: search.SearchResult, i: int, T_base_tool: Array) -> list[tuple[Array, int, int]]:
+    def _undecided(
+        self, found: search.SearchResult, i: int, T_base_tool: Array
+    ) -> list[tuple[Array, int, int]]:
         """Return the undecided candidates of an open cell, or all inside the limits where they are many."""
         count = int(found.open_count[i])
         if count <= search.OPEN_KEPT:

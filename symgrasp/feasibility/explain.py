@@ -233,7 +233,7 @@ def _outside_limits(checker: CandidateChecker, q: Array, sample: int, branch: in
 def _checked(
     checker: CandidateChecker, T_base_tool: Array, q: Array, sample: int, branch: int, opening: float
 ) -> CandidateResult:
-    """Check a candidate inside the limits, and ask the world for what the check alone does not say."""
+    """Check a candidate inside the limits, and measure all its collisions or its clearance."""
     world, arm = checker.world, checker.arm
     check = checker.check(T_base_tool, q, sample, opening)
     collisions, failure, clearance = (), None, None

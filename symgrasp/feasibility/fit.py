@@ -1,4 +1,4 @@
-"""Which hand fits an object where, whatever the arm does: the radius dimension of the map."""
+"""Whether a hand fits an object at a height: the part of feasibility in which the arm has no say."""
 
 from __future__ import annotations
 
@@ -22,7 +22,16 @@ ROWS = 400
 
 
 def fit(hand: Hand, profile: Profile, h: float) -> Reason | None:
-    """Return why a hand cannot hold a profile at height h whatever the arm does, or None."""
+    """Return why a hand cannot hold an object at a height, for any arm and any angle.
+
+    Args:
+        hand: the hand.
+        profile: the object.
+        h: the height (m).
+
+    Returns:
+        `Reason.HAND_TOO_SMALL` or `Reason.SURFACE_TOO_STEEP`, or None where the hand fits.
+    """
     if not (hand.spans(float(profile.radius(h))) and hand.palm_has_room(profile, h)):
         return Reason.HAND_TOO_SMALL
     if not hand.pads_rest(profile, h):
@@ -39,10 +48,11 @@ def plot_openings(profile: Profile, hands: Mapping[str, Hand]) -> Figure:
     """
     h = np.linspace(profile.h_min, profile.h_max, ROWS)
     radii = profile.radius(h)
-    reason = np.array([[_stage(fit(hand, profile, x)) for x in h] for hand in hands.values()])
+    reason = np.array([[_reason(fit(hand, profile, x)) for x in h] for hand in hands.values()])
     openings = np.array([[hand.opening(float(r)) for r in radii] for hand in hands.values()])
     return pictures.draw_openings(h, 2 * radii, list(hands), openings, reason)
 
 
-def _stage(reason: Reason | None) -> Reason:
-    return Reason.FEASIBLE if reason is None else reason
+def _reason(misfit: Reason | None) -> Reason:
+    """Return a reason for every height: FEASIBLE where the hand fits."""
+    return Reason.FEASIBLE if misfit is None else misfit

@@ -164,35 +164,35 @@ class FeasibilityMap:
             clearance=np.where(drop, np.nan, self.clearance),
         )
 
-    def values(self, view: ColorBy) -> Array:
-        """(R, H, A) what a view shows, in its unit; NaN where infeasible, and where it has no unit."""
-        if view is ColorBy.CLEARANCE:
+    def values(self, color_by: ColorBy) -> Array:
+        """Return the values (R, H, A) that colours stand for, in their unit; NaN where there is none."""
+        if color_by is ColorBy.CLEARANCE:
             return 1e3 * self.clearance
-        if view is ColorBy.ALONG:
+        if color_by is ColorBy.ALONG:
             found = 1e3 * self.margins[..., 0]
-        elif view is ColorBy.AROUND:
+        elif color_by is ColorBy.AROUND:
             found = np.rad2deg(self.margins[..., 1])
-        elif view is ColorBy.OPENING:
+        elif color_by is ColorBy.OPENING:
             found = 1e3 * self.opening[:, None]
         else:
             found = np.nan
         return np.where(self.feasible, found, np.nan)
 
-    def plot(self, view: ColorBy = ColorBy.REASON, marks: Sequence[tuple[float, float]] = ()) -> Figure:
+    def plot(self, color_by: ColorBy = ColorBy.REASON, marks: Sequence[tuple[float, float]] = ()) -> Figure:
         """Draw both rolls of the map with axes, a legend and counts, or the scale of the values.
 
         Args:
-            view: what the colours stand for.
+            color_by: what the colours stand for.
             marks: grasps (h, θ) (m, rad) to circle.
         """
         m = self.manifold
         title = f"{self.scene} · {self.task} · {self.arm}"
-        coloured = color_map(view, self.reason, self.values(view))
+        coloured = color_map(color_by, self.reason, self.values(color_by))
         heights = (m.profile.h_min, m.profile.h_max)
         return pictures.draw_map(coloured, heights, m.theta_start, title, ("roll 0°", "roll 180°"), marks)
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows."""
+        """Return the picture that a notebook displays for a map."""
         return pictures.to_png(self.plot())
 
     def show(self) -> None:

@@ -1,4 +1,4 @@
-"""How many cells away the nearest infeasible one is."""
+"""Margins of feasible cells, counted in cells."""
 
 from __future__ import annotations
 

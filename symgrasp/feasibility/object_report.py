@@ -1,4 +1,4 @@
-"""What there is to say about an object before any robot comes into it."""
+"""A report on an object alone: its profile, how it was measured, and which hands hold it where."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def describe_object(name: str | Path, scale: float = 1.0, hands: Mapping[str, Ha
 
 
 def holding_heights(hand: Hand, profile: Profile) -> tuple[tuple[float, float], ...]:
-    """Return the intervals of heights (m) at which a hand can hold an object, whatever the arm does."""
+    """Return the intervals of heights (m) at which a hand fits an object, to half a millimetre."""
     count = max(2, int(np.ceil((profile.h_max - profile.h_min) / STEP)) + 1)
     heights = np.linspace(profile.h_min, profile.h_max, count)
     fits = np.array([fit(hand, profile, float(h)) is None for h in heights])

@@ -1,4 +1,4 @@
-"""Pictures of maps, for files and notebooks."""
+"""Pictures of maps, hands and objects by matplotlib, for files and notebooks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plan file, checked, with what is needed to show it."""
+"""Reading a plan file and verifying it before anything of it is shown."""
 
 from __future__ import annotations
 
@@ -25,10 +25,6 @@ class CheckedPlan:
     plan: Plan
     report: Report
     scene: Scene | None
-
-    def is_for(self, scene: Scene) -> bool:
-        """Whether the plan was made for exactly this scene."""
-        return self.plan.scene.sha256 == scene.sha256
 
 
 def check_plan(content: str | bytes, source: str, progress: Progress | None = None) -> CheckedPlan:

@@ -1,4 +1,4 @@
-"""Writes down what a planner decided: grasps become poses, joint values, clearances and margins."""
+"""Write down what a planner decided: grasps become poses, joint values, clearances and margins."""
 
 from __future__ import annotations
 
@@ -37,7 +37,14 @@ class Held(NamedTuple):
 
 
 def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held]) -> PlanTask:
-    """Write one task with the object turned by ``delta`` (rad) about its axis."""
+    """Write one task.
+
+    Args:
+        world: a world of the scene; object and arms end where the plan puts them.
+        task: the task.
+        delta: turn (rad) of the object about its axis.
+        held: the arms that hold the object.
+    """
     turned = task.T_world_object @ rotation_z(delta)
     world.set_object(turned)
     world.set_arms(h.configuration for h in held)

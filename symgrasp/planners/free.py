@@ -51,15 +51,15 @@ class _Attempt(NamedTuple):
     loss: float
     number: int
     holding: Holding
-    settling: Iterator[tuple[float, list[Step] | None]]
+    choices: Iterator[tuple[float, list[Step] | None]]
 
 
 class FreePlacements:
     """Lists the placements for which there are configurations in which nothing collides, best first.
 
     Complete, so the first is the best, and an empty list is a proof. Where nothing is free at the
-    best turns of a placement, it waits until no other placement promises more than what its next
-    best turns reach. Of placements of several hands that are like a listed one but for neighbouring
+    best turns of a placement, it waits until no other placement can reach more than its next
+    best turns do. Of placements of several hands that are like a listed one but for neighbouring
     cells, none is listed.
 
     Args:
@@ -78,35 +78,35 @@ class FreePlacements:
         self._search, self._finders, self._progress = search, finders, progress
 
     def __iter__(self) -> Iterator[FreePlacement]:
-        """Yield them; lazily, as finding one may take a while."""
+        """Yield the placements; each is searched for when it is asked for."""
         waiting: list[_Attempt] = []
         listed: list[FreePlacement] = []
         placements = self._search.best_first()
-        promised = np.inf
+        bound = np.inf
         while True:
             if self._progress:
                 self._progress(1.0)  # how many there are is not known beforehand; lets the caller cancel
-            if waiting and -waiting[0].loss >= promised:
+            if waiting and -waiting[0].loss >= bound:
                 attempt = heapq.heappop(waiting)
                 if self._is_listed(attempt.holding, listed):
                     continue
-                reached, settled = next(attempt.settling, (None, None))
-                if settled:
+                reached, steps = next(attempt.choices, (None, None))
+                if steps:
                     assert reached is not None
-                    listed.append(FreePlacement(reached, attempt.holding.cells, settled))
+                    listed.append(FreePlacement(reached, attempt.holding.cells, steps))
                     yield listed[-1]
                 elif reached is not None:
                     heapq.heappush(waiting, attempt._replace(loss=-reached))
                 continue
             holding = next(placements, None)
             if holding:
-                promised = holding.score
+                bound = holding.score
                 if not self._is_listed(holding, listed):
                     self.tried += 1
-                    attempt = _Attempt(-holding.score, self.tried, holding, self._settle(holding))
+                    attempt = _Attempt(-holding.score, self.tried, holding, self._choose_turns(holding))
                     heapq.heappush(waiting, attempt)
             elif waiting:
-                promised = -np.inf
+                bound = -np.inf
             else:
                 return
 
@@ -114,8 +114,13 @@ class FreePlacements:
         angles = self._finders[0].maps[0].manifold.angles
         return len(holding.cells) > 1 and any(_near(holding.cells, p.grasps, angles) for p in listed)
 
-    def _settle(self, holding: Holding) -> Iterator[tuple[float, list[Step] | None]]:
-        """Settle group by group; yield what it reaches whenever that falls, and the steps at last."""
+    def _choose_turns(self, holding: Holding) -> Iterator[tuple[float, list[Step] | None]]:
+        """Choose a free turn for group after group of tasks.
+
+        Yields:
+            The score (m) with None whenever it falls, and at last the score with the steps; nothing more
+            where a group has no free turn.
+        """
         reached = holding.score
         steps: list[Step] = []
         for group, members in enumerate(self._search.groups):

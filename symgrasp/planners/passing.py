@@ -1,4 +1,4 @@
-"""Hands whose prints overlap and which still pass each other, one behind the other."""
+"""Whether two hands whose prints overlap collide, or pass each other one behind the other."""
 
 from __future__ import annotations
 
