@@ -30,7 +30,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-FLIP = -0.55
+FLIP_HEIGHT = -0.55
 """Height of an axis below which its frame is built from the opposite axis: about 123° from
 upright, an angle at which objects are seldom held on purpose."""
 
@@ -140,7 +140,7 @@ def axis_frame(pose: ArrayLike) -> Array:
     """
     pose = np.asarray(pose, dtype=float)
     axis = pose[:3, 2] + 0.0  # + 0.0 turns -0.0 into 0.0
-    up = axis[2] >= FLIP
+    up = axis[2] >= FLIP_HEIGHT
     x, y, z = axis if up else -axis
     s = 1.0 / (1.0 + z)
     rotation = np.array([[1 - x * x * s, -x * y * s, x], [-x * y * s, 1 - y * y * s, y], [-x, -y, z]])
