@@ -18,7 +18,7 @@ from app.compute.channel import Channel
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanService
 from app.state.requests import MapRequest, MapResult
-from symgrasp.compiling import telling_of_compiling
+from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
@@ -76,7 +76,7 @@ class _Child:
 
     def _do(self, name: str, args: tuple[Any, ...]) -> tuple[str, Any]:
         try:
-            with telling_of_compiling(lambda: self._tell("compiling", None)):
+            with notify_on_compile(lambda: self._tell("compiling", None)):
                 return "done", self._skills[name](*args, self._progress)
         except Cancelled:
             return "failed", Cancelled()

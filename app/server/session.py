@@ -32,7 +32,7 @@ from app.state.page_link import Camera
 from app.state.requests import CompareRequest, MapRequest, Request
 from app.state.state import State
 from app.state.uploaded_scene import UploadedScene
-from symgrasp.compiling import telling_of_compiling
+from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import SymgraspError
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
@@ -354,7 +354,7 @@ class Session:
         ticket, begun = next(self._tickets), time.monotonic()
 
         def telling(progress: Progress) -> Any:
-            with telling_of_compiling(lambda: self.change(lambda s: s.compiles(ticket))):
+            with notify_on_compile(lambda: self.change(lambda s: s.compiles(ticket))):
                 return run(progress)
 
         job = Job(
