@@ -72,10 +72,10 @@ class _CountingWorld(BulletWorld):
 
     checks = 0
 
-    def first_collision(self, arm: Arm, near: NearBodies | None = None) -> Collision | None:
+    def first_collision(self, arm: Arm, among: NearBodies | None = None) -> Collision | None:
         """Count, and answer."""
         self.checks += 1
-        return super().first_collision(arm, near)
+        return super().first_collision(arm, among)
 
 
 def without_the_manifold(runs: int) -> Iterator[Figure]:

@@ -18,8 +18,7 @@ from symgrasp.robot.model import Joint, RobotModel
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
-from symgrasp.world import Body as Name
-from symgrasp.world import BulletWorld, Shape, checked_self_pairs
+from symgrasp.world import BodyName, BulletWorld, Shape, checked_self_pairs
 
 __all__ = ["ArmGeometry", "arm_geometry", "supports"]
 
@@ -38,7 +37,7 @@ class ArmGeometry(NamedTuple):
         with_tool: those of them that are fixed to the tool, fingers included.
     """
 
-    names: list[Name]
+    names: list[BodyName]
     solids: Solids
     pose: Array
     body: MovingBodies
@@ -51,7 +50,7 @@ class ArmGeometry(NamedTuple):
 class _Placed(NamedTuple):
     """A piece, whose it is, and where."""
 
-    name: Name
+    name: BodyName
     piece: Piece
     pose: Array
 
@@ -95,8 +94,8 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
     zero = arm.robot_values(np.zeros(arm.dof))
     at_zero = arm.robot.T_world_base @ model.forward(zero)
     frames = [at_zero[j.child] for j in joints]
-    own = [_Placed(Name(arm.robot.name, k), _piece(s), at_zero[model.link_index(k)]) for k, s in order]
-    name = Name(scene.file.object.name, "")
+    own = [_Placed(BodyName(arm.robot.name, k), _piece(s), at_zero[model.link_index(k)]) for k, s in order]
+    name = BodyName(scene.file.object.name, "")
     objects = [_Placed(name, _revolved(v), np.eye(4)) for v in scene.profile.convex_pieces()]
     others = [*_obstacles(world), *_other_robots(world, arm)]
     placed = [*own, *objects, *others]
@@ -200,7 +199,7 @@ def _revolved(vertices: Array) -> Piece:
 
 def _obstacles(world: BulletWorld) -> Iterator[_Placed]:
     for o in world.scene.obstacles:
-        name, pose = Name(o.name, ""), o.T_world_obstacle
+        name, pose = BodyName(o.name, ""), o.T_world_obstacle
         if o.kind == "urdf":
             assert o.path is not None
             model = RobotModel(o.path)
@@ -238,4 +237,4 @@ def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[_Placed]:
 def _links(shapes: dict[str, list[Shape]], name: str, model: RobotModel, links: Array) -> Iterator[_Placed]:
     for link, parts in shapes.items():
         for shape in parts:
-            yield _Placed(Name(name, link), _piece(shape), links[model.link_index(link)])
+            yield _Placed(BodyName(name, link), _piece(shape), links[model.link_index(link)])

@@ -32,7 +32,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import Body, BulletWorld, Collision, NearBodies
+from symgrasp.world import BodyName, BulletWorld, Collision, NearBodies
 
 __all__ = ["ExactEngine"]
 
@@ -90,7 +90,7 @@ class ExactEngine:
         self._scratch = new_scratch(self._geometry.pose, self._geometry.solids, arm.dof)
         # How far off pairs are of which the arm moves neither; those with the object are asked for every map.
         self._reach = max(CLEARANCE_LIMIT, scene.settings.margin)
-        pairs = world.near(arm, self._reach)
+        pairs = world.pairs_within(arm, self._reach)
         self._resting = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._rests(c)]
 
     @staticmethod
@@ -151,7 +151,7 @@ class ExactEngine:
 
     def _still(self) -> _StaticBodies:
         """Say how far apart the bodies are that the arm does not move: it is the same for all candidates."""
-        found = self.world.near(self.arm, self._reach, (self.scene.file.object.name,))
+        found = self.world.pairs_within(self.arm, self._reach, (self.scene.file.object.name,))
         gap, blocked = CLEARANCE_LIMIT, None
         for c in [*self._resting, *filter(self._rests, found)]:
             distance = self._reach - c.depth
@@ -287,7 +287,7 @@ class MapDraft:
         self._body = np.array([index[str(name)] for name in names])
         self._reason = np.array([self._collision(name) for name in names])
 
-    def _collision(self, hit: Body) -> Reason:
+    def _collision(self, hit: BodyName) -> Reason:
         """Return what a collision with a body is called."""
         scene = self.engine.scene
         if hit.body == self.engine.arm.robot.name:

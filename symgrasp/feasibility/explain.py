@@ -178,7 +178,7 @@ def explain(
     opening = arm.hand.opening(float(manifold.profile.radius(h)))
     stage, candidates = fit(arm.hand, manifold.profile, h), []
     if stage is None:
-        with world.kept():
+        with world.preserving_state():
             world.margin = settings.margin
             world.set_arms(())
             world.set_object(task.T_world_object)

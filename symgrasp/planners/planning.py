@@ -199,7 +199,7 @@ def handover_plans(
     known = {(index[task], arm): m for (task, arm), m in (maps or {}).items()}
     with BulletWorld(scene) as world:
         for before, after in pairwise(tasks):
-            if not set(before.arms) & set(after.arms) and not world.rests(before.T_world_object):
+            if not set(before.arms) & set(after.arms) and not world.object_rests(before.T_world_object):
                 expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
                 raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
         all_maps = _all_maps(world, tasks, known, progress)

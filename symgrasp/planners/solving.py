@@ -72,7 +72,7 @@ def with_regrasps(world: BulletWorld, tasks: Sequence[Task], maps: Maps, arm: st
 
 def _resting(world: BulletWorld, tasks: Sequence[Task]) -> list[int]:
     """Return the tasks, as indices, in which the object stands on something."""
-    return [k for k, task in enumerate(tasks) if world.rests(task.T_world_object)]
+    return [k for k, task in enumerate(tasks) if world.object_rests(task.T_world_object)]
 
 
 def holdings(

@@ -81,7 +81,7 @@ def compare(engine: ExactEngine, world: BulletWorld, rng: np.random.Generator) -
     opening = arm.hand.opening(float(engine.manifold.profile.radius(engine.manifold.h[row])))
     world.set_arms([(arm, q, opening)])
     measured: dict[frozenset[str], float] = defaultdict(lambda: math.inf)
-    for c in world.near(arm, NEAR):
+    for c in world.pairs_within(arm, NEAR):
         key = frozenset((str(c.a), str(c.b)))
         measured[key] = min(measured[key], NEAR - c.depth)
     for key, (lower, upper) in by_bodies(engine, world, q, row).items():
