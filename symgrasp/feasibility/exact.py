@@ -15,10 +15,12 @@ import numba
 import numpy as np
 
 from symgrasp.engine import search
-from symgrasp.engine.checks import FREE_BAND, HIT_BAND, mark_near, new_scratch, place_arm, place_hand
+from symgrasp.engine.boxes import box_of
+from symgrasp.engine.broad_phase import mark_near
+from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
-from symgrasp.engine.solids import pose_rows
-from symgrasp.engine.tree import box_of
+from symgrasp.engine.kinematics import new_scratch, place_arm, place_hand
+from symgrasp.engine.pieces import pose_rows
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
 from symgrasp.feasibility.fit import fit
@@ -87,7 +89,7 @@ class ExactEngine:
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
-        self._scratch = new_scratch(self._geometry.pose, self._geometry.solids, arm.dof)
+        self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces, arm.dof)
         # How far off pairs are of which the arm moves neither; those with the object are asked for every map.
         self._reach = max(CLEARANCE_LIMIT, scene.settings.margin)
         pairs = world.pairs_within(arm, self._reach)
@@ -126,9 +128,9 @@ class ExactEngine:
         world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
         world.set_object(task.T_world_object)
         arm_geometry, scratch = self._geometry, self._scratch
-        scratch.pose[arm_geometry.body.objects] = pose_rows(axis_frame(task.T_world_object))
-        for k in arm_geometry.body.objects:
-            box_of(arm_geometry.solids.size, scratch.pose, k, scratch.box[k])
+        scratch.pose[arm_geometry.moving.objects] = pose_rows(axis_frame(task.T_world_object))
+        for k in arm_geometry.moving.objects:
+            box_of(arm_geometry.pieces.size, scratch.pose, k, scratch.box[k])
         draft = MapDraft(self, grid)
         still = self._still()
         rows = np.array([row for row, stage in enumerate(self._fit) if stage is None], dtype=np.int64)
@@ -165,7 +167,7 @@ class ExactEngine:
         """Whether a pair is one of the robot's own bodies of which the arm moves none."""
         name = self.arm.robot.name
         own = [body.link for body in (c.a, c.b) if body.body == name]
-        return bool(own) and not self._geometry.moving.intersection(own)
+        return bool(own) and not self._geometry.moving_links.intersection(own)
 
     def _search(
         self,
@@ -176,21 +178,21 @@ class ExactEngine:
     ) -> Iterator[None]:
         """Search some rows of the map; pause after every cell that PyBullet decided."""
         goals = search.SearchInput(
-            order=self._order,
+            sample_order=self._order,
             T_world_base=self._T_world_base,
             T_base_tool=np.ascontiguousarray(T_base_tool[:, rows].reshape(-1, 4, 4)),
             row=np.tile(rows, len(ROLLS)),
             retreat=-retreat_distances(self.scene.settings.approach),
             margin=float(self.scene.settings.margin),
             clearance=still.gap,
-            blocked=still.blocked is not None,
-            parts=PARTS * numba.get_num_threads(),
+            always_collides=still.blocked is not None,
+            chunks=PARTS * numba.get_num_threads(),
         )
         with _ALL_CORES:
             found = search.search(
                 self.ik.chain,
-                self._geometry.body,
-                self._geometry.solids,
+                self._geometry.moving,
+                self._geometry.pieces,
                 self._geometry.tree,
                 self._scratch.pose,
                 goals,
@@ -199,17 +201,17 @@ class ExactEngine:
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.grid.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
         draft.take(found, cells, still.blocked)
-        for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.open_count > 0)):
+        for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.undecided_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             self._decide(draft, cell, goals.T_base_tool[i], self._listed(found, int(i), goals.T_base_tool[i]))
             yield
 
     def _listed(self, found: search.SearchResult, i: int, T_base_tool: Array) -> list[tuple[Array, int, int]]:
         """Return the undecided candidates of an open cell, or all inside the limits where they are many."""
-        count = int(found.open_count[i])
-        if count <= search.OPEN_KEPT:
-            picks = found.open_pick[i]
-            return [(found.open_q[i, j], int(picks[j, 0]), int(picks[j, 1])) for j in range(count)]
+        count = int(found.undecided_count[i])
+        if count <= search.UNDECIDED_KEPT:
+            picks = found.undecided_solution[i]
+            return [(found.undecided_q[i, j], int(picks[j, 0]), int(picks[j, 1])) for j in range(count)]
         s = self.ik.solve(T_base_tool)
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
 
@@ -236,15 +238,15 @@ class ExactEngine:
     def _near(self, q: Array, T_base_tool: Array, row: int) -> NearBodies:
         """Return what is near the arm: all else is certified free."""
         arm_geometry, scratch = self._geometry, self._scratch
-        place_hand(arm_geometry.body, arm_geometry.solids, scratch, self._T_world_base, T_base_tool, row)
-        place_arm(arm_geometry.body, arm_geometry.solids, scratch, q)
+        place_hand(arm_geometry.moving, arm_geometry.pieces, scratch, self._T_world_base, T_base_tool, row)
+        place_arm(arm_geometry.moving, arm_geometry.pieces, scratch, q)
         near, pairs = (
             np.zeros(len(arm_geometry.names), dtype=bool),
             np.zeros(len(arm_geometry.pairs), dtype=bool),
         )
         mark_near(
-            arm_geometry.body,
-            arm_geometry.solids.size,
+            arm_geometry.moving,
+            arm_geometry.pieces.size,
             arm_geometry.tree,
             scratch,
             self.world.margin + FREE_BAND,
@@ -258,7 +260,9 @@ class ExactEngine:
         """Whether a collision is one of bodies that the tool pose alone places."""
         name = self.arm.robot.name
         own = [body.link for body in (collision.a, collision.b) if body.body == name]
-        return self._geometry.with_tool.issuperset(link for link in own if link in self._geometry.moving)
+        return self._geometry.tool_links.issuperset(
+            link for link in own if link in self._geometry.moving_links
+        )
 
 
 def _same(a: Collision, b: Collision) -> bool:
