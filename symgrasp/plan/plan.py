@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from symgrasp.errors import PlanError
 from symgrasp.files import write_atomically
 from symgrasp.poses import Array, quat_wxyz
-from symgrasp.scene.format import describe
+from symgrasp.scene.format import describe_error
 
 __all__ = [
     "CLEARANCE_LIMIT",
@@ -161,7 +161,7 @@ class Plan(_Part):
         try:
             return Plan.model_validate(data)
         except ValidationError as error:
-            raise PlanError(source, *describe(error, data)) from None
+            raise PlanError(source, *describe_error(error, data)) from None
 
 
 def plan_schema() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a scene is made of besides robots: obstacles and tasks."""
+"""Obstacles, tasks, and the parts that a scene is made of."""
 
 from __future__ import annotations
 
@@ -10,23 +10,21 @@ from typing import NamedTuple
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm, Robot
-from symgrasp.scene.format import (
-    SceneFile,
-)
+from symgrasp.scene.format import SceneFile
 
 __all__ = ["Obstacle", "SceneParts", "Task"]
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """A fixed body.
+    """A body that does not move.
 
     Attributes:
-        name: its name.
+        name: its name in the scene.
         kind: box, cylinder, sphere, mesh or urdf.
         size: box: full sizes (3,); cylinder: radius, height; sphere: radius; otherwise empty.
         path: the mesh or URDF file, otherwise None.
-        T_world_obstacle: its pose (4, 4).
+        T_world_obstacle: pose (4, 4) of its frame; boxes, cylinders and spheres are centred at the origin.
     """
 
     name: str
@@ -41,9 +39,9 @@ class Task:
     """A pose of the object, and the arms that hold it there.
 
     Attributes:
-        name: its name.
-        arms: names of the arms.
-        T_world_object: object pose (4, 4); turning it about its own z changes nothing.
+        name: its name in the scene.
+        arms: names of the arms that hold the object.
+        T_world_object: object pose (4, 4); its rotation about the object's own z axis is free.
     """
 
     name: str
@@ -52,7 +50,7 @@ class Task:
 
 
 class SceneParts(NamedTuple):
-    """What a scene is made of; see `symgrasp.scene.scene.Scene`."""
+    """The parts of a scene; see `symgrasp.scene.scene.Scene` for the attributes."""
 
     file: SceneFile
     robots: Mapping[str, Robot]
