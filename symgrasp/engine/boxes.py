@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from symgrasp.compiling import njit
-from symgrasp.engine.distance import FAST
+from symgrasp.engine.simplex import FAST
 
 __all__ = ["box_of", "boxes_apart", "oriented_boxes_apart"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from symgrasp.compiling import njit
 from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
-from symgrasp.engine.distance import FAST
+from symgrasp.engine.simplex import FAST
 
 __all__ = ["mark_near"]
 

@@ -16,7 +16,8 @@ import math
 
 from symgrasp.compiling import njit
 from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
-from symgrasp.engine.distance import FAST, distance_bounds
+from symgrasp.engine.distance import distance_bounds
+from symgrasp.engine.simplex import FAST
 
 __all__ = ["FREE_BAND", "HIT_BAND", "UNDECIDED", "check_arm", "check_hand", "check_row"]
 

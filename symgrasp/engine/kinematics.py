@@ -9,7 +9,7 @@ import numpy as np
 
 from symgrasp.compiling import njit
 from symgrasp.engine.boxes import box_of
-from symgrasp.engine.distance import FAST
+from symgrasp.engine.simplex import FAST
 from symgrasp.poses import Array
 
 __all__ = ["MovingPieces", "Scratch", "new_scratch", "place_arm", "place_hand"]
