@@ -1,4 +1,4 @@
-"""Compiled code: it is made on first use and kept on disk, so only the first run on a machine waits."""
+"""Compiling with numba: on first use, with the result cached on disk for later runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 import numba
 from numba.core import config, event
 
-__all__ = ["COMPILING", "SOURCES", "njit", "telling_of_compiling"]
+__all__ = ["COMPILING_MESSAGE", "SOURCES", "njit", "notify_on_compile"]
 
 SOURCES = (
     "engine/*.py",
@@ -22,48 +22,49 @@ SOURCES = (
     "object/manifold.py",
     "planners/*.py",
 )
-"""Where compiled code and the constants in it come from, inside this package."""
+"""Files of this package that hold compiled functions, or constants that are compiled into them."""
 
-COMPILING = "compiling what this needs, once on this machine; it takes up to a minute"
-"""What to tell people meanwhile."""
+COMPILING_MESSAGE = "compiling what this needs, once on this machine; it takes up to a minute"
+"""Shown to the user while something is compiled."""
 
-# OpenMP's threads would spin while they wait for each other. Where something else, such as a browser,
-# has one of the cores, that makes a map take three times as long; else it gains next to nothing.
+# By default OpenMP threads spin while they wait for each other. Where another program, such as a browser,
+# occupies a core, spinning makes a map take three times as long; otherwise it gains next to nothing.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-_config: Any = config  # numba fills it in as it is imported, where type checkers do not see it
+_config: Any = config  # numba sets its attributes at import time, where type checkers do not see them
 
 
-class _Once(event.Listener):
-    """Calls a function when something is compiled for the first time."""
+class _FirstCompilation(event.Listener):
+    """Listens to numba and calls a function at the first compilation."""
 
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell, self._told = tell, False
+    def __init__(self, notify: Callable[[], None]) -> None:
+        self._notify, self._notified = notify, False
 
     def on_start(self, event: event.Event) -> None:
-        if not self._told:
-            self._told = True
-            self._tell()
+        """Call the function, unless it has been called."""
+        if not self._notified:
+            self._notified = True
+            self._notify()
 
     def on_end(self, event: event.Event) -> None:
-        """There may be more to compile."""
+        """Do nothing: only the start of a compilation matters."""
 
 
 @contextmanager
-def telling_of_compiling(tell: Callable[[], None]) -> Iterator[None]:
+def notify_on_compile(notify: Callable[[], None]) -> Iterator[None]:
     """Call a function once if something has to be compiled inside the ``with`` block.
 
-    What was compiled in an earlier run and is read from the disk does not count.
+    Reading the result of an earlier compilation from the disk does not count.
     """
-    with event.install_listener("numba:compile", _Once(tell)):
+    with event.install_listener("numba:compile", _FirstCompilation(notify)):
         yield
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile as `numba.njit`, and keep the result apart for every state of `SOURCES`.
+    """Compile like `numba.njit`, with a separate disk cache for every state of the files in `SOURCES`.
 
-    numba's own cache looks at the file of a function alone. Compiled functions hold copies of those
-    that they call, so a change in one file would leave old code at work in another.
+    numba's own cache checks only the file that a function stands in. Compiled functions contain copies
+    of those that they call, so after a change in one file, callers in other files would run old code.
     """
 
     def compile_later(function: Callable[..., Any]) -> Any:
@@ -79,7 +80,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 @cache
 def _cache_dir(chosen: str) -> str:
-    """Return the folder for what is compiled from the sources as they are.
+    """Return the cache folder for the present state of the files in `SOURCES`.
 
     Args:
         chosen: the folder that the user chose through ``NUMBA_CACHE_DIR``, if any.

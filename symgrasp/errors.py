@@ -1,7 +1,7 @@
-"""Every error this library raises on purpose.
+"""All exceptions that this library raises on purpose.
 
-An input error is one line that says where the bad value stands, what it is and what was
-expected, so that the command line and the page can show it as it is.
+The text of an input error is one line with the source of the bad value, the field, the value and what was
+expected, so the command line and the page can show it unchanged.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ class SymgraspError(Exception):
 
 
 class InputError(SymgraspError, ValueError):
-    """A value that came from outside is not usable.
+    """A value from a file or a caller is unusable.
 
     Args:
         source: file name or object that holds the value.
         field: where in the source, in the notation of the file format.
-        value: the offending value, shown shortened.
-        expected: what would have been right.
+        value: the bad value; the text shows it shortened.
+        expected: what a good value would be.
     """
 
     def __init__(self, source: object, field: str, value: object, expected: str) -> None:
@@ -57,7 +57,7 @@ class InputError(SymgraspError, ValueError):
         super().__init__(" ".join(line.split()))
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle what it was made of, not its text."""
+        """Pickle the arguments, because the default would pickle only the text."""
         return type(self), (self.source, self.field, self.value, self.expected)
 
 
@@ -86,7 +86,7 @@ class PlanError(InputError):
 
 
 class NoPlanError(SymgraspError):
-    """A planner found nothing; the text says why."""
+    """A planner found no plan; the text says why."""
 
 
 class Cancelled(SymgraspError):
@@ -94,8 +94,13 @@ class Cancelled(SymgraspError):
 
 
 def one_of(choices: Iterable[str], wrong: object = None) -> str:
-    """Return the phrase that lists the valid names, nearest to the wrong one first."""
+    """Return the phrase that lists the valid names, with the one closest to a misspelled name as a hint.
+
+    Args:
+        choices: the valid names.
+        wrong: the name that was given; None gives no hint.
+    """
     names = sorted(choices)
-    near = get_close_matches(str(wrong), names, n=1)
-    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    similar = get_close_matches(str(wrong), names, n=1)
+    hint = f" (did you mean {similar[0]!r}?)" if similar else ""
     return "one of " + ", ".join(repr(n) for n in names) + hint

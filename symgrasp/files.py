@@ -1,4 +1,4 @@
-"""Finding the files that scenes and robots refer to, and writing files in one piece."""
+"""Files: resolving references between them, parsing YAML, and writing atomically."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def package_dir(name: str) -> Path | None:
     """
     if name == SCENES:
         return SCENES_DIR
-    if "." in name:  # finding a package inside another would import the other
+    if "." in name:  # finding a subpackage would import its parent
         return None
     try:
         spec = find_spec(name)
@@ -44,13 +44,13 @@ def package_dir(name: str) -> Path | None:
 
 
 def resolve(reference: str, folder: Path) -> Path | None:
-    """Find the file that a reference means.
+    """Resolve a reference to a file.
 
     Args:
         reference: ``package://<package>/<path>``, ``file://<path>``, or a path relative to
             ``folder``. Where no Python package of that name holds the file, the folders above
             ``folder`` are searched for ``<package>/<path>``, as ROS packages are laid out.
-        folder: where the file that holds the reference lies.
+        folder: folder of the file that holds the reference.
 
     Returns:
         The existing file, or None.
@@ -77,7 +77,7 @@ def file_sha256(path: Path) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """Plain data only, and no key twice."""
+    """YAML loader that accepts plain data only and rejects duplicate keys."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict:
         mapping = super().construct_mapping(node, deep=deep)
@@ -88,14 +88,14 @@ class _Loader(yaml.SafeLoader):
 
 
 MOST_NODES = 1_000_000
-"""Values in a YAML document once its aliases are written out; aliases can blow a small file up."""
+"""Largest number of values in a YAML document with its aliases expanded, which can make a small file huge."""
 
 
 def parse_yaml(text: str) -> Any:
     """Parse a YAML document of plain data.
 
     Raises:
-        ValueError: it is not one; the text says why, in one line.
+        ValueError: it is not such a document; the text says why in one line.
     """
     try:
         content = yaml.load(text, Loader=_Loader)
@@ -107,17 +107,22 @@ def parse_yaml(text: str) -> Any:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise ValueError(f"{where}{error.problem}") from error
-    except Exception as error:  # the parser raises whatever a malformed scalar makes Python raise
+    except Exception as error:  # a malformed scalar can raise any exception
         raise ValueError(" ".join(f"{error or type(error).__name__}".split())) from error
     return content
 
 
 def _nodes(value: Any, known: dict[int, int]) -> int:
-    """Count the values in plain data as if every alias were written out."""
+    """Count the values in plain data with every alias expanded.
+
+    Args:
+        value: the data.
+        known: id of a mapping or list → its count; filled by the function.
+    """
     if not isinstance(value, (dict, list)):
         return 1
     if id(value) not in known:
-        known[id(value)] = MOST_NODES + 1  # what holds itself never ends
+        known[id(value)] = MOST_NODES + 1  # for data that contains itself
         parts = value.values() if isinstance(value, dict) else value
         known[id(value)] = 1 + sum(_nodes(part, known) for part in parts)
     return known[id(value)]
@@ -125,9 +130,9 @@ def _nodes(value: Any, known: dict[int, int]) -> int:
 
 @contextmanager
 def write_atomically(path: Path) -> Iterator[IO[bytes]]:
-    """Open a temporary file beside ``path`` that takes its name once the block succeeded."""
-    path = Path(path).resolve()  # a link keeps pointing to what it points to
-    if path.exists() and not path.is_file():  # a device or a pipe has no name to be taken over
+    """Open a temporary file that replaces ``path`` when the ``with`` block ends without an exception."""
+    path = Path(path).resolve()  # replace the file that a symbolic link points to
+    if path.exists() and not path.is_file():  # a device or a pipe cannot be replaced
         with path.open("wb") as file:
             yield file
         return
@@ -144,6 +149,7 @@ def write_atomically(path: Path) -> Iterator[IO[bytes]]:
 
 
 def _umask() -> int:
+    """Return the file mode mask of the process, which can only be read by setting it."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -1,4 +1,4 @@
-"""Reading triangle meshes, with one clear error for everything that can be wrong with the file."""
+"""Reading triangle meshes from files, and asking whether a point lies inside one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def read_mesh(path: Path, field: str = "mesh") -> trimesh.Trimesh:
 
     Args:
         path: the file.
-        field: what refers to it, for messages.
+        field: what refers to it, for error messages.
 
     Raises:
         MeshError: the file cannot be parsed, has no triangles, or has vertices that are not finite.
@@ -36,10 +36,9 @@ def read_mesh(path: Path, field: str = "mesh") -> trimesh.Trimesh:
 
 
 def depth_inside(mesh: trimesh.Trimesh, point: np.ndarray) -> float:
-    """Return how deep (m) a point (3,) lies inside a closed mesh, 0 outside.
+    """Return the distance (m) of a point (3,) inside a closed mesh from its surface, 0 for a point outside.
 
-    The solid angles of all triangles seen from the point add up to a full sphere inside, and to
-    nothing outside.
+    The signed solid angles of all triangles seen from the point add up to 4π inside and to 0 outside.
     """
     if not ((point >= mesh.bounds[0]) & (point <= mesh.bounds[1])).all():
         return 0.0

@@ -30,9 +30,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-FLIP = -0.55
-"""Height of an axis below which its frame is built from the opposite axis: about 123° from
-upright, an angle at which objects are seldom held on purpose."""
+FLIP_HEIGHT = -0.55
+"""z component of an axis below which `axis_frame` is built from the opposite axis: about 123° from upright,
+an inclination that tasks seldom have."""
 
 
 def from_rotation(rotation: ArrayLike, position: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
@@ -48,7 +48,7 @@ def from_rotation(rotation: ArrayLike, position: ArrayLike = (0.0, 0.0, 0.0)) ->
 
 
 def translation(offset: ArrayLike) -> Array:
-    """Return pure translations (..., 4, 4) by ``offset`` (..., 3)."""
+    """Return translations (..., 4, 4) by ``offset`` (..., 3) (m)."""
     return from_rotation(np.eye(3), offset)
 
 
@@ -131,16 +131,15 @@ def pose_error(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
 
 
 def axis_frame(pose: ArrayLike) -> Array:
-    """Return the pose (4, 4) with the same origin and z axis whose spin about z is fixed.
+    """Return the pose (4, 4) with the same origin and z axis, its x axis determined by these alone.
 
-    It depends on origin and axis alone, so every turn of an object about its axis of symmetry
-    has bit for bit the same axis frame. The rotation is the shortest one from the world's z; for
-    an axis that points well down it is that of the opposite axis after a half turn about x, which
-    keeps it well conditioned everywhere. It jumps where the one becomes the other.
+    So an object turned about its axis of symmetry has bit for bit the same axis frame. The rotation
+    is the shortest one from the world's z. For an axis below `FLIP_HEIGHT` it is that of the opposite
+    axis after a half turn about x, which keeps it well conditioned; between the two cases it jumps.
     """
     pose = np.asarray(pose, dtype=float)
     axis = pose[:3, 2] + 0.0  # + 0.0 turns -0.0 into 0.0
-    up = axis[2] >= FLIP
+    up = axis[2] >= FLIP_HEIGHT
     x, y, z = axis if up else -axis
     s = 1.0 / (1.0 + z)
     rotation = np.array([[1 - x * x * s, -x * y * s, x], [-x * y * s, 1 - y * y * s, y], [-x, -y, z]])

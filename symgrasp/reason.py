@@ -1,4 +1,4 @@
-"""Why a cell of the map is feasible or not."""
+"""The reasons why a cell of a feasibility map is feasible or not."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ __all__ = ["Reason"]
 
 
 class Reason(IntEnum):
-    """The furthest stage that any candidate configuration of a cell reached, worst first."""
+    """The furthest stage of the checks that any candidate configuration of a cell reached, in their order.
+
+    A candidate that passes all checks makes the cell `FEASIBLE`; otherwise the cell carries the check that
+    its most successful candidate failed.
+    """
 
     HAND_TOO_SMALL = 0
     SURFACE_TOO_STEEP = 1
@@ -23,12 +27,12 @@ class Reason(IntEnum):
 
     @property
     def label(self) -> str:
-        """A few words for people."""
+        """The reason in a few words."""
         return _LABELS[self]
 
     @property
     def color(self) -> str:
-        """Its colour on every map, as #rrggbb; tellable apart by colour-blind readers."""
+        """Its colour on every map, as #rrggbb; colour-blind readers can tell the colours apart."""
         return _COLORS[self]
 
 

@@ -10,17 +10,17 @@ from numba import njit
 
 import symgrasp
 from symgrasp.cli.main import main
-from symgrasp.compiling import COMPILING, SOURCES, telling_of_compiling
+from symgrasp.compiling import COMPILING_MESSAGE, SOURCES, notify_on_compile
 
 PROGRAM = """
 from numba import njit
-from symgrasp.compiling import telling_of_compiling
+from symgrasp.compiling import notify_on_compile
 
 @njit(cache=True)
 def twice(x):
     return 2 * x
 
-with telling_of_compiling(lambda: print("compiling")):
+with notify_on_compile(lambda: print("compiling")):
     print(twice(21))
 """
 
@@ -31,10 +31,10 @@ def test_it_is_told_once_and_only_while_something_is_compiled():
 
     told = []
     one, two = njit(add), njit(add)
-    with telling_of_compiling(lambda: told.append(True)):
+    with notify_on_compile(lambda: told.append(True)):
         assert one(1) == two(1) == 2
     assert told == [True]
-    with telling_of_compiling(lambda: told.append(True)):
+    with notify_on_compile(lambda: told.append(True)):
         assert one(2) == 3
     assert told == [True]
 
@@ -53,7 +53,7 @@ def test_the_command_line_says_so(capsys, monkeypatch, tmp_path):
     """Not by compiling everything again, which takes a minute: something new is compiled meanwhile."""
     monkeypatch.setattr("symgrasp.feasibility.create.create_map", _compiles_something)
     assert main(["map", "soda_can"]) == 2
-    assert COMPILING in capsys.readouterr().err
+    assert COMPILING_MESSAGE in capsys.readouterr().err
 
 
 def _compiles_something(*args, progress, **options):
@@ -95,9 +95,9 @@ def test_changed_sources_are_compiled_anew(tmp_path):
             f"@njit(cache=True)\ndef inner(x):\n    return {factor} * x\n"
         )
         program = (
-            "from symgrasp.compiling import telling_of_compiling\n"
+            "from symgrasp.compiling import notify_on_compile\n"
             "from symgrasp.engine.outer import outer\n"
-            "with telling_of_compiling(lambda: print('compiling')):\n    print(outer(7))\n"
+            "with notify_on_compile(lambda: print('compiling')):\n    print(outer(7))\n"
         )
         command = [sys.executable, "-B", "-c", program]  # Python's own cache tells files by the second
         done = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": ""}, capture_output=True, check=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.compute.compute_process import ProcessDied
-from symgrasp.compiling import telling_of_compiling
+from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
 
@@ -107,7 +107,7 @@ class JobQueue:
                 raise Cancelled
 
         try:
-            with telling_of_compiling(self.compiling):
+            with notify_on_compile(self.compiling):
                 result = job.run(progress)
         except Cancelled:
             return

@@ -18,7 +18,7 @@ from app.compute.channel import Call, Cancel, Channel, Compiling, ComputedMap, F
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanService
 from app.state.requests import MapRequest
-from symgrasp.compiling import telling_of_compiling
+from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
 
@@ -74,7 +74,7 @@ class _Server:
 
     def _answer(self, call: Call) -> Result | Failure:
         try:
-            with telling_of_compiling(lambda: self._channel.send(Compiling())):
+            with notify_on_compile(lambda: self._channel.send(Compiling())):
                 return Result(self._methods[call.method](*call.args, self._progress))
         except Cancelled:
             return Failure(Cancelled())

@@ -127,7 +127,7 @@ def link_of(state: State, served: Scene, camera: Camera | None = None) -> str:
     parts: dict[str, str] = {"scene": state.scene_name}
     if state.object_choice:
         parts["object"] = state.object_choice.option
-    parts |= {f"hand.{arm}": hand for arm, hand in state.scene.mounted.items()}
+    parts |= {f"hand.{arm}": hand for arm, hand in state.scene.replaceable_hands.items()}
     parts |= {"task": state.task, "arm": state.arm}
     parts |= tasks_text(state, served.tasks)
     optional: list[tuple[str, bool, Callable[[], str]]] = [

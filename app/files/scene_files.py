@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import SceneError
 from symgrasp.files import SCENES_DIR, package_dir, parse_yaml, resolve
-from symgrasp.scene.format import SceneFile, describe
+from symgrasp.scene.format import SceneFile, describe_error
 from symgrasp.scene.scene import Scene
 
 __all__ = ["SCENE_LIMIT", "read_scene", "refuse_foreign_files", "scene_yaml"]
@@ -80,7 +80,7 @@ def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> UploadedSc
     try:
         plain = SceneFile.model_validate(data).model_dump(mode="json", exclude_none=True)
     except ValidationError as error:
-        raise SceneError(source, *describe(error, data)) from None
+        raise SceneError(source, *describe_error(error, data)) from None
     roots = [folder.resolve() for folder in folders]
     for field, holder, key in _references(plain):
         holder[key] = str(_allowed(source, field, holder[key], roots))
@@ -98,7 +98,7 @@ def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable
     try:
         plain = SceneFile.model_validate(content).model_dump(mode="json", exclude_none=True)
     except ValidationError as error:
-        raise SceneError(source, *describe(error, content)) from None
+        raise SceneError(source, *describe_error(error, content)) from None
     roots = [folder.resolve() for folder in folders]
     for field, holder, key in _references(plain):
         reference = holder[key]

@@ -53,7 +53,7 @@ class ScenePanel(Panel):
         """Show what is chosen."""
         self.scene.value = state.scene_name
         self.task.value, self.arm.value = state.task, state.arm
-        hand = state.scene.mounted.get(state.arm)
+        hand = state.scene.replaceable_hands.get(state.arm)
         self.hand.visible = hand is not None
         if hand is not None:
             self.hand.value = hand

@@ -15,7 +15,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
-from symgrasp.world import Body
+from symgrasp.world import BodyName
 
 __all__ = ["Ghost", "body_mesh", "ghost", "link_mesh"]
 
@@ -35,13 +35,13 @@ class Ghost:
 
     robot: str
     values: Array
-    hits: frozenset[Body]
+    hits: frozenset[BodyName]
 
     def links(self) -> frozenset[str]:
         """Return its own links that hit something."""
         return frozenset(body.link for body in self.hits if body.body == self.robot)
 
-    def others(self) -> frozenset[Body]:
+    def others(self) -> frozenset[BodyName]:
         """Return the other bodies that are hit."""
         return frozenset(body for body in self.hits if body.body != self.robot)
 
@@ -63,7 +63,7 @@ def link_mesh(model: RobotModel, link: str) -> trimesh.Trimesh:
     return _joined([trimesh.convex.convex_hull(points) for points in model.hulls(link)])
 
 
-def body_mesh(scene: Scene, body: Body, T_world_object: Array) -> tuple[trimesh.Trimesh, Array]:
+def body_mesh(scene: Scene, body: BodyName, T_world_object: Array) -> tuple[trimesh.Trimesh, Array]:
     """Return the shape of a body that is hit, a little swollen, and its pose (4, 4).
 
     Args:

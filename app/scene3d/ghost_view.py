@@ -10,7 +10,7 @@ from app.scene3d.ghost import Ghost, body_mesh, ghost, link_mesh
 from app.scene3d.nodes import set_pose
 from app.state.state import State
 from symgrasp.scene.scene import Scene
-from symgrasp.world import Body
+from symgrasp.world import BodyName
 
 __all__ = ["GhostView"]
 
@@ -31,7 +31,7 @@ class GhostView:
         self.client, self.root, self.scene = client, root, scene
         client.scene.add_frame(root, show_axes=False)
         self._robots: dict[str, dict[str, tuple[viser.MeshHandle, viser.MeshHandle]]] = {}
-        self._bodies: dict[Body, viser.MeshHandle] = {}
+        self._bodies: dict[BodyName, viser.MeshHandle] = {}
 
     def show(self, state: State) -> None:
         """Bring it up to the state."""

@@ -11,7 +11,7 @@ import warnings
 from app.compute.cache import SharedCache
 from app.compute.warm_up import compute_first_map
 from app.server.lobby import open_lobby
-from symgrasp.compiling import COMPILING, telling_of_compiling
+from symgrasp.compiling import COMPILING_MESSAGE, notify_on_compile
 from symgrasp.errors import InputError
 
 __all__ = ["serve"]
@@ -45,7 +45,7 @@ def serve(scene: str, host: str, port: int) -> None:
 
 def _warm_cache(scene: str) -> SharedCache:
     """Return the cache with the first map in it, so that whoever opens the page finds it there."""
-    with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
+    with notify_on_compile(lambda: print(f"symgrasp: {COMPILING_MESSAGE} …", file=sys.stderr, flush=True)):
         cache = SharedCache(scene)
         compute_first_map(cache)
     return cache

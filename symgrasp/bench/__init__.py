@@ -1,4 +1,4 @@
-"""The software measured against what one would do otherwise, as ratios inside one run."""
+"""Benchmarks of maps and planners against alternative methods, as ratios of times within one run."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ __all__ = ["Figure", "report", "run"]
 
 
 def run() -> Iterator[Figure]:
-    """Measure everything, a figure at a time."""
+    """Run all benchmarks and yield their figures as they are measured."""
     yield from maps.run()
     yield from planners.run()

@@ -1,4 +1,4 @@
-"""Brute force through Pinocchio and Coal: the same candidates, each asked in turn until one is free.
+"""Brute force with Pinocchio and Coal: the candidates of a cell are checked in turn until one is free.
 
 Needs the extra ``bench`` (``pip install 'symgrasp[bench]'``); importing this module fails without it.
 """
@@ -23,15 +23,15 @@ __all__ = ["BruteForce"]
 
 
 class BruteForce:
-    """An arm among everything that a map asks about: the robot moves, all else stands still.
+    """Collision checks of an arm in Pinocchio and Coal: the robot moves, everything else is static.
 
-    Takes the shapes and pairs that PyBullet has; beside meshes without the ball that it rounds links
-    by, a millimetre or less, because Coal cannot measure from rounded shapes to triangles.
+    Uses the shapes and pairs that PyBullet has. In scenes with meshes it leaves out the rounding of the
+    links, a millimetre or less, because Coal cannot measure distances of rounded shapes from triangles.
 
     Args:
         world: a world of the scene.
         arm: the arm.
-        ik: its inverse kinematics, shared with the other methods.
+        ik: its inverse kinematics, the same as for the other methods.
         T_world_object: object pose (4, 4).
     """
 
@@ -43,8 +43,8 @@ class BruteForce:
         self._data = self._model.createData()
         self._geometry = pinocchio.GeometryModel()
         own = self._add_robot(world)
-        still = self._add_still(world, T_world_object)
-        self._pairs(own, still)
+        static = self._add_static(world, T_world_object)
+        self._add_pairs(own, static)
         self._geometry_data = self._geometry.createData()
         for request in self._geometry_data.collisionRequests:
             request.security_margin = 0.0
@@ -52,7 +52,7 @@ class BruteForce:
 
     @property
     def pairs(self) -> int:
-        """Number of pairs that a configuration is checked for."""
+        """Number of pairs of shapes that each configuration is checked for."""
         return len(self._geometry.collisionPairs)
 
     def feasible(self, T_base_tool: Array, opening: float) -> bool:
@@ -67,7 +67,7 @@ class BruteForce:
         for joint in self._joints:
             moved = self._model.joints[self._model.getJointId(joint.name)]
             value = joint.ratio * values[joint.source] + joint.offset
-            if moved.nq == 2:  # a joint without limits is a point on the circle
+            if moved.nq == 2:  # Pinocchio stores a continuous joint as cosine and sine
                 configuration[moved.idx_q : moved.idx_q + 2] = np.cos(value), np.sin(value)
             else:
                 configuration[moved.idx_q] = value
@@ -97,14 +97,14 @@ class BruteForce:
             ]
         return own
 
-    def _add_still(self, world: BulletWorld, T_world_object: Array) -> dict[str, list[int]]:
-        """Add the object, the obstacles and the other robots, as seen from the robot's base."""
+    def _add_static(self, world: BulletWorld, T_world_object: Array) -> dict[str, list[int]]:
+        """Add the object, the obstacles and the other robots, in the frame of the robot's base."""
         scene, robot = world.scene, self.arm.robot
         T_base_world = np.linalg.inv(robot.T_world_base)
         add = lambda name, pose, shape: self._add(name, 0, T_base_world @ pose, shape)  # noqa: E731
         axis = axis_frame(T_world_object)
-        still = {"object": [add("object", axis, _hull(v)) for v in scene.profile.convex_pieces()]}
-        still["rest"] = [
+        static = {"object": [add("object", axis, _hull(v)) for v in scene.profile.convex_pieces()]}
+        static["rest"] = [
             add(o.name, T @ o.T_world_obstacle if o.kind != "urdf" else T, shape)
             for o in scene.obstacles
             for T, shape in self._obstacle(world, o)
@@ -112,15 +112,15 @@ class BruteForce:
         for name, other in scene.robots.items():
             if name != robot.name:
                 links = other.T_world_base @ other.model.forward(other.home)
-                still["rest"] += [
+                static["rest"] += [
                     add(name, links[other.model.link_index(link)], self._rounded(shape))
                     for link, shapes in world.shapes(name).items()
                     for shape in shapes
                 ]
-        return still
+        return static
 
     def _obstacle(self, world: BulletWorld, o: Obstacle) -> Iterator[tuple[Array, Any]]:
-        """Yield the shapes of an obstacle in its frame; those of a URDF in the world."""
+        """Yield (pose (4, 4), shape) of an obstacle, in its own frame; those of a URDF in the world."""
         if o.kind == "box":
             yield np.eye(4), coal.Box(*o.size)
         elif o.kind == "cylinder":
@@ -139,7 +139,7 @@ class BruteForce:
                 for shape in shapes:
                     yield links[model.link_index(link)], self._rounded(shape)
 
-    def _pairs(self, own: dict[str, list[int]], still: dict[str, list[int]]) -> None:
+    def _add_pairs(self, own: dict[str, list[int]], static: dict[str, list[int]]) -> None:
         arm, scene_links = self.arm, set(own) - set(self.arm.robot.model.mount_links())
         pairs = [(a, b) for x, y in checked_self_pairs(arm.robot.model) for a in own[x] for b in own[y]]
         pairs += [
@@ -147,9 +147,9 @@ class BruteForce:
             for link in own
             if link not in arm.hand.touch_links
             for a in own[link]
-            for b in still["object"]
+            for b in static["object"]
         ]
-        pairs += [(a, b) for link in scene_links for a in own[link] for b in still["rest"]]
+        pairs += [(a, b) for link in scene_links for a in own[link] for b in static["rest"]]
         for a, b in pairs:
             self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
 

@@ -1,4 +1,4 @@
-"""What a benchmark measured, to print and to keep."""
+"""Figures that a benchmark measured, as text and as plain data."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Figure", "report"]
 
 @dataclass(frozen=True)
 class Figure:
-    """A measured quantity.
+    """A quantity measured in one or several runs.
 
     Attributes:
         name: what was measured.
         unit: its unit; ``×`` for a ratio.
-        values: one value a run; none where it could not be measured, and the name says why.
+        values: one value a run; empty where it could not be measured, with the reason in the name.
     """
 
     name: str
@@ -28,7 +28,7 @@ class Figure:
     values: tuple[float, ...]
 
     def line(self) -> str:
-        """Say median and spread."""
+        """Return name, median, unit and range as one line of text."""
         if not self.values:
             return self.name
         low, middle, high = np.quantile(self.values, [0.0, 0.5, 1.0])

@@ -1,4 +1,4 @@
-"""Maps by the engine measured against the reference and brute force, and how their cost grows."""
+"""Times of the exact engine's maps: against Algorithm 1 and brute force, and growing with the problem."""
 
 from __future__ import annotations
 
@@ -30,37 +30,38 @@ from symgrasp.world import BulletWorld, open_world
 __all__ = ["against_others", "boxes", "growth", "process", "run", "turning"]
 
 GRID = {"heights": 48, "angles": 96, "redundancy": 32}
-"""The grid that the figures are for: times two rolls, 9216 cells."""
+"""The resolution that the figures are for; with two rolls, 9216 cells."""
 
 ROUNDS = 5
-"""Each round times everything that a ratio compares, one right after the other."""
+"""Number of rounds; each times everything that a ratio compares, one right after the other."""
 
 SECONDS = {"reference": 0.9, "Pinocchio and Coal": 0.5}
-"""About how long (s) each of the slow ways is timed in a round."""
+"""About how long (s) each of the slow methods is timed in a round."""
 
 CALIBRATION = 60
-"""Cells that tell how many make up those seconds."""
+"""Number of cells that are timed to find out how many take that long."""
 
 CUTS = 10
-"""Along two sides each, to make a hundred boxes of one."""
+"""Number of parts that a box is cut into along each of two sides, to make a hundred of one."""
 
-SCALES = """
+MEASURE_PROCESS = """
 import resource, subprocess, sys, time
 start = time.perf_counter()
 subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
 peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
 print(time.perf_counter() - start, peak / (1e6 if sys.platform == "darwin" else 1e3))
 """
-"""Runs a command and prints its time (s) and the most memory (MB) it took.
+"""Program that runs a command and prints its time (s) and its peak memory (MB).
 
-A small process of its own: what a child weighs counts from before it has let go of its parent's memory.
+It runs as a small process of its own, because the peak of a child includes the memory of its parent that
+it has between fork and exec.
 """
 
 WITHOUT_COAL = "maps against Pinocchio and Coal: not measured, needs pip install 'symgrasp[bench]'"
 
 
 def run() -> Iterator[Figure]:
-    """Measure the maps, a figure at a time."""
+    """Run the benchmarks of maps and yield their figures as they are measured."""
     yield from against_others(list(shipped_scenes()), ROUNDS)
     yield from growth(ROUNDS)
     yield from boxes(ROUNDS)
@@ -68,8 +69,14 @@ def run() -> Iterator[Figure]:
     yield from process(3)
 
 
-class _Race(NamedTuple):
-    """A scene's times: to build and for a map (s), and of the slow ways as multiples of a map."""
+class _SceneTimes(NamedTuple):
+    """Times of one scene.
+
+    Attributes:
+        build: to build the engine (s), one value a run.
+        map: to compute a map (s), one value a run.
+        others: slow method → its times as multiples of that of a map, one value a round.
+    """
 
     build: list[float]
     map: list[float]
@@ -77,31 +84,31 @@ class _Race(NamedTuple):
 
 
 Decide = Callable[[Array, float], Any]
-"""Decides one cell by its tool pose (4, 4) in the base and the opening (m) of the hand."""
+"""Decides whether a cell is feasible, given its tool pose (4, 4) in the base and the hand's opening (m)."""
 
 
 def against_others(scenes: Sequence[str], rounds: int) -> Iterator[Figure]:
-    """Time the first task's map of each scene, by the engine and by the slow ways.
+    """Time the map of the first task of each scene by the engine and by the slow methods.
 
-    The slow ways decide cells drawn at random among those that a hand can hold; their time is scaled
-    to all of these.
+    The slow methods decide a random sample of the cells that fit the hand; their time is scaled to all of
+    these.
     """
-    races: list[_Race] = []
+    times: list[_SceneTimes] = []
     for name in scenes:
-        races.append(_race(Scene.load(name).with_settings(**GRID), rounds))
-        yield Figure(f"map of {name}", "ms", _ms(races[-1].map))
-        yield Figure("  built once for its arm and obstacles", "ms", _ms(races[-1].build))
-        for other, ratios in races[-1].others.items():
+        times.append(_time_scene(Scene.load(name).with_settings(**GRID), rounds))
+        yield Figure(f"map of {name}", "ms", _ms(times[-1].map))
+        yield Figure("  built once for its arm and obstacles", "ms", _ms(times[-1].build))
+        for other, ratios in times[-1].others.items():
             yield Figure(f"  {other}, from a random sample of its cells", "×", tuple(ratios))
     for other in SECONDS:
-        medians = [float(np.median(race.others[other])) for race in races if other in race.others]
+        medians = [float(np.median(scene.others[other])) for scene in times if other in scene.others]
         if medians:
             yield Figure(f"maps of all shipped scenes: {other} takes", "×", tuple(medians))
         else:
             yield Figure(WITHOUT_COAL, "", ())
 
 
-def _race(scene: Scene, rounds: int) -> _Race:
+def _time_scene(scene: Scene, rounds: int) -> _SceneTimes:
     task = scene.task()
     arm = scene.arm(task.arms[0])
     with open_world(scene) as world:
@@ -112,12 +119,12 @@ def _race(scene: Scene, rounds: int) -> _Race:
             task.T_world_object, arm.hand.finger_depth
         )
         world.margin = scene.settings.margin
-        ways = dict(_ways(world, scene))
+        methods = dict(_slow_methods(world, scene))
         cells = [Cell(*cell) for cell in np.argwhere(m.reason >= Reason.UNREACHABLE)]
         rng = np.random.default_rng(0)
 
         def sample(decide: Decide, count: int) -> float:
-            """Return the time (s) of all cells, from some."""
+            """Return the time (s) for all cells, estimated from a sample."""
             picks = [cells[k] for k in rng.choice(len(cells), min(count, len(cells)), replace=False)]
             world.set_arms(())
             world.set_object(task.T_world_object)
@@ -126,20 +133,20 @@ def _race(scene: Scene, rounds: int) -> _Race:
 
         counts = {
             name: max(1, round(SECONDS[name] * len(cells) / sample(decide, CALIBRATION)))
-            for name, decide in ways.items()
+            for name, decide in methods.items()
         }
-        times, others = [], {name: [] for name in ways}
+        times, others = [], {name: [] for name in methods}
         for _ in range(rounds):
-            for name, decide in ways.items():
+            for name, decide in methods.items():
                 slow = sample(decide, counts[name])
                 quick = [_time(lambda: maker.map(arm.name, task)) for _ in range(3)]
                 times += quick
                 others[name].append(slow / float(np.median(quick)))
-    return _Race(build, times, others)
+    return _SceneTimes(build, times, others)
 
 
-def _ways(world: BulletWorld, scene: Scene) -> Iterator[tuple[str, Decide]]:
-    """Yield the slow ways to decide a cell of the first task."""
+def _slow_methods(world: BulletWorld, scene: Scene) -> Iterator[tuple[str, Decide]]:
+    """Yield (name, function) of the slow methods to decide a cell of the first task."""
     task = scene.task()
     arm = scene.arm(task.arms[0])
     ik = solver_for(arm, scene.settings.redundancy)
@@ -157,7 +164,7 @@ def has_coal() -> bool:
 
 
 def growth(rounds: int) -> Iterator[Figure]:
-    """Time maps with more cells and more redundancy samples: the time for each should stay."""
+    """Time maps with more cells and more redundancy samples; the time for each should stay constant."""
     cells = {scale: {**GRID, "heights": 24 * scale, "angles": 48 * scale} for scale in (1, 2, 4)}
     samples = {count: {**GRID, "redundancy": count} for count in (16, 32, 64, 128)}
     for what, settings, most in (
@@ -165,13 +172,13 @@ def growth(rounds: int) -> Iterator[Figure]:
         ("a redundancy sample, 8 times as many samples", samples, lambda s: s["redundancy"]),
     ):
         small, large = settings[min(settings)], settings[max(settings)]
-        with _Quick(small) as few, _Quick(large) as many:
+        with _MapTimer(small) as few, _MapTimer(large) as many:
             ratios = [many.time() / most(large) / (few.time() / most(small)) for _ in range(rounds)]
         yield Figure(f"time for {what}", "×", tuple(ratios))
 
 
 def boxes(rounds: int) -> Iterator[Figure]:
-    """Time a map among four boxes, and with each cut into a hundred: the answer is the same."""
+    """Time a map among four boxes, and among the same boxes cut into a hundred each; the maps are equal."""
     content = yaml.safe_load((SCENES_DIR / "bottle_on_table.yaml").read_text())
     few = [
         {"name": "table", "box": [1.2, 1.2, 0.04], "pose": {"position": [0.4, 0, -0.02]}},
@@ -179,34 +186,34 @@ def boxes(rounds: int) -> Iterator[Figure]:
         {"name": "side", "box": [0.6, 0.04, 0.5], "pose": {"position": [0.5, 0.3, 0.25]}},
         {"name": "shelf", "box": [0.3, 0.5, 0.04], "pose": {"position": [0.7, 0, 0.55]}},
     ]
-    many = [piece for box in few for piece in _cut(box)]
+    many = [part for box in few for part in _cut(box)]
     made = {}
     for count, obstacles in ((4, few), (400, many)):
         content["obstacles"] = obstacles
         made[count] = Scene.from_content(content).with_settings(**GRID)
         assert len(made[count].obstacles) == count
-    with _Quick(scene=made[4]) as quick, _Quick(scene=made[400]) as slow:
+    with _MapTimer(scene=made[4]) as quick, _MapTimer(scene=made[400]) as slow:
         assert np.array_equal(quick.map().feasible, slow.map().feasible)
         ratios = tuple(slow.time() / quick.time() for _ in range(rounds))
     yield Figure("the same boxes, 4 cut into 400", "×", ratios)
 
 
 def _cut(box: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Cut a box across its two longer sides."""
+    """Yield the parts of a box cut across its two longest sides."""
     size, middle = np.array(box["box"], dtype=float), np.array(box["pose"]["position"], dtype=float)
     first, second = np.sort(np.argsort(-size)[:2])
-    piece = size.copy()
-    piece[[first, second]] /= CUTS
+    part = size.copy()
+    part[[first, second]] /= CUTS
     for i, j in np.ndindex(CUTS, CUTS):
         at = middle.copy()
-        at[first] += (i + 0.5) * piece[first] - 0.5 * size[first]
-        at[second] += (j + 0.5) * piece[second] - 0.5 * size[second]
-        yield {"name": f"{box['name']}{i}_{j}", "box": piece.tolist(), "pose": {"position": at.tolist()}}
+        at[first] += (i + 0.5) * part[first] - 0.5 * size[first]
+        at[second] += (j + 0.5) * part[second] - 0.5 * size[second]
+        yield {"name": f"{box['name']}{i}_{j}", "box": part.tolist(), "pose": {"position": at.tolist()}}
 
 
 def turning(rounds: int) -> Iterator[Figure]:
-    """Time what turning the object about its axis costs."""
-    with _Quick(GRID) as quick:
+    """Time the shift of a map when the object is turned about its axis."""
+    with _MapTimer(GRID) as quick:
         m = quick.map()
         angles = np.random.default_rng(0).uniform(-np.pi, np.pi, rounds)
         times = [1e6 * _time(lambda angle=angle: m.shift(angle)) for angle in angles]
@@ -214,27 +221,27 @@ def turning(rounds: int) -> Iterator[Figure]:
 
 
 def process(runs: int) -> Iterator[Figure]:
-    """Run the command line as a process: what a first look takes on a machine that has compiled before."""
+    """Time ``symgrasp map`` as a process, and its memory, with the compiled code cached."""
     command = [sys.executable, "-m", "symgrasp", "map", "bottle_on_table"]
     subprocess.run(command, check=True, capture_output=True)
-    weighed = [
+    outputs = [
         subprocess.run(
-            [sys.executable, "-c", SCALES, *command], check=True, capture_output=True, text=True
+            [sys.executable, "-c", MEASURE_PROCESS, *command], check=True, capture_output=True, text=True
         ).stdout
         for _ in range(runs)
     ]
-    times, peaks = zip(*(map(float, line.split()) for line in weighed), strict=True)
+    times, peaks = zip(*(map(float, line.split()) for line in outputs), strict=True)
     yield Figure("symgrasp map bottle_on_table, whole process", "s", times)
     yield Figure("  memory at most", "MB", peaks)
 
 
-class _Quick:
-    """Maps of a scene's first task by the engine, in a ``with`` block."""
+class _MapTimer:
+    """Computes and times maps of a scene's first task by the engine; used in a ``with`` block."""
 
     def __init__(self, settings: dict[str, int] | None = None, scene: Scene | None = None) -> None:
         self._scene = scene or Scene.load("bottle_on_table").with_settings(**(settings or GRID))
 
-    def __enter__(self) -> _Quick:
+    def __enter__(self) -> _MapTimer:
         self._world = open_world(self._scene)
         self._maker = MapMaker(self._world)
         self.map()

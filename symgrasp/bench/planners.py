@@ -1,4 +1,4 @@
-"""The planners measured against what one would do otherwise, as ratios inside one run."""
+"""Times and success rates of the planners against sampling and hill climbing, as ratios within one run."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ __all__ = ["long_sequence", "run", "several_hands", "without_the_manifold"]
 
 
 LIMITS = Climb(restarts=10, iterations=50)
-"""Of the hill climbing; the paper does not tell its own.
+"""Restarts and iterations of hill climbing; the paper does not state its own.
 
-Twice as many of both find 2 % more, in thrice the time.
+Twice as many of both find 2 % more, in three times the time.
 """
 
 
 def run() -> Iterator[Figure]:
-    """Measure the planners, a figure at a time."""
+    """Run the benchmarks of planners and yield their figures as they are measured."""
     yield from long_sequence(tasks=50, runs=10)
     yield from without_the_manifold(runs=10)
     yield from several_hands(pairs=500)
 
 
 def long_sequence(tasks: int, runs: int) -> Iterator[Figure]:
-    """Plan one grasp for many tasks: the maps of a real sequence, turned at random."""
+    """Time the search of one grasp for many tasks: the maps of a shipped sequence, turned at random."""
     scene = Scene.load("pick_pour_place").with_settings(heights=48, angles=96, redundancy=4)
     maps = [create_map(scene, task=name) for name in scene.tasks]
     rng = np.random.default_rng(0)
@@ -72,14 +72,14 @@ class _CountingWorld(BulletWorld):
 
     checks = 0
 
-    def first_collision(self, arm: Arm, near: NearBodies | None = None) -> Collision | None:
-        """Count, and answer."""
+    def first_collision(self, arm: Arm, among: NearBodies | None = None) -> Collision | None:
+        """Count the check, and return its result."""
         self.checks += 1
-        return super().first_collision(arm, near)
+        return super().first_collision(arm, among)
 
 
 def without_the_manifold(runs: int) -> Iterator[Figure]:
-    """Sample grasps and test each against every task, within the collision checks that the maps took."""
+    """Sample grasps and test each in every task, with as many collision checks as the maps took."""
     scene = Scene.load("pick_pour_place")
     tasks = list(scene.tasks.values())
     with _CountingWorld(scene) as world:
@@ -110,7 +110,10 @@ def without_the_manifold(runs: int) -> Iterator[Figure]:
 def _sample_grasps(
     scene: Scene, tasks: Sequence[Task], world: _CountingWorld, budget: int, seed: int
 ) -> bool:
-    """Draw grasps until one is feasible in every task as it is posed, or the budget is used up."""
+    """Whether a random grasp feasible in every task is found within a budget of collision checks.
+
+    The tasks are taken as posed, without turning the object about its axis.
+    """
     arm = scene.arm()
     checker = CandidateChecker(
         world, arm, solver_for(arm, scene.settings.redundancy), scene.settings.approach
@@ -137,7 +140,15 @@ def _sample_grasps(
 
 
 class _Pair(NamedTuple):
-    """What came of the maps of two arms. Times in s; cells are None where nothing was found."""
+    """Results of both searches on the maps of two arms.
+
+    Attributes:
+        exact: cells that the complete search found, None for none.
+        exact_time: its time (s).
+        climbed: cells that hill climbing found, None for none.
+        climb_time: its time (s).
+        gained: by how much (m) the objective of the complete search exceeds that of hill climbing.
+    """
 
     exact: tuple[Cell, ...] | None
     exact_time: float
@@ -147,10 +158,10 @@ class _Pair(NamedTuple):
 
 
 def several_hands(pairs: int) -> Iterator[Figure]:
-    """Place two hands on a log and on a bottle: complete search and hill climbing on the same maps.
+    """Compare complete search and hill climbing for two hands on a log and on a bottle, on the same maps.
 
-    The object is moved about at random between the robots, and random parts are kept of the maps, from
-    a handful of cells to all of them: wide and narrow, dense and full of holes.
+    The object gets random poses between the robots, and of each map a random part is kept: a window of
+    random size with a random share of its cells.
     """
     results: list[_Pair] = []
     prints = []
@@ -169,10 +180,11 @@ def several_hands(pairs: int) -> Iterator[Figure]:
             _compare(world, arms, next(drawn), gaps, 0)  # compiles what is not compiled yet
             results += [_compare(world, arms, maps, gaps, k) for k, maps in zip(range(pairs), drawn)]  # noqa: B905
     yield Figure("handprints and gaps of two hands, once a scene", "ms", tuple(prints))
-    yield from _said(results)
+    yield from _pair_figures(results)
 
 
-def _said(results: Sequence[_Pair]) -> Iterator[Figure]:
+def _pair_figures(results: Sequence[_Pair]) -> Iterator[Figure]:
+    """Yield success rates and times of both searches over all pairs of maps."""
     solved = [r for r in results if r.climbed]
     exact, climb = (np.array([getattr(r, name) for r in results]) for name in ("exact_time", "climb_time"))
     where = np.array([r.climbed is not None for r in results])
@@ -205,7 +217,7 @@ def _random_pairs(world: BulletWorld, task: Task, rng: np.random.Generator) -> I
 
 
 def _part(m: FeasibilityMap, rng: np.random.Generator) -> FeasibilityMap:
-    """Keep a random window of a map around one of its feasible cells, and of that a random share."""
+    """Return a map masked to a random share of a random window around one of its feasible cells."""
     heights, angles = m.feasible.shape[1:]
     _, row, column = rng.choice(np.argwhere(m.feasible))
     tall, wide = (int(n ** rng.uniform(0.2, 1.0)) for n in (heights, angles))
@@ -239,7 +251,7 @@ def _compare(
 def _climb_as_printed(
     world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap], seed: int
 ) -> tuple[Cell, ...] | None:
-    """Algorithm 3, counting collisions of the robots in the world at every step."""
+    """Return what Algorithm 3 finds, with the collisions of the whole robots counted at every step."""
     configurations = ConfigurationFinder(world, arms, maps)
 
     def count(cells: Sequence[Cell]) -> int:
@@ -255,7 +267,7 @@ def _climb_as_printed(
 
 
 def _reached(gaps: PrintGaps, maps: Sequence[FeasibilityMap], cells: Sequence[Cell]) -> float:
-    """Return what the complete search maximises (m): the smallest of the gap and the margins."""
+    """Return the objective of the complete search (m): the smallest of the gap and the surface margins."""
     a, b = cells
     shift = (b.column - a.column) % maps[0].manifold.angles
     gap = max(0.0, float(gaps.around(0, a.roll, a.row, 1)[b.roll, b.row, shift]))

@@ -160,11 +160,11 @@ def progress_of(what: str) -> Iterator[Callable[[float], None] | None]:
     Yields:
         A callback that shows a percentage; None where stderr is no terminal.
     """
-    from symgrasp.compiling import COMPILING, telling_of_compiling
+    from symgrasp.compiling import COMPILING_MESSAGE, notify_on_compile
 
     def show(share: float) -> None:
         end = "\n" if share >= 1 else ""
         print(f"\r{what}: {100 * share:3.0f} %", end=end, file=sys.stderr, flush=True)
 
-    with telling_of_compiling(lambda: print(f"symgrasp: {COMPILING} …", file=sys.stderr, flush=True)):
+    with notify_on_compile(lambda: print(f"symgrasp: {COMPILING_MESSAGE} …", file=sys.stderr, flush=True)):
         yield show if sys.stderr.isatty() else None

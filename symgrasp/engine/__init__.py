@@ -1,1 +1,1 @@
-"""The compiled search for free configurations: convex pieces, certified distances, cells in parallel."""
+"""The compiled search of maps: certified distances of convex pieces, and all cells in parallel."""

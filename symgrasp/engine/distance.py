@@ -1,64 +1,56 @@
-"""Bounds on the distance of two convex pieces that are proofs: Gilbert, Johnson and Keerthi's method.
+"""Certified bounds on the distance of two convex pieces, by the method of Gilbert, Johnson and Keerthi (GJK).
 
-For pieces A and B the method walks through their difference ``A − B``, whose distance from the
-origin is the distance of the pieces. At every step it holds
+For pieces A and B the method iterates in their Minkowski difference ``A − B``, whose distance from the
+origin is the distance of the pieces. At every step it has
 
-* a point v of the difference, as a mixture of differences of vertices: so the pieces are at most
-  ``|v|`` apart, whatever rounding did to the choice of v;
-* the extreme point w of the difference against v: all of the difference lies beyond the plane
-  through w across v, so the pieces are at least ``v·w / |v|`` apart, whatever v is;
+* a point v of the difference, as a convex combination of differences of vertices: so the pieces are at
+  most ``|v|`` apart, however v was chosen;
+* the extreme point w of the difference in direction −v: all of the difference lies beyond the plane
+  through w perpendicular to v, so the pieces are at least ``v·w / |v|`` apart, however v was chosen;
 * where four differences of vertices surround the origin, the radius of a ball around the origin
-  inside their tetrahedron: the pieces sink into each other by at least that.
+  inside their tetrahedron: the pieces penetrate each other by at least that.
 
-Both bounds therefore hold up to the rounding of a few sums and products (1e-14 m here), and the
-caller stops as soon as one of them says enough. Nothing rests on the method having converged.
+So the bounds hold up to the rounding of a few sums and products (1e-14 m here), whether or not the method
+has converged, and the iteration stops as soon as one of them suffices.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from symgrasp.compiling import njit
-from symgrasp.engine.solids import SEED_GRID
+from symgrasp.engine.pieces import SEED_GRID
+from symgrasp.engine.simplex import FAST, SURROUNDS, depth_inside, reduce_to_nearest
 
-__all__ = ["FAST", "distance_bounds"]
-
-FAST: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
-"""How to compile what may round as it likes: products and sums may be fused. Without the last entry
-numba counts references to every array of every call, which costs more than the calls; nothing here
-makes arrays, so there is nothing to count."""
+__all__ = ["distance_bounds"]
 
 STEPS = 40
-"""Steps before giving up; the bounds stand as they are."""
+"""Largest number of iterations; the bounds at that point are returned."""
 
 CLOSE = 0.03
-"""A clearance need not be known better than to this share of it."""
-
-SOLID = 1e-9
-"""A tetrahedron surrounds the origin for certain when its faces are at least this far (m) from it."""
+"""Relative precision at which a clearance is precise enough."""
 
 
 @njit(**FAST)
-def distance_bounds(solids, pose, a, b, enough, sure, little, work):
+def distance_bounds(pieces, pose, a, b, enough, sure, little, work):
     """Return a lower and an upper bound (m) of the distance of two pieces.
 
     Args:
-        solids: the arrays of `Solids`, as a tuple.
-        pose: (P, 12) where each piece is, see `pose_rows`.
+        pieces: the arrays of `PackedPieces`, as a tuple.
+        pose: (P, 12) pose of each piece, see `pose_rows`.
         a: index of a piece.
         b: index of another piece.
         enough: stop when the lower bound is at least this (m).
         sure: stop when the lower bound is at least this (m) and the bounds are close, see `CLOSE`.
         little: stop when the upper bound is below this (m).
-        work: (4, 3) scratch.
+        work: (4, 3) the simplex, overwritten.
 
     Returns:
-        The bounds; below zero where the pieces overlap, when the lower bound is -inf.
+        The bounds. Where the pieces overlap the upper one is negative and the lower one -inf.
     """
-    vertices, edge_start, edges, seeds, index, size = solids
+    vertices, edge_start, edges, seeds, index, size = pieces
     thick = size[a, 0] + size[b, 0]
     enough += thick
     sure += thick
@@ -89,14 +81,14 @@ def distance_bounds(solids, pose, a, b, enough, sure, little, work):
             break
         for k in range(count):
             if work[k, 0] == w0 and work[k, 1] == w1 and work[k, 2] == w2:
-                return lower - thick, upper - thick  # no new point: as close as it gets
+                return lower - thick, upper - thick  # w is in the simplex already: converged
         work[count, 0], work[count, 1], work[count, 2] = w0, w1, w2
         count += 1
         if count == 4:
-            deep = _depth(work)
-            if deep > SOLID:
+            deep = depth_inside(work)
+            if deep > SURROUNDS:
                 return -math.inf, -deep - thick
-        count, v0, v1, v2 = _nearest(work, count)
+        count, v0, v1, v2 = reduce_to_nearest(work, count)
         square = v0 * v0 + v1 * v1 + v2 * v2
         upper = min(upper, math.sqrt(square))
         if upper < little:
@@ -108,6 +100,7 @@ def distance_bounds(solids, pose, a, b, enough, sure, little, work):
 
 @njit(**FAST)
 def _centre(size, pose, k):
+    """Return the centre of the box of piece k in the world."""
     c0, c1, c2 = size[k, 3], size[k, 4], size[k, 5]
     return (
         pose[k, 0] * c0 + pose[k, 1] * c1 + pose[k, 2] * c2 + pose[k, 9],
@@ -118,7 +111,7 @@ def _centre(size, pose, k):
 
 @njit(**FAST)
 def _extreme(vertices, edge_start, edges, seeds, index, size, pose, k, d0, d1, d2, at):
-    """Return the extreme point of a piece along a direction, and its vertex to start from next time."""
+    """Return the extreme point of piece k along a direction, and its vertex, to start from next time."""
     e0 = pose[k, 0] * d0 + pose[k, 3] * d1 + pose[k, 6] * d2
     e1 = pose[k, 1] * d0 + pose[k, 4] * d1 + pose[k, 7] * d2
     e2 = pose[k, 2] * d0 + pose[k, 5] * d1 + pose[k, 8] * d2
@@ -143,6 +136,7 @@ def _extreme(vertices, edge_start, edges, seeds, index, size, pose, k, d0, d1, d
 
 @njit(**FAST)
 def _best(vertices, first, end, e0, e1, e2):
+    """Return the extreme vertex from first to before end along a direction, by trying all."""
     at = first
     best = -math.inf
     for i in range(first, end):
@@ -154,7 +148,7 @@ def _best(vertices, first, end, e0, e1, e2):
 
 @njit(**FAST)
 def _climb(vertices, edge_start, edges, at, e0, e1, e2):
-    """Climb to the extreme vertex: on a convex surface a corner that no neighbour beats is beaten by none."""
+    """Return the extreme vertex along a direction, by hill climbing: on a hull a local maximum is global."""
     here = np.uint32(at)
     best = vertices[here, 0] * e0 + vertices[here, 1] * e1 + vertices[here, 2] * e2
     while True:
@@ -171,6 +165,7 @@ def _climb(vertices, edge_start, edges, at, e0, e1, e2):
 
 @njit(**FAST)
 def _extreme_revolved(vertices, first, end, e0, e1, e2):
+    """Return the extreme point of a revolved piece along a direction."""
     flat = math.sqrt(e0 * e0 + e1 * e1)
     radius, height, best = 0.0, 0.0, -math.inf
     for i in range(first, end):
@@ -184,7 +179,7 @@ def _extreme_revolved(vertices, first, end, e0, e1, e2):
 
 @njit(**FAST)
 def _seed(e0, e1, e2):
-    """Return the cell of the cube's surface that a direction points to."""
+    """Return the index of the cell on the cube, see `SEED_GRID`, that a direction points to."""
     a0, a1, a2 = abs(e0), abs(e1), abs(e2)
     if a0 >= a1 and a0 >= a2:
         face, along, u, v = 0, e0, e1, e2
@@ -200,147 +195,3 @@ def _seed(e0, e1, e2):
     i = min(int((u / along + 1.0) * (0.5 * SEED_GRID)), SEED_GRID - 1)
     j = min(int((v / along + 1.0) * (0.5 * SEED_GRID)), SEED_GRID - 1)
     return (face * SEED_GRID + i) * SEED_GRID + j
-
-
-@njit(**FAST)
-def _nearest(w, count):
-    """Keep the points of a simplex that its point nearest to the origin needs; return that point."""
-    if count == 1:
-        return 1, w[0, 0], w[0, 1], w[0, 2]
-    if count == 2:
-        return _nearest_on_line(w)
-    if count == 3:
-        return _nearest_on_triangle(w)
-    return _nearest_on_tetrahedron(w)
-
-
-@njit(**FAST)
-def _nearest_on_line(w):
-    """The last point is the newest; Ericson, Real-Time Collision Detection, 5.1.2."""
-    d0, d1, d2 = w[1, 0] - w[0, 0], w[1, 1] - w[0, 1], w[1, 2] - w[0, 2]
-    along = -(w[0, 0] * d0 + w[0, 1] * d1 + w[0, 2] * d2)
-    square = d0 * d0 + d1 * d1 + d2 * d2
-    if along <= 0.0:
-        return 1, w[0, 0], w[0, 1], w[0, 2]
-    if along >= square:
-        _keep1(w, 1)
-        return 1, w[0, 0], w[0, 1], w[0, 2]
-    t = along / square
-    return 2, w[0, 0] + t * d0, w[0, 1] + t * d1, w[0, 2] + t * d2
-
-
-@njit(**FAST)
-def _nearest_on_triangle(w):
-    """Ericson, 5.1.5."""
-    s, t, kept = _triangle_weights(w, 0, 1, 2)
-    x = (
-        w[0, 0] + s * (w[1, 0] - w[0, 0]) + t * (w[2, 0] - w[0, 0]),
-        w[0, 1] + s * (w[1, 1] - w[0, 1]) + t * (w[2, 1] - w[0, 1]),
-        w[0, 2] + s * (w[1, 2] - w[0, 2]) + t * (w[2, 2] - w[0, 2]),
-    )
-    return _keep(w, 0, 1, 2, kept), x[0], x[1], x[2]
-
-
-@njit(**FAST)
-def _nearest_on_tetrahedron(w):
-    """The nearest of the nearest points of all faces; the origin inside was told apart before."""
-    best, face, kept = math.inf, 0, 0
-    x0, x1, x2 = 0.0, 0.0, 0.0
-    for k in range(4):
-        i, j, m = _face(k)
-        s, t, mask = _triangle_weights(w, i, j, m)
-        y0 = w[i, 0] + s * (w[j, 0] - w[i, 0]) + t * (w[m, 0] - w[i, 0])
-        y1 = w[i, 1] + s * (w[j, 1] - w[i, 1]) + t * (w[m, 1] - w[i, 1])
-        y2 = w[i, 2] + s * (w[j, 2] - w[i, 2]) + t * (w[m, 2] - w[i, 2])
-        square = y0 * y0 + y1 * y1 + y2 * y2
-        if square < best:
-            best, face, kept, x0, x1, x2 = square, k, mask, y0, y1, y2
-    i, j, m = _face(face)
-    return _keep(w, i, j, m, kept), x0, x1, x2
-
-
-@njit(**FAST)
-def _face(k):
-    if k == 0:
-        return 0, 1, 2
-    if k == 1:
-        return 0, 1, 3
-    if k == 2:
-        return 0, 2, 3
-    return 1, 2, 3
-
-
-@njit(**FAST)
-def _triangle_weights(w, i, j, m):
-    """Return weights of points j and m for the nearest point, and which points it needs, as bits."""
-    ab0, ab1, ab2 = w[j, 0] - w[i, 0], w[j, 1] - w[i, 1], w[j, 2] - w[i, 2]
-    ac0, ac1, ac2 = w[m, 0] - w[i, 0], w[m, 1] - w[i, 1], w[m, 2] - w[i, 2]
-    p1 = -(ab0 * w[i, 0] + ab1 * w[i, 1] + ab2 * w[i, 2])
-    p2 = -(ac0 * w[i, 0] + ac1 * w[i, 1] + ac2 * w[i, 2])
-    if p1 <= 0.0 and p2 <= 0.0:
-        return 0.0, 0.0, 1
-    p3 = -(ab0 * w[j, 0] + ab1 * w[j, 1] + ab2 * w[j, 2])
-    p4 = -(ac0 * w[j, 0] + ac1 * w[j, 1] + ac2 * w[j, 2])
-    if p3 >= 0.0 and p4 <= p3:
-        return 1.0, 0.0, 2
-    vc = p1 * p4 - p3 * p2
-    if vc <= 0.0 and p1 >= 0.0 and p3 <= 0.0 and p1 > p3:
-        return p1 / (p1 - p3), 0.0, 3
-    p5 = -(ab0 * w[m, 0] + ab1 * w[m, 1] + ab2 * w[m, 2])
-    p6 = -(ac0 * w[m, 0] + ac1 * w[m, 1] + ac2 * w[m, 2])
-    if p6 >= 0.0 and p5 <= p6:
-        return 0.0, 1.0, 4
-    vb = p5 * p2 - p1 * p6
-    if vb <= 0.0 and p2 >= 0.0 and p6 <= 0.0 and p2 > p6:
-        return 0.0, p2 / (p2 - p6), 5
-    va = p3 * p6 - p5 * p4
-    if va <= 0.0 and p4 >= p3 and p5 >= p6 and (p4 - p3) + (p5 - p6) > 0.0:
-        t = (p4 - p3) / ((p4 - p3) + (p5 - p6))
-        return 1.0 - t, t, 6
-    total = va + vb + vc
-    if total <= 0.0:  # three points on a line: any of its points will do
-        return 0.0, 0.0, 1
-    return vb / total, vc / total, 7
-
-
-@njit(**FAST)
-def _keep(w, i, j, m, mask):
-    """Move the points that the bits name to the front, and return how many they are."""
-    count = 0
-    for bit in range(3):
-        if mask & (1 << bit):
-            k = i if bit == 0 else (j if bit == 1 else m)
-            # Faces list their points in rising order, so nothing is overwritten before its turn.
-            w[count, 0], w[count, 1], w[count, 2] = w[k, 0], w[k, 1], w[k, 2]
-            count += 1
-    return count
-
-
-@njit(**FAST)
-def _keep1(w, k):
-    w[0, 0], w[0, 1], w[0, 2] = w[k, 0], w[k, 1], w[k, 2]
-
-
-@njit(**FAST)
-def _depth(w):
-    """Return the distance of the origin from the faces of a tetrahedron around it, else -1."""
-    least = math.inf
-    for k in range(4):
-        i, j, m = _face(k)
-        opposite = 3 - k
-        b0, b1, b2 = w[j, 0] - w[i, 0], w[j, 1] - w[i, 1], w[j, 2] - w[i, 2]
-        c0, c1, c2 = w[m, 0] - w[i, 0], w[m, 1] - w[i, 1], w[m, 2] - w[i, 2]
-        n0, n1, n2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
-        length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-        if length == 0.0:
-            return -1.0
-        origin = -(n0 * w[i, 0] + n1 * w[i, 1] + n2 * w[i, 2]) / length
-        inner = (
-            n0 * (w[opposite, 0] - w[i, 0])
-            + n1 * (w[opposite, 1] - w[i, 1])
-            + n2 * (w[opposite, 2] - w[i, 2])
-        ) / length
-        if origin * inner <= 0.0 or abs(inner) < abs(origin):
-            return -1.0
-        least = min(least, abs(origin))
-    return least

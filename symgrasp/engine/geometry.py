@@ -1,4 +1,4 @@
-"""What never changes while an object is moved: the pieces of a scene as one arm meets them."""
+"""The collision geometry of a scene for one arm: everything that does not depend on the object's pose."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.engine.checks import MovingBodies
-from symgrasp.engine.solids import Piece, Solids, pack, pose_rows
+from symgrasp.engine.kinematics import MovingPieces
+from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.engine.tree import Tree, build
 from symgrasp.meshes import read_mesh
 from symgrasp.object.profile import COLLISION_FACETS
@@ -18,46 +18,51 @@ from symgrasp.robot.model import Joint, RobotModel
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
-from symgrasp.world import Body as Name
-from symgrasp.world import BulletWorld, Shape, checked_self_pairs
+from symgrasp.world import BodyName, BulletWorld, Shape, checked_self_pairs
 
 __all__ = ["ArmGeometry", "arm_geometry", "supports"]
 
 
 class ArmGeometry(NamedTuple):
-    """An arm among everything that stands still, and an object.
+    """The collision geometry of a scene for one arm, as P pieces: the robot's, the object's, the static ones.
 
     Attributes:
-        names: (P,) the body and link of each piece.
-        solids: all P pieces: those that move, the robot's others, the object's, all others.
-        pose: (P, 12) where they are; the object's and those of what moves do not matter.
-        body: what moves.
-        tree: over all others.
-        pairs: the links of the robot's own pairs, in the order of `mark_near`.
-        moving: the links that move.
-        with_tool: those of them that are fixed to the tool, fingers included.
+        names: (P,) names of the body and link of each piece.
+        pieces: those that the arm moves, the rest of the robot's, the object's, and the static ones (the
+            obstacles and the other robots at home), in this order.
+        pose: (P, 12) their poses; placeholders for the moving ones and the object's.
+        moving: the pieces that the arm moves, and their pairs.
+        tree: the boxes of the static pieces.
+        pairs: the two links of each pair of the robot's own pieces, in the order of `mark_near`.
+        moving_links: names of the links that the arm moves.
+        tool_links: those of them that are fixed to the tool, fingers included.
     """
 
-    names: list[Name]
-    solids: Solids
+    names: list[BodyName]
+    pieces: PackedPieces
     pose: Array
-    body: MovingBodies
+    moving: MovingPieces
     tree: Tree
     pairs: list[frozenset[str]]
-    moving: frozenset[str]
-    with_tool: frozenset[str]
+    moving_links: frozenset[str]
+    tool_links: frozenset[str]
 
 
 class _Placed(NamedTuple):
-    """A piece, whose it is, and where."""
+    """A piece with the name of its body and its pose (4, 4) in the world."""
 
-    name: Name
+    name: BodyName
     piece: Piece
     pose: Array
 
 
 def supports(arm: Arm) -> bool:
-    """Whether all that an arm moves is either fixed to one of its joints or part of its hand."""
+    """Whether the engine can place every link that an arm moves.
+
+    It can where each such link depends on the joints of the arm's chain alone, or on the joints of the
+    hand and lies beyond the last joint of the chain. A mimic joint elsewhere that follows a joint of the
+    arm breaks this.
+    """
     model = arm.robot.model
     own = set(arm.indices.tolist())
     chain = {j.name for j in model.joints if j.name in arm.joint_names}
@@ -73,79 +78,73 @@ def supports(arm: Arm) -> bool:
 
 
 def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
-    """Collect the pieces of a world as an arm meets them.
+    """Collect the collision geometry of a world for an arm.
 
     Args:
-        world: the world; its robots are at home.
+        world: the world; its other robots are at home.
         arm: the arm.
         openings: (rows,) opening (m) of the hand at each row of the grid.
     """
     scene, model = world.scene, arm.robot.model
     shapes = world.shapes(arm.robot.name)
     joints = [next(j for j in model.joints if j.name == name) for name in arm.joint_names]
-    level = {link: _level(model, joints, link) for link in shapes}
-    tool = [link for link in shapes if level[link] == arm.dof - 1]
-    between = sorted((link for link in shapes if 0 <= level[link] < arm.dof - 1), key=lambda k: level[k])
-    still = [link for link in shapes if level[link] < 0]
-    order = [(link, shape) for links in (tool, between, still) for link in links for shape in shapes[link]]
+    last_joint = {link: _last_joint(model, joints, link) for link in shapes}
+    tool = [link for link in shapes if last_joint[link] == arm.dof - 1]
+    between = [link for link in shapes if 0 <= last_joint[link] < arm.dof - 1]
+    between.sort(key=lambda link: last_joint[link])
+    fixed = [link for link in shapes if last_joint[link] < 0]
+    order = [(link, shape) for links in (tool, between, fixed) for link in links for shape in shapes[link]]
     links = [link for link, _ in order]
-    hands = sum(link in tool for link in links)
-    count = sum(link not in still for link in links)
+    tool_count = sum(link in tool for link in links)
+    moving_count = sum(link not in fixed for link in links)
 
     zero = arm.robot_values(np.zeros(arm.dof))
     at_zero = arm.robot.T_world_base @ model.forward(zero)
     frames = [at_zero[j.child] for j in joints]
-    own = [_Placed(Name(arm.robot.name, k), _piece(s), at_zero[model.link_index(k)]) for k, s in order]
-    name = Name(scene.file.object.name, "")
+    own = [_Placed(BodyName(arm.robot.name, k), _piece(s), at_zero[model.link_index(k)]) for k, s in order]
+    name = BodyName(scene.file.object.name, "")
     objects = [_Placed(name, _revolved(v), np.eye(4)) for v in scene.profile.convex_pieces()]
     others = [*_obstacles(world), *_other_robots(world, arm)]
     placed = [*own, *objects, *others]
 
-    solids = pack([p.piece for p in placed])
+    local = [inverse(frames[last_joint[p.name.link]]) @ p.pose for p in own[:moving_count]]
+    pieces = pack([p.piece for p in placed])
     pose = pose_rows(np.array([p.pose for p in placed]))
-    pairs = _own_pairs(model, links, count)
-    together = (pairs < hands).all(axis=1)
-    base = (pairs[:, 0] < hands) & (pairs[:, 1] >= count)
-    arm_pairs, start = _by_first(pairs[~(together | base)], hands, count)
+    pairs = _own_pairs(model, links, moving_count)
+    together = (pairs < tool_count).all(axis=1)
+    base = (pairs[:, 0] < tool_count) & (pairs[:, 1] >= moving_count)
+    arm_pairs, start = _sort_by_arm_piece(pairs[~(together | base)], tool_count, moving_count)
     return ArmGeometry(
         names=[p.name for p in placed],
-        solids=solids,
+        pieces=pieces,
         pose=pose,
-        body=MovingBodies(
-            joint_origin=pose_rows(np.array([frames[0], *(inverse(a) @ b for a, b in _steps(frames))])),
+        moving=MovingPieces(
+            joint_origin=pose_rows(np.array([frames[0], *(inverse(a) @ b for a, b in pairwise(frames))])),
             joint_axis=np.array([j.axis for j in joints]),
-            frame=np.array([level[link] for link in links[:count]], dtype=np.int32),
-            local=pose_rows(
-                np.array([inverse(frames[level[p.name.link]]) @ p.pose for p in own[:count]]).reshape(
-                    -1, 4, 4
-                )
-            ),
-            hand=_hand_poses(arm, links[:hands], openings),
-            touch=np.array([link in arm.hand.touch_links for link in links[:hands]], dtype=bool),
+            frame=np.array([last_joint[link] for link in links[:moving_count]], dtype=np.int32),
+            local=pose_rows(np.array(local).reshape(-1, 4, 4)),
+            hand=_hand_poses(arm, links[:tool_count], openings),
+            touch=np.array([link in arm.hand.touch_links for link in links[:tool_count]], dtype=bool),
             hand_pairs=pairs[together],
             base_pairs=pairs[base],
             arm_pairs=arm_pairs,
             arm_pair_start=start,
             objects=np.arange(len(own), len(own) + len(objects), dtype=np.int32),
         ),
-        tree=build(solids, pose, np.arange(len(own) + len(objects), len(placed))),
+        tree=build(pieces, pose, np.arange(len(own) + len(objects), len(placed))),
         pairs=[
             frozenset((links[a], links[b]))
             for a, b in np.concatenate([pairs[together], pairs[base], arm_pairs]).tolist()
         ],
-        moving=frozenset(links[:count]),
-        with_tool=frozenset(links[:hands]),
+        moving_links=frozenset(links[:moving_count]),
+        tool_links=frozenset(links[:tool_count]),
     )
 
 
-def _level(model: RobotModel, joints: list[Joint], link: str) -> int:
-    """Return which of an arm's joints is the last one to move a link, -1 if none does."""
+def _last_joint(model: RobotModel, joints: list[Joint], link: str) -> int:
+    """Return the index of the last of an arm's joints that moves a link, -1 if none does."""
     chain = [j.name for j in model.chain(link)]
     return max((k for k, joint in enumerate(joints) if joint.name in chain), default=-1)
-
-
-def _steps(frames: list[Array]) -> Iterator[tuple[Array, Array]]:
-    return pairwise(frames)
 
 
 def _piece(shape: Shape) -> Piece:
@@ -153,7 +152,7 @@ def _piece(shape: Shape) -> Piece:
 
 
 def _hand_poses(arm: Arm, links: list[str], openings: Array) -> Array:
-    """Return the poses (rows, G, 12) of links in the tool frame at every opening."""
+    """Return the poses (rows, G, 12) of G links in the tool frame at the opening of each row."""
     model = arm.robot.model
     index = [model.link_index(link) for link in links]
     values = np.array([arm.robot_values(arm.home, float(opening)) for opening in openings])
@@ -163,34 +162,49 @@ def _hand_poses(arm: Arm, links: list[str], openings: Array) -> Array:
 
 
 def _own_pairs(model: RobotModel, links: list[str], count: int) -> np.ndarray:
-    """Return the pairs (., 2) of the robot's own pieces that can collide, of which one moves at least.
+    """Return the pairs (., 2) of the robot's own pieces that can collide and of which at least one moves.
 
-    The first of a pair moves, and against the tool if either does.
+    Args:
+        model: the robot's model.
+        links: link of each of the robot's pieces; those fixed to the tool first, then the other moving ones.
+        count: number of moving pieces.
+
+    Returns:
+        The pairs, the lower index first: so the first piece moves, and is fixed to the tool if any is.
     """
-    pieces: dict[str, list[int]] = {}
+    by_link: dict[str, list[int]] = {}
     for k, link in enumerate(links):
-        pieces.setdefault(link, []).append(k)
+        by_link.setdefault(link, []).append(k)
     found = []
     for first, second in checked_self_pairs(model):
-        for a in pieces.get(first, []):
-            for b in pieces.get(second, []):
+        for a in by_link.get(first, []):
+            for b in by_link.get(second, []):
                 found.append((min(a, b), max(a, b)))
     pairs = np.array([pair for pair in found if pair[0] < count], dtype=np.int32)
     return pairs.reshape(-1, 2)
 
 
-def _by_first(pairs: np.ndarray, hands: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Sort pairs by the piece that moves between tool and base; return them and where each begins."""
+def _sort_by_arm_piece(pairs: np.ndarray, hands: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sort pairs by their piece between tool and base, of which each pair has one, and put it first.
+
+    Args:
+        pairs: (., 2) pairs of pieces.
+        hands: number of pieces that are fixed to the tool.
+        count: number M of moving pieces.
+
+    Returns:
+        The pairs (., 2), and (M + 1,) where those of each moving piece begin.
+    """
     turned = [(b, a) if a < hands else (a, b) for a, b in pairs.tolist()]
     ordered = np.array(sorted(turned), dtype=np.int32).reshape(-1, 2)
     return ordered, np.searchsorted(ordered[:, 0], np.arange(count + 1)).astype(np.int32)
 
 
 def _revolved(vertices: Array) -> Piece:
-    """Return the round piece through the corners of a convex piece of the object.
+    """Return the revolved piece around the vertices (n, 3) of a convex piece of the object.
 
-    It contains the prism that PyBullet has, and exceeds it by the height of the arcs over its sides.
-    The same for every turn of the object, it makes the hand's gap the same for all cells of a row.
+    It contains the prism that PyBullet has; the slack is the height of its arcs over the sides of the prism.
+    Because it is round, the hand has the same distance from it for all cells of a row.
     """
     radius = np.hypot(vertices[:, 0], vertices[:, 1])
     knots = np.column_stack([radius, np.zeros(len(radius)), vertices[:, 2]])
@@ -199,8 +213,9 @@ def _revolved(vertices: Array) -> Piece:
 
 
 def _obstacles(world: BulletWorld) -> Iterator[_Placed]:
+    """Yield the pieces of the obstacles; a mesh is one piece for each triangle."""
     for o in world.scene.obstacles:
-        name, pose = Name(o.name, ""), o.T_world_obstacle
+        name, pose = BodyName(o.name, ""), o.T_world_obstacle
         if o.kind == "urdf":
             model = o.model
             assert model is not None
@@ -214,6 +229,7 @@ def _obstacles(world: BulletWorld) -> Iterator[_Placed]:
 
 
 def _primitive(o: Obstacle) -> Piece:
+    """Return a box, cylinder or sphere as a piece in its own frame."""
     if o.kind == "box":
         return Piece((np.array(list(np.ndindex(2, 2, 2))) - 0.5) * o.size)
     if o.kind == "cylinder":
@@ -223,11 +239,13 @@ def _primitive(o: Obstacle) -> Piece:
 
 
 def _triangles(o: Obstacle) -> Array:
+    """Return the triangles (n, 3, 3) of a mesh obstacle in its own frame."""
     assert o.path is not None
     return np.asarray(read_mesh(o.path, f"obstacle {o.name}").triangles, dtype=float)
 
 
 def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[_Placed]:
+    """Yield the pieces of all robots but the arm's, at home."""
     scene: Scene = world.scene
     for name, robot in scene.robots.items():
         if name != arm.robot.name:
@@ -236,6 +254,7 @@ def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[_Placed]:
 
 
 def _links(shapes: dict[str, list[Shape]], name: str, model: RobotModel, links: Array) -> Iterator[_Placed]:
+    """Yield the pieces of a URDF, given the shapes and the world poses (links, 4, 4) of its links."""
     for link, parts in shapes.items():
         for shape in parts:
-            yield _Placed(Name(name, link), _piece(shape), links[model.link_index(link)])
+            yield _Placed(BodyName(name, link), _piece(shape), links[model.link_index(link)])

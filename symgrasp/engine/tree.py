@@ -1,4 +1,4 @@
-"""A tree of boxes over everything that stands still: which pieces are near a box?"""
+"""A tree of bounding boxes over the static pieces, to find those near a box."""
 
 from __future__ import annotations
 
@@ -7,20 +7,22 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.compiling import njit
-from symgrasp.engine.distance import FAST
-from symgrasp.engine.solids import Solids
+from symgrasp.engine.boxes import box_of
+from symgrasp.engine.pieces import PackedPieces
 from symgrasp.poses import Array
 
-__all__ = ["Tree", "box_of", "build"]
+__all__ = ["Tree", "build"]
 
 
 class Tree(NamedTuple):
-    """A binary tree in preorder: after a node that is missed comes ``skip``, else the next one.
+    """A binary tree of axis-aligned boxes, its N nodes in preorder.
+
+    Where a box misses a node, the walk goes on at ``skip``, else at the next node.
 
     Attributes:
         box: (N, 6) lower and upper corner of each node.
-        skip: (N,) the node after the whole subtree.
-        piece: (N,) the piece of a leaf, -1 for inner nodes.
+        skip: (N,) index of the node after the whole subtree.
+        piece: (N,) index of the piece of a leaf, -1 for inner nodes.
     """
 
     box: Array
@@ -28,34 +30,24 @@ class Tree(NamedTuple):
     piece: np.ndarray
 
 
-def build(solids: Solids, pose: Array, pieces: np.ndarray) -> Tree:
-    """Build the tree over some pieces at rest.
+def build(pieces: PackedPieces, pose: Array, indices: np.ndarray) -> Tree:
+    """Build the tree over some of the pieces.
 
     Args:
-        solids: all pieces.
-        pose: (P, 12) where they are.
-        pieces: indices of those to put into the tree.
+        pieces: all P pieces.
+        pose: (P, 12) their poses.
+        indices: indices of the pieces to put into the tree.
     """
-    boxes = np.zeros((len(pieces), 6))
-    for row, k in enumerate(pieces):
-        box_of(solids.size, pose, k, boxes[row])
-    return Tree(*_build(boxes, np.asarray(pieces, dtype=np.int32)))
-
-
-@njit(**FAST)
-def box_of(size, pose, k, box):
-    """Write the box (6,) around a piece at its pose, rounding included."""
-    for i in range(3):
-        r0, r1, r2 = pose[k, 3 * i], pose[k, 3 * i + 1], pose[k, 3 * i + 2]
-        centre = r0 * size[k, 3] + r1 * size[k, 4] + r2 * size[k, 5] + pose[k, 9 + i]
-        half = abs(r0) * size[k, 6] + abs(r1) * size[k, 7] + abs(r2) * size[k, 8] + size[k, 0]
-        box[i] = centre - half
-        box[3 + i] = centre + half
+    boxes = np.zeros((len(indices), 6))
+    for row, k in enumerate(indices):
+        box_of(pieces.size, pose, k, boxes[row])
+    return Tree(*_build(boxes, np.asarray(indices, dtype=np.int32)))
 
 
 @njit(cache=True)
-def _build(boxes, pieces):
-    count = len(pieces)
+def _build(boxes, indices):
+    """Return the arrays of `Tree`, splitting at the median along the axis of the widest spread."""
+    count = len(indices)
     nodes = max(2 * count - 1, 0)
     box = np.empty((nodes, 6))
     skip = np.empty(nodes, dtype=np.int32)
@@ -74,7 +66,7 @@ def _build(boxes, pieces):
             box[node, 3 + i] = boxes[order[first:end], 3 + i].max()
         skip[node] = node + 2 * (end - first) - 1
         if end - first == 1:
-            piece[node] = pieces[order[first]]
+            piece[node] = indices[order[first]]
             continue
         axis = 0
         widest = -1.0
@@ -87,7 +79,7 @@ def _build(boxes, pieces):
         order[first:end] = order[first:end][np.argsort(middles)]
         half = first + (end - first) // 2
         left = 2 * (half - first) - 1
-        # Right first, so that the left child is taken off the stack next: the stack stays low.
+        # The left child is pushed last and popped next: depth first, so the stack stays shallow.
         stack[height, 0], stack[height, 1], stack[height, 2] = node + 1 + left, half, end
         stack[height + 1, 0], stack[height + 1, 1], stack[height + 1, 2] = node + 1, first, half
         height += 2

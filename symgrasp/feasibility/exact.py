@@ -15,10 +15,12 @@ import numba
 import numpy as np
 
 from symgrasp.engine import search
-from symgrasp.engine.checks import FREE_BAND, HIT_BAND, mark_near, new_scratch, place_arm, place_hand
+from symgrasp.engine.boxes import box_of
+from symgrasp.engine.broad_phase import mark_near
+from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
-from symgrasp.engine.solids import pose_rows
-from symgrasp.engine.tree import box_of
+from symgrasp.engine.kinematics import new_scratch, place_arm, place_hand
+from symgrasp.engine.pieces import pose_rows
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
 from symgrasp.feasibility.fit import fit
@@ -32,7 +34,7 @@ from symgrasp.progress import Progress
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
-from symgrasp.world import Body, BulletWorld, Collision, NearBodies
+from symgrasp.world import BodyName, BulletWorld, Collision, NearBodies
 
 __all__ = ["ExactEngine"]
 
@@ -99,10 +101,10 @@ class ExactEngine:
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
-        self._scratch = new_scratch(self._geometry.pose, self._geometry.solids, arm.dof)
+        self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces, arm.dof)
         # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
-        pairs = world.near(arm, self._reach)
+        pairs = world.pairs_within(arm, self._reach)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
     @staticmethod
@@ -148,9 +150,9 @@ class ExactEngine:
         self.world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
         self.world.set_object(T_world_object)
         geometry, scratch = self._geometry, self._scratch
-        scratch.pose[geometry.body.objects] = pose_rows(axis_frame(T_world_object))
-        for k in geometry.body.objects:
-            box_of(geometry.solids.size, scratch.pose, k, scratch.box[k])
+        scratch.pose[geometry.moving.objects] = pose_rows(axis_frame(T_world_object))
+        for k in geometry.moving.objects:
+            box_of(geometry.pieces.size, scratch.pose, k, scratch.box[k])
 
     def _search_rows(self, draft: MapDraft, T_base_tool: Array, progress: Progress | None) -> None:
         """Fill the rows at which the hand fits, some at a time so that progress is told often enough."""
@@ -173,7 +175,7 @@ class ExactEngine:
 
     def _fixed_bodies(self) -> _FixedBodies:
         """Measure the bodies that the arm does not move, with the object where it is now."""
-        with_object = self.world.near(self.arm, self._reach, (self.world.scene.file.object.name,))
+        with_object = self.world.pairs_within(self.arm, self._reach, (self.world.scene.file.object.name,))
         gap, deepest = CLEARANCE_LIMIT, None
         for c in [*self._fixed_pairs, *filter(self._is_fixed, with_object)]:
             distance = self._reach - c.depth
@@ -187,7 +189,7 @@ class ExactEngine:
         """Whether a pair involves the arm's robot, but no link that the arm moves."""
         name = self.arm.robot.name
         own = [body.link for body in (c.a, c.b) if body.body == name]
-        return bool(own) and not self._geometry.moving.intersection(own)
+        return bool(own) and not self._geometry.moving_links.intersection(own)
 
     def _bodies(self, draft: MapDraft) -> _Bodies:
         """Name all pieces in a map."""
@@ -197,7 +199,7 @@ class ExactEngine:
             np.array([self._collision_reason(name) for name in names]),
         )
 
-    def _collision_reason(self, hit: Body) -> Reason:
+    def _collision_reason(self, hit: BodyName) -> Reason:
         """Return what the arm's collision with a body is called."""
         scene = self.world.scene
         if hit.body == self.arm.robot.name:
@@ -215,34 +217,34 @@ class ExactEngine:
         fixed: _FixedBodies,
     ) -> Iterator[None]:
         """Search some rows of the map; pause after every cell that PyBullet decided."""
-        goals = search.SearchInput(
-            order=self._order,
+        inputs = search.SearchInput(
+            sample_order=self._order,
             T_world_base=self._T_world_base,
             T_base_tool=np.ascontiguousarray(T_base_tool[:, rows].reshape(-1, 4, 4)),
             row=np.tile(rows, len(ROLLS)),
             retreat=-retreat_distances(self._settings.approach),
             margin=float(self._settings.margin),
             clearance=fixed.gap,
-            blocked=fixed.collision is not None,
-            parts=PARTS * numba.get_num_threads(),
+            always_collides=fixed.collision is not None,
+            chunks=PARTS * numba.get_num_threads(),
         )
         with _ALL_CORES:
             found = search.search(
                 self.ik.chain,
-                self._geometry.body,
-                self._geometry.solids,
+                self._geometry.moving,
+                self._geometry.pieces,
                 self._geometry.tree,
                 self._scratch.pose,
-                goals,
+                inputs,
                 self.arm.dof,
             )
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.manifold.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
         _record(draft, bodies, found, cells, fixed)
-        for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.open_count > 0)):
+        for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.undecided_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             self._decide(
-                draft, cell, goals.T_base_tool[i], self._undecided(found, int(i), goals.T_base_tool[i])
+                draft, cell, inputs.T_base_tool[i], self._undecided(found, int(i), inputs.T_base_tool[i])
             )
             yield
 
@@ -250,10 +252,10 @@ class ExactEngine:
         self, found: search.SearchResult, i: int, T_base_tool: Array
     ) -> list[tuple[Array, int, int]]:
         """Return the undecided candidates of an open cell, or all inside the limits where they are many."""
-        count = int(found.open_count[i])
-        if count <= search.OPEN_KEPT:
-            picks = found.open_pick[i]
-            return [(found.open_q[i, j], int(picks[j, 0]), int(picks[j, 1])) for j in range(count)]
+        count = int(found.undecided_count[i])
+        if count <= search.UNDECIDED_KEPT:
+            picks = found.undecided_solution[i]
+            return [(found.undecided_q[i, j], int(picks[j, 0]), int(picks[j, 1])) for j in range(count)]
         s = self.ik.solve(T_base_tool)
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
 
@@ -279,12 +281,12 @@ class ExactEngine:
     def _near(self, q: Array, T_base_tool: Array, row: int) -> NearBodies:
         """Return the bodies near the arm at joint values (n,); all others are certified free."""
         geometry, scratch = self._geometry, self._scratch
-        body, size = geometry.body, geometry.solids.size
-        place_hand(body, geometry.solids, scratch, self._T_world_base, T_base_tool, row)
-        place_arm(body, geometry.solids, scratch, q)
+        moving, size = geometry.moving, geometry.pieces.size
+        place_hand(moving, geometry.pieces, scratch, self._T_world_base, T_base_tool, row)
+        place_arm(moving, geometry.pieces, scratch, q)
         near = np.zeros(len(geometry.names), dtype=bool)
         pairs = np.zeros(len(geometry.pairs), dtype=bool)
-        mark_near(body, size, geometry.tree, scratch, self.world.margin + FREE_BAND, near, pairs)
+        mark_near(moving, size, geometry.tree, scratch, self.world.margin + FREE_BAND, near, pairs)
         bodies = {geometry.names[k].body for k in np.flatnonzero(near)}
         return bodies | {geometry.pairs[k] for k in np.flatnonzero(pairs)}
 
@@ -292,7 +294,9 @@ class ExactEngine:
         """Whether the tool pose alone decides a collision: no link but those fixed to the tool moves."""
         name = self.arm.robot.name
         own = [body.link for body in (collision.a, collision.b) if body.body == name]
-        return self._geometry.with_tool.issuperset(link for link in own if link in self._geometry.moving)
+        return self._geometry.tool_links.issuperset(
+            link for link in own if link in self._geometry.moving_links
+        )
 
 
 def _same(a: Collision, b: Collision) -> bool:
@@ -322,7 +326,7 @@ def _record(
     status = found.status
     draft.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, Reason.UNREACHABLE)
     feasible = status == search.FEASIBLE
-    sample, branch = found.pick[feasible].T
+    sample, branch = found.solution[feasible].T
     draft.record_feasible(those(feasible), found.q[feasible], sample, branch, found.clearance[feasible])
     blocked = status == search.BLOCKED
     hit = (status == search.HIT) | blocked

@@ -187,7 +187,7 @@ def explain_cell(
     reason, candidates = fit(arm.hand, manifold.profile, h), []
     if reason is None:
         T_base_tool = inverse(arm.robot.T_world_base) @ tools[cell]
-        with world.kept():
+        with world.preserving_state():
             world.margin = world.scene.settings.margin
             world.set_arms(())
             world.set_object(task.T_world_object)

@@ -10,6 +10,10 @@ __all__ = ["ClosedFormIK", "Solutions", "SphericalIK", "solver_for"]
 def solver_for(arm: Arm, samples: int) -> ClosedFormIK:
     """Return the fastest solver of an arm: compiled where its axes allow, EAIK otherwise.
 
+    Args:
+        arm: the arm.
+        samples: number of redundancy samples; a 6-joint arm always has one.
+
     Raises:
         UrdfError: no closed form is known for the arm, whichever joint is locked.
     """

@@ -1,6 +1,6 @@
-"""The closed form itself, compiled: all branches at a pose and a redundancy value.
+"""Compiled closed form: all inverse-kinematics branches at a tool pose and a redundancy value.
 
-See `symgrasp.ik.spherical` for the equations.
+See `symgrasp.ik.spherical` for the equations and the meaning of triple, middle joint and pair.
 """
 
 from __future__ import annotations
@@ -8,31 +8,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import prange
-
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, P0, PHI, R0, TRIPLE, WRIST, WRIST_SEEN
 
-__all__ = ["BRANCHES", "STRICT", "branches_at", "solve_batch", "solve_range"]
+__all__ = ["BRANCHES", "STRICT", "branches_at", "solve_range"]
 
 BRANCHES = 8
-"""Branches of the closed form: two for the middle joint, times two for the pair, times two."""
+"""Branches of the closed form: two values of the middle joint, times two of the pair, two of the triple."""
 
-GRAZE = 1e-12
-"""By how much (of one, or m²) a square root may fall below zero and count as zero: at the edge of
-the reach both branches are one, and rounding decides."""
+ROOT_TOLERANCE = 1e-12
+"""A radicand (dimensionless, or m²) above minus this counts as zero: at the limit of the reach two
+branches coincide, and rounding decides on which side of zero it falls."""
 
 STRICT: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-"""How to compile: plain IEEE arithmetic. The last entry spares the counting of references to arrays,
-of which nothing below makes any."""
-
-
-@njit(cache=True, error_model="numpy", parallel=True)
-def solve_batch(geometry, joint, limits, forward, T, q, exists, inside):
-    """Solve poses T (m, 4, 4) at every redundancy value, on all cores; see `branches_at`."""
-    for i in prange(len(T)):
-        for k in range(len(geometry)):
-            branches_at(geometry, joint, limits, forward, k, T[i], False, q[i, k], exists[i, k], inside[i, k])
+"""Options of numba: plain IEEE arithmetic. The last one switches off reference counting of arrays, which
+is safe because nothing below allocates any."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,43 +41,43 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
         geometry, joint, limits, forward: the arm, see `Chain`.
         k: index of the redundancy sample.
         T: tool pose (4, 4) in the base.
-        inside_only: leave out what is outside the limits, as soon as that shows; what remains is
+        inside_only: leave out branches outside the limits as early as possible; those that remain are
             bit for bit the same.
         q: (BRANCHES, n) receives the joint values.
         exists: (BRANCHES,) receives which branches reach the pose.
-        inside: (BRANCHES,) receives which do so inside the limits.
+        inside: (BRANCHES,) receives which branches reach it inside the limits.
 
     Returns:
-        Whether the middle joint can bring S and W as far apart as the pose has them.
+        Whether some angle of the middle joint gives the distance between S and W that the pose needs.
     """
     for b in range(BRANCHES):
         exists[b] = False
         inside[b] = False
     g = geometry[k]
-    R, p = _motion(g, joint[7], T)
+    R, p = _tool_motion(g, joint[7], T)
     a = _vec(g, CENTRE_SEEN)
-    t = _minus(_back(R, _minus(_vec(g, CENTRE), p)), _vec(g, WRIST))  # G⁻¹ S − W
-    # Subproblem 3: |R4⁻¹ a − b| = |t|. Sines and cosines come without their angles where they can:
-    # most branches end at a limit, and few angles are ever needed.
+    t = _minus(_transposed_times(R, _minus(_vec(g, CENTRE), p)), _vec(g, WRIST))  # G⁻¹ S − W
+    # Subproblem 3: |R4⁻¹ a − b| = |t|. Where possible sines and cosines are computed without their angles:
+    # most branches are dropped at a joint limit before an angle is needed.
     middle, length, part = _vec(g, MIDDLE)
     sm, cm = g[MIDDLE + 3], g[MIDDLE + 4]
     c = (-0.5 * _dot(t, t) - part) / length
     s = _sine(c)
     if s < 0.0:
         return False
-    swing = math.atan2(s, c)
+    offset = math.atan2(s, c)
     for i in range(2):
         if i == 0:
-            q4, s4, c4 = -(middle + swing), -(sm * c + cm * s), cm * c - sm * s
+            q4, s4, c4 = -(middle + offset), -(sm * c + cm * s), cm * c - sm * s
         else:
-            q4, s4, c4 = swing - middle, s * cm - c * sm, cm * c + sm * s
+            q4, s4, c4 = offset - middle, s * cm - c * sm, cm * c + sm * s
         if inside_only and _outside(limits, joint[3], s4, c4):
             continue
-        q4 = _turned(limits, joint[3], q4)
+        q4 = _nearest_turn(limits, joint[3], q4)
         if inside_only and not _within(limits, joint[3], q4):
             continue
-        u = _minus(_turn(_vec(g, AXES + 9), -s4, c4, a), _vec(g, WRIST_SEEN))  # e4⁻¹ S − W
-        _pairs(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside)
+        u = _minus(_rotate(_vec(g, AXES + 9), -s4, c4, a), _vec(g, WRIST_SEEN))  # e4⁻¹ S − W
+        _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside)
     for i in range(BRANCHES):
         if exists[i] and _misses(forward, q[i], T):
             exists[i] = False
@@ -99,12 +89,12 @@ def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, 
 def _sine(cosine):
     """Return the sine of the arc cosine, which is not negative, or -1 where there is none."""
     rest = 1.0 - cosine * cosine
-    return math.sqrt(max(rest, 0.0)) if rest >= -GRAZE else -1.0
+    return math.sqrt(max(rest, 0.0)) if rest >= -ROOT_TOLERANCE else -1.0
 
 
 @njit(**STRICT)
-def _pairs(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside):
-    """Subproblem 2: R5⁻¹ u = R6 t."""
+def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside):
+    """Subproblem 2: R5⁻¹ u = R6 t gives q5 and q6 for a value of the middle joint."""
     h4, h5, h6 = _vec(g, AXES + 9), _vec(g, AXES + 12), _vec(g, AXES + 15)
     c = _dot(h5, h6)
     across = 1.0 - c * c
@@ -112,13 +102,13 @@ def _pairs(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, ins
     alpha = (along5 - c * along6) / across
     beta = (along6 - c * along5) / across
     rest = (_dot(u, u) - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / across
-    if rest < -GRAZE:
+    if rest < -ROOT_TOLERANCE:
         return
     gamma = math.sqrt(max(rest, 0.0))
     normal = _cross(h5, h6)
     h3 = _vec(g, AXES + 6)
     side = _perpendicular(h3)
-    v3, vside = _turn(h4, -s4, c4, h3), _turn(h4, -s4, c4, side)
+    v3, vside = _rotate(h4, -s4, c4, h3), _rotate(h4, -s4, c4, side)
     for j in range(2):
         out = gamma if j == 0 else -gamma
         z = (
@@ -126,29 +116,29 @@ def _pairs(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, ins
             alpha * h5[1] + beta * h6[1] + out * normal[1],
             alpha * h5[2] + beta * h6[2] + out * normal[2],
         )
-        y6, x6 = _angle(h6, t, z)
+        y6, x6 = _subproblem1(h6, t, z)
         s6, c6 = _unit(y6, x6)
         if inside_only and _outside(limits, joint[5], s6, c6):
             continue
-        y5, x5 = _angle(h5, z, u)
+        y5, x5 = _subproblem1(h5, z, u)
         s5, c5 = _unit(y5, x5)
         if inside_only and _outside(limits, joint[4], s5, c5):
             continue
-        q6 = _turned(limits, joint[5], math.atan2(y6, x6))
+        q6 = _nearest_turn(limits, joint[5], math.atan2(y6, x6))
         if inside_only and not _within(limits, joint[5], q6):
             continue
-        q5 = _turned(limits, joint[4], math.atan2(y5, x5))
+        q5 = _nearest_turn(limits, joint[4], math.atan2(y5, x5))
         if inside_only and not _within(limits, joint[4], q5):
             continue
-        # M = R_G R6⁻¹ R5⁻¹ R4⁻¹, of h3 and of what stands across it
-        M3 = _times(R, _turn(h6, -s6, c6, _turn(h5, -s5, c5, v3)))
-        Mside = _times(R, _turn(h6, -s6, c6, _turn(h5, -s5, c5, vside)))
+        # M = R_G R6⁻¹ R5⁻¹ R4⁻¹, applied to h3 and to a vector perpendicular to it
+        M3 = _times(R, _rotate(h6, -s6, c6, _rotate(h5, -s5, c5, v3)))
+        Mside = _times(R, _rotate(h6, -s6, c6, _rotate(h5, -s5, c5, vside)))
         _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, 4 * i + 2 * j, inside_only, q, exists, inside)
 
 
 @njit(**STRICT)
 def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside):
-    """Subproblem 4: R1 R2 R3 = M, so h1ᵀ R2 h3 = h1ᵀ M h3."""
+    """Subproblem 4: R1 R2 R3 = M, so h1ᵀ R2 h3 = h1ᵀ M h3, gives q1, q2 and q3; write the branch."""
     h1, h2, h3 = _vec(g, AXES), _vec(g, AXES + 3), _vec(g, AXES + 6)
     middle, length, part = _vec(g, TRIPLE)
     sm, cm = g[TRIPLE + 3], g[TRIPLE + 4]
@@ -161,19 +151,19 @@ def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, 
         s2, c2 = sm * c + cm * way, cm * c - sm * way
         if inside_only and _outside(limits, joint[1], s2, c2):
             continue
-        y1, x1 = _angle(h1, _turn(h2, s2, c2, h3), M3)
+        y1, x1 = _subproblem1(h1, _rotate(h2, s2, c2, h3), M3)
         s1, c1 = _unit(y1, x1)
         if inside_only and _outside(limits, joint[0], s1, c1):
             continue
-        # R3 from all of R2⁻¹ R1⁻¹ M: where q1 is free, because h1 and h3 align, q3 makes up for it.
-        y3, x3 = _angle(h3, side, _turn(h2, -s2, c2, _turn(h1, -s1, c1, Mside)))
-        q2 = _turned(limits, joint[1], middle + math.atan2(way, c))
+        # q3 from R2⁻¹ R1⁻¹ M with the q1 found: where h1 and h3 align, any q1 will do and q3 compensates.
+        y3, x3 = _subproblem1(h3, side, _rotate(h2, -s2, c2, _rotate(h1, -s1, c1, Mside)))
+        q2 = _nearest_turn(limits, joint[1], middle + math.atan2(way, c))
         if inside_only and not _within(limits, joint[1], q2):
             continue
-        q1 = _turned(limits, joint[0], math.atan2(y1, x1))
+        q1 = _nearest_turn(limits, joint[0], math.atan2(y1, x1))
         if inside_only and not _within(limits, joint[0], q1):
             continue
-        q3 = _turned(limits, joint[2], math.atan2(y3, x3))
+        q3 = _nearest_turn(limits, joint[2], math.atan2(y3, x3))
         if inside_only and not _within(limits, joint[2], q3):
             continue
         row = q[branch + i]
@@ -184,7 +174,7 @@ def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, 
         row[joint[4]] = q5
         row[joint[5]] = q6
         if joint[6] >= 0:
-            row[joint[6]] = _turned(limits, joint[6], g[PHI])
+            row[joint[6]] = _nearest_turn(limits, joint[6], g[PHI])
         exists[branch + i] = True
         fits = True
         for j in range(row.shape[0]):
@@ -193,8 +183,8 @@ def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, 
 
 
 @njit(**STRICT)
-def _motion(g, backwards, T):
-    """Return G as nested tuples (rotation, position), read from the end with the triple."""
+def _tool_motion(g, backwards, T):
+    """Return the displacement G of the tool as nested tuples (rotation, position), or G⁻¹ if backwards."""
     p0 = _vec(g, P0)
     # G = T T0⁻¹: rotation T R0ᵀ, position p − R p0.
     R = (
@@ -208,7 +198,7 @@ def _motion(g, backwards, T):
         T[2, 3] - (R[2][0] * p0[0] + R[2][1] * p0[1] + R[2][2] * p0[2]),
     )
     if backwards:
-        back = _back(R, p)
+        back = _transposed_times(R, p)
         p = (-back[0], -back[1], -back[2])
         R = (
             (R[0][0], R[1][0], R[2][0]),
@@ -220,6 +210,7 @@ def _motion(g, backwards, T):
 
 @njit(**STRICT)
 def _row3(T, i, g, j):
+    """Return entry (i, j) of the rotation T R0ᵀ."""
     return T[i, 0] * g[R0 + 3 * j] + T[i, 1] * g[R0 + 3 * j + 1] + T[i, 2] * g[R0 + 3 * j + 2]
 
 
@@ -234,21 +225,22 @@ def _times(R, v):
 
 
 @njit(**STRICT)
-def _turned(limits, joint, value):
-    """Take the full turns that bring a joint nearest to the middle of its limits."""
+def _nearest_turn(limits, joint, value):
+    """Add the full turns to a joint value that bring it nearest to the middle of its limits."""
     return value + 2.0 * math.pi * math.floor((limits[2, joint] - value) / (2.0 * math.pi) + 0.5)
 
 
 @njit(**STRICT)
 def _within(limits, joint, value):
+    """Whether a joint value is inside its limits."""
     return limits[0, joint] <= value <= limits[1, joint]
 
 
 @njit(**STRICT)
 def _outside(limits, joint, s, c):
-    """Whether the sine and cosine of a joint's angle say that no turn of it is inside the limits.
+    """Whether an angle of this sine and cosine is outside the limits of a joint, with any full turns added.
 
-    The turn nearest to the middle is inside when it is no further from it than half the range.
+    It is inside when the value nearest to the middle of the range is within half the range of it.
     """
     return c * limits[3, joint] + s * limits[4, joint] < limits[5, joint]
 
@@ -264,23 +256,23 @@ def _unit(y, x):
 
 @njit(**STRICT)
 def _misses(forward, q, T):
-    """Whether forward kinematics is further from the pose than the tolerances allow."""
+    """Whether the tool pose at joint values q differs from T by more than the tolerances."""
     n = q.shape[0]
     x, y, p = _column(forward, 2 * n + 1, 0), _column(forward, 2 * n + 1, 1), (0.0, 0.0, 0.0)
     for j in range(n - 1, -1, -1):
         axis, s, c = _row(forward, j), math.sin(q[j]), math.cos(q[j])
-        x, y = _turn(axis, s, c, x), _turn(axis, s, c, y)
-        p = _turn(axis, s, c, _plus(p, _row(forward, n + j + 1)))
+        x, y = _rotate(axis, s, c, x), _rotate(axis, s, c, y)
+        p = _rotate(axis, s, c, _plus(p, _row(forward, n + j + 1)))
     d = _minus(_plus(p, _row(forward, n)), _column(T, 0, 3))
     dx, dy = _minus(x, _column(T, 0, 0)), _minus(y, _column(T, 0, 1))
-    # The columns of two rotations an angle apart differ by at most that angle, and two columns by
-    # at least that angle together.
+    # For rotations an angle apart, a column differs by at most that angle, and two columns together (root
+    # sum of squares) by about that angle at least.
     turn = math.sqrt(_dot(dx, dx) + _dot(dy, dy))
     return not (math.sqrt(_dot(d, d)) <= forward[2 * n + 4, 0] and turn <= forward[2 * n + 4, 1])
 
 
 @njit(**STRICT)
-def _turn(axis, s, c, v):
+def _rotate(axis, s, c, v):
     """Rotate v about a unit axis by the angle of that sine and cosine (Rodrigues)."""
     along = _dot(axis, v) * (1.0 - c)
     w = _cross(axis, v)
@@ -292,21 +284,21 @@ def _turn(axis, s, c, v):
 
 
 @njit(**STRICT)
-def _angle(axis, a, b):
+def _subproblem1(axis, a, b):
     """Subproblem 1: y and x of the angle ``atan2(y, x)`` about an axis that turns a into b."""
     return _dot(axis, _cross(a, b)), _dot(a, b) - _dot(axis, a) * _dot(axis, b)
 
 
 @njit(**STRICT)
 def _perpendicular(v):
-    """Return a unit vector across v."""
+    """Return a unit vector perpendicular to v."""
     w = (0.0, -v[2], v[1]) if abs(v[0]) < 0.6 else (v[2], 0.0, -v[0])
     length = math.sqrt(_dot(w, w))
     return (w[0] / length, w[1] / length, w[2] / length)
 
 
 @njit(**STRICT)
-def _back(R, v):
+def _transposed_times(R, v):
     """Return Rᵀ v."""
     return (
         R[0][0] * v[0] + R[1][0] * v[1] + R[2][0] * v[2],

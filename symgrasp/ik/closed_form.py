@@ -20,25 +20,28 @@ from symgrasp.robot.robot import Arm
 __all__ = ["ClosedFormIK", "Solutions", "Tolerance"]
 
 LOCK_PREFERENCE = (6, 2, 0, 4, 1, 5, 3)
-"""Which of seven joints to lock, first choice first: the last one leaves the arm's reach whole,
-the elbow (3) would fix it."""
+"""Which of seven joints to lock, first choice first. Locking the last one keeps the arm's whole reach;
+locking the elbow (index 3) would fix its distance."""
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """By how much a returned configuration may miss the pose."""
+    """Largest error of the tool pose of a returned configuration.
+
+    Attributes:
+        position: distance (m).
+        rotation: angle (rad).
+    """
 
     position: float = 1e-6
-    """metres"""
     rotation: float = 1e-6
-    """radians"""
 
 
 class Solutions(NamedTuple):
     """Candidate configurations of one pose, in the order of Algorithm 1: by φ, then by branch.
 
     Attributes:
-        q: (m, n) joint values, turned into the limits where full turns can do that.
+        q: (m, n) joint values (rad), inside the limits where full turns can bring them there.
         sample: (m,) index of the redundancy sample.
         branch: (m,) index of the closed form's branch at that sample.
         inside: (m,) whether all joints are inside their limits.
@@ -51,12 +54,12 @@ class Solutions(NamedTuple):
 
 
 class ClosedFormIK:
-    """All branches of the inverse kinematics of an arm.
+    """All branches of the inverse kinematics of an arm, by EAIK.
 
     Args:
         arm: the arm.
         samples: number of redundancy samples; a 6-joint arm always has one.
-        tolerance: what a solution may miss the pose by.
+        tolerance: largest error of a solution.
 
     Raises:
         UrdfError: no closed form is known for the arm, whichever joint is locked.
@@ -80,11 +83,9 @@ class ClosedFormIK:
 
     @cached_property
     def _solvers(self) -> list[HPRobot]:
-        return [self._solver(phi) for phi in self.phi]
-
-    def _solver(self, phi: float) -> HPRobot:
-        locks = [] if self.locked is None else [(self.locked, float(phi))]
-        return HPRobot(self.arm.H, self.arm.P, locks)
+        """EAIK's solvers, one for each redundancy sample."""
+        locks = [[] if self.locked is None else [(self.locked, float(phi))] for phi in self.phi]
+        return [HPRobot(self.arm.H, self.arm.P, lock) for lock in locks]
 
     def solve(self, T_base_tool: Array) -> Solutions:
         """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""
@@ -94,20 +95,17 @@ class ClosedFormIK:
         """Return every configuration that reaches a pose (4, 4) at one redundancy sample."""
         return self._collect(T_base_tool, [self._solvers[sample]])
 
-    def solve_at(self, T_base_tool: Array, phi: float) -> Solutions:
-        """Return every configuration that reaches a pose (4, 4) at one redundancy value."""
-        return self._collect(T_base_tool, [self._solver(phi)])
-
     def _collect(self, T_base_tool: Array, solvers: list[HPRobot]) -> Solutions:
+        """Return what solvers find for a pose (4, 4), without answers that miss it."""
         target = np.array(T_base_tool, dtype=float)
-        target[:3, :3] = target[:3, :3] @ self.arm.R0.T  # EAIK's tool is unturned at zero
+        target[:3, :3] = target[:3, :3] @ self.arm.R0.T  # EAIK's tool frame is parallel to the base at zero
         found = [np.reshape(solver.IK(target).Q, (-1, self.arm.dof)) for solver in solvers]
         counts = [len(q) for q in found]
         q = np.concatenate(found)
         sample = np.repeat(np.arange(len(solvers)), counts)
         branch = np.concatenate([np.arange(n) for n in counts]) if counts else np.zeros(0, dtype=int)
-        # EAIK also returns least-squares answers where a pose is out of reach; forward kinematics
-        # tells them from solutions.
+        # EAIK returns least-squares answers where a pose is out of reach; forward kinematics tells them
+        # from solutions.
         position, rotation = pose_error(self.arm.tool_pose(q), T_base_tool)
         exact = (position <= self.tolerance.position) & (rotation <= self.tolerance.rotation)
         q, inside = self.arm.within_limits(q[exact])
@@ -115,10 +113,14 @@ class ClosedFormIK:
 
 
 def _lockable_joint(arm: Arm) -> int | None:
-    """Return the joint to lock, or None where the arm has a closed form as it is."""
+    """Return the index of the joint to lock, or None for a 6-joint arm.
+
+    Raises:
+        UrdfError: EAIK knows no closed form, whichever joint is locked.
+    """
     choices = [None] if arm.dof == 6 else list(LOCK_PREFERENCE)
     for joint in choices:
-        # Any value serves for the question; zero could make axes parallel that are not.
+        # At almost any value the answer is the same; at zero, axes may happen to be parallel.
         locks = [] if joint is None else [(joint, 0.3)]
         if HPRobot(arm.H, arm.P, locks).hasKnownDecomposition():
             return joint

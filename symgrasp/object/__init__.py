@@ -1,1 +1,1 @@
-"""Objects of revolution: profiles, the grid over their surface, and measuring them in meshes."""
+"""Objects of revolution: radius profiles, the grasp manifold over their surface, and measuring meshes."""

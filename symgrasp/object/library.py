@@ -1,4 +1,4 @@
-"""Objects by name or file: the shipped library of everyday objects, profiles in YAML, and meshes."""
+"""Loading objects of revolution: from the shipped library by name, from a YAML profile, or from a mesh."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OBJECTS_DIR = SCENES_DIR / "objects"
 
 
 def library_objects() -> dict[str, Path]:
-    """Return the objects that come with the package: name → file, in order."""
+    """Return the objects that come with the package: name → file, in alphabetical order."""
     return {path.stem: path for path in sorted(OBJECTS_DIR.glob("*.yaml"))}
 
 
@@ -47,7 +47,11 @@ def load_object(name: str | Path, scale: float = 1.0) -> tuple[str, Profile]:
 
 
 def _read(path: Path) -> tuple[str, Profile]:
-    """Read the name and the profile of an object from a YAML file."""
+    """Read the name and the profile of an object from a YAML file.
+
+    Raises:
+        ProfileError: it cannot be read, or is not a mapping of ``name`` and ``profile``.
+    """
     try:
         content = parse_yaml(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:

@@ -33,7 +33,7 @@ turning the object by whole cells gives bit for bit the same tool poses in the w
 
 
 def wrap(angle: ArrayLike) -> Array:
-    """Wrap angles (rad) into [-π, π)."""
+    """Wrap angles (...) (rad) into [-π, π)."""
     return np.mod(np.asarray(angle, dtype=float) + np.pi, 2 * np.pi) - np.pi
 
 
@@ -62,7 +62,8 @@ def grasp_to_tool(
     hand[..., 2, 0] = sign
     hand[..., 1, 1] = sign
     hand[..., 0, 2] = -1.0
-    # Each factor has the batch axes that it depends on: on a grid, few of the products are many.
+    # Each factor has only the batch axes that it depends on, so on a grid most of the matrix products
+    # are not repeated for every cell.
     return (axis_frame(T_world_object) @ rotation_z(azimuth)) @ from_rotation(hand, offset)
 
 
@@ -140,11 +141,17 @@ class Manifold:
         return row, int(np.floor(turned / self.dtheta)) % self.angles
 
     def shift(self, delta: float) -> tuple[Manifold, int]:
-        """Return the grid after the object turned by ``delta`` (rad), and the cells it moved.
+        """Shift the grid by the rotation of the object about its axis (equation 3).
 
-        A map over this grid becomes, for the turned object, ``np.roll(map, -k, axis=angles)``
-        over the returned grid. For whole cells the grid stays as it is; what is left over of
-        ``delta`` moves the start of the grid by less than a cell, so every shift is exact.
+        A map over this grid becomes, for the object turned by ``delta``, ``np.roll(map, -k,
+        axis=angles)`` over the returned grid. For a whole number of cells the grid stays as it is; the
+        rest of ``delta``, at most half a cell, moves the start of the grid, so every shift is exact.
+
+        Args:
+            delta: angle (rad) by which the object turned about its own axis.
+
+        Returns:
+            The shifted grid, and the number k of whole cells.
         """
         cells = delta / self.dtheta
         k = round(cells)

@@ -16,13 +16,12 @@ from symgrasp.poses import Array
 __all__ = ["COLLISION_FACETS", "Profile"]
 
 COLLISION_FACETS = 48
-"""Sides of the prisms that stand for circles in the collision body. They are circumscribed,
-so the body contains the object and exceeds it by at most 0.22 % of the radius (0.07 mm on a
-bottle)."""
+"""Sides of the polygons that stand for circles in the object's collision shape. They are circumscribed,
+so the shape contains the object and exceeds it by at most 0.22 % of the radius (0.07 mm on a bottle)."""
 
 
 class Profile:
-    """Outer radius r(h) over the height along the axis, piecewise linear.
+    """Outer radius r(h) of an object of revolution over the height along its axis, piecewise linear.
 
     Args:
         points: (n, 2) array of ``[h, r]`` in metres, n >= 2, heights strictly increasing,
@@ -75,7 +74,7 @@ class Profile:
 
         Raises:
             MeshError: the file is unusable, or what it shows is no object of revolution; see
-                `symgrasp.object.measure.measurement.measure_mesh`, which also tells how symmetric it is.
+                `symgrasp.object.measure.measurement.measure_mesh`, which also returns the deviations.
         """
         return cls.measured(measure_mesh(path, scale=scale))
 
@@ -130,14 +129,14 @@ class Profile:
         return float(radii.min()), float(radii.max())
 
     def convex_pieces(self) -> list[Array]:
-        """Cut the solid into convex pieces whose union is exactly the solid.
+        """Cut the object into convex pieces whose union is exactly the object (convex decomposition).
 
-        Neighbouring segments are joined as long as r(h) stays concave there, because a solid of
-        revolution is convex exactly where its profile is concave.
+        Neighbouring segments of the profile are joined as long as r(h) stays concave, because a solid
+        of revolution is convex exactly where its profile is concave.
 
         Returns:
-            One (m, 3) vertex array in the object frame a piece; its convex hull is the piece,
-            with every circle replaced by a circumscribed polygon.
+            One (m, 3) vertex array in the object frame for each piece; the convex hull of the vertices
+            is the piece, with every circle replaced by a circumscribed polygon.
         """
         knots = self._points
         slopes = np.diff(knots[:, 1]) / np.diff(knots[:, 0])
@@ -157,7 +156,7 @@ class Profile:
         return pieces
 
     def mesh(self, facets: int = 96) -> trimesh.Trimesh:
-        """Return the closed surface as a mesh in the object frame, for pictures."""
+        """Return the closed surface as a mesh in the object frame, with every circle as ``facets`` sides."""
         outline = np.column_stack([self._points[:, 1], self._points[:, 0]])
         ends = [(0.0, self.h_min)] if outline[0, 0] > 0 else []
         tail = [(0.0, self.h_max)] if outline[-1, 0] > 0 else []

@@ -15,7 +15,7 @@ from symgrasp.errors import PlanError, SymgraspError
 from symgrasp.feasibility.pictures import to_png
 from symgrasp.files import write_atomically
 from symgrasp.poses import Array, quat_wxyz
-from symgrasp.scene.format import describe
+from symgrasp.scene.format import describe_error
 
 __all__ = [
     "CLEARANCE_LIMIT",
@@ -194,7 +194,7 @@ class Plan(_Part):
         try:
             return Plan.model_validate(data)
         except ValidationError as error:
-            raise PlanError(source, *describe(error, data)) from None
+            raise PlanError(source, *describe_error(error, data)) from None
 
 
 def plan_schema() -> dict[str, Any]:

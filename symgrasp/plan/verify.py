@@ -155,7 +155,7 @@ def _check_grasps_stay(plan: Plan, world: BulletWorld, report: Report) -> None:
         old, new = before.object_pose_turned.array(), after.object_pose_turned.array()
         if before.name == after.name or not kept:
             _same_pose(old, new, f"{where}: the object moved while nobody held it", report)
-            report.expect(world.rests(old), f"{where}: the object is let go where nothing holds it up")
+            report.expect(world.object_rests(old), f"{where}: the object is let go where nothing holds it up")
         else:
             report.expect(False, f"{where}: an arm changed its grasp on the way")
 

@@ -131,7 +131,7 @@ class PrintGaps:
 
     def _bodies(self, a: int, radius: float) -> list[Array]:
         """Return the bodies of a hand in its tool frame, open for a radius (m)."""
-        return self.arms[a].hand_bodies(self.arms[a].hand.opening(radius))
+        return self.arms[a].hand_hulls(self.arms[a].hand.opening(radius))
 
     def _tool(self, a: int, line: _Line, h: float) -> Array:
         """Return the tool pose (4, 4) on the object at column 0 and a height (m)."""
@@ -169,7 +169,7 @@ def _same_hand(a: Arm, b: Arm, grid: Manifold) -> bool:
     if a.hand != b.hand:
         return False
     openings = {a.hand.opening(float(radius)) for radius in grid.profile.radius(grid.h)}
-    pairs = [zip(a.hand_bodies(o), b.hand_bodies(o), strict=True) for o in openings]
+    pairs = [zip(a.hand_hulls(o), b.hand_hulls(o), strict=True) for o in openings]
     return all(np.array_equal(x, y) for bodies in pairs for x, y in bodies)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from symgrasp.compiling import njit
 from symgrasp.engine.distance import distance_bounds
-from symgrasp.engine.solids import Piece, pack, pose_rows
+from symgrasp.engine.pieces import Piece, pack, pose_rows
 from symgrasp.poses import Array
 
 __all__ = ["Hands"]
@@ -29,7 +29,7 @@ class Hands:
     """
 
     def __init__(self, a: Sequence[Array], b: Sequence[Array]) -> None:
-        self._solids = tuple(pack([Piece(_shrunk(points)) for points in (*a, *b)]))
+        self._pieces = tuple(pack([Piece(_shrunk(points)) for points in (*a, *b)]))
         self._counts = len(a), len(b)
 
     def meet(self, T_a: Array, T_b: Array, asked: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ class Hands:
         """
         first, second = self._counts
         poses = np.repeat(pose_rows(np.stack([T_a, T_b])), [first, second], axis=0)
-        return _meet(self._solids, poses, first, asked)
+        return _meet(self._pieces, poses, first, asked)
 
 
 def _shrunk(points: Array) -> Array:
@@ -54,7 +54,7 @@ def _shrunk(points: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _meet(solids, pose, first, asked):
+def _meet(packed, pose, first, asked):
     angles, pieces = len(asked), len(pose)
     work, turned = np.empty((4, 3)), pose.copy()
     meets = np.zeros(angles, np.bool_)
@@ -69,6 +69,6 @@ def _meet(solids, pose, first, asked):
         for i in range(first):
             for k in range(first, pieces):
                 if not meets[j]:
-                    _, upper = distance_bounds(solids, turned, i, k, 0.0, 0.0, TOUCH, work)
+                    _, upper = distance_bounds(packed, turned, i, k, 0.0, 0.0, TOUCH, work)
                     meets[j] = upper < TOUCH
     return meets

@@ -202,7 +202,7 @@ def handover_plans(
             raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
     with open_world(scene) as world:
         for before, after in pairwise(tasks):
-            if not set(before.arms) & set(after.arms) and not world.rests(before.T_world_object):
+            if not set(before.arms) & set(after.arms) and not world.object_rests(before.T_world_object):
                 expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
                 raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
         visits = _visits(world, tasks, maps, progress)

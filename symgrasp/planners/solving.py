@@ -97,7 +97,7 @@ def with_regrasps(world: BulletWorld, visits: Sequence[Visit], arm: str) -> list
 
 def _resting(world: BulletWorld, visits: Sequence[Visit]) -> list[int]:
     """Return the visits, as indices, in which the object stands on something."""
-    return [k for k, visit in enumerate(visits) if world.rests(visit.task.T_world_object)]
+    return [k for k, visit in enumerate(visits) if world.object_rests(visit.task.T_world_object)]
 
 
 def holdings(

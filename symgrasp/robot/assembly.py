@@ -1,4 +1,4 @@
-"""One URDF out of several: hands mounted on a robot's links, and tool frames that no file names."""
+"""Joining URDF files: hands mounted on links of a robot, and tool frames added as links."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ __all__ = ["Frame", "Mount", "assemble"]
 
 @dataclass(frozen=True)
 class Frame:
-    """A pose fixed to a link.
+    """A coordinate frame fixed to a link.
 
     Attributes:
-        link: the link.
-        position: where the frame's origin is in the link (m).
-        quat_wxyz: how it is turned.
+        link: name of the link.
+        position: origin (3,) of the frame in the link frame (m).
+        quat_wxyz: orientation (4,) of the frame in the link frame.
     """
 
     link: str
@@ -31,23 +31,23 @@ class Frame:
     quat_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
     def matrix(self) -> Array:
-        """Return the frame's pose (4, 4) in its link."""
+        """Return the pose (4, 4) of the frame in its link frame."""
         return from_position_quat(self.position, self.quat_wxyz)
 
     @property
     def is_link(self) -> bool:
-        """Whether the frame is the link's own."""
+        """Whether the frame coincides with the link frame."""
         return np.allclose(self.matrix(), np.eye(4), atol=1e-12)
 
 
 @dataclass(frozen=True)
 class Mount:
-    """What is fixed to a link of a robot.
+    """Something to be fixed to a link of a robot: the contents of another URDF, or an empty link.
 
     Attributes:
-        frame: where.
-        urdf: the file whose root link is put there, or None for a link without a body.
-        name: name of that link, or what all names of the file are prefixed with.
+        frame: where on the robot it is fixed.
+        urdf: the file whose root link is fixed there; None for an empty link, such as a tool frame.
+        name: the name of the empty link, or the prefix of all link and joint names of the file.
     """
 
     frame: Frame
@@ -56,15 +56,15 @@ class Mount:
 
 
 def assemble(path: Path, mounts: Sequence[Mount] = ()) -> bytes:
-    """Return a URDF with everything that is mounted on it, and every mesh as an absolute path.
+    """Return the text of a URDF with the mounts added and every mesh reference made an absolute path.
 
     Args:
         path: the URDF file.
-        mounts: what to add, in order; a later one may stand on an earlier one.
+        mounts: what to add, in order; a later one may be fixed to an earlier one.
 
     Raises:
-        UrdfError: a file is not a URDF, refers to a mesh that does not exist, has no link of the
-            name that something is to be mounted on, or two things would have the same name.
+        UrdfError: a file is not a URDF, refers to a mesh that does not exist, lacks the link that
+            something is to be mounted on, or two links or joints would have the same name.
     """
     robot = _read(path)
     for mount in mounts:
@@ -73,6 +73,7 @@ def assemble(path: Path, mounts: Sequence[Mount] = ()) -> bytes:
 
 
 def _read(path: Path) -> ET.Element:
+    """Parse a URDF file, check that its names are unique, and make its mesh references absolute."""
     try:
         robot = ET.parse(path).getroot()
     except OSError as error:
@@ -93,6 +94,7 @@ def _read(path: Path) -> ET.Element:
 
 
 def _no_repeats(path: Path, field: str, names: Sequence[str]) -> None:
+    """Raise UrdfError if a name occurs twice."""
     for name in names:
         if names.count(name) > 1:
             raise UrdfError(path, field, name, "a name that is not used twice")
@@ -103,6 +105,7 @@ def _names(robot: ET.Element, tag: str) -> list[str]:
 
 
 def _add(robot: ET.Element, path: Path, mount: Mount) -> None:
+    """Add a mount and the fixed joint that holds it to the element tree of a robot."""
     links = _names(robot, "link")
     if mount.frame.link not in links:
         raise UrdfError(path, "mount: link", mount.frame.link, one_of(links, mount.frame.link))
@@ -120,7 +123,7 @@ def _add(robot: ET.Element, path: Path, mount: Mount) -> None:
     roots = [name for name in _names(added, "link") if name not in children]
     if len(roots) != 1:
         raise UrdfError(mount.urdf or path, "urdf", f"{len(roots)} root links {roots}", "one root link")
-    for material in added.iter("material"):  # the same name may mean another colour here
+    for material in added.iter("material"):  # materials of the same name may differ between files
         material.set("name", f"{roots[0]}/{material.get('name', '')}")
     robot.extend(added)
     joint = ET.SubElement(robot, "joint", name=f"{roots[0]}_mount", type="fixed")
@@ -133,13 +136,13 @@ def _add(robot: ET.Element, path: Path, mount: Mount) -> None:
 
 def _references(robot: ET.Element) -> Iterator[tuple[ET.Element, str]]:
     """Yield every element and attribute that holds the name of a link or joint."""
-    places = (
+    name_attributes = (
         ("link", "name"),
         ("joint", "name"),
         ("joint/parent", "link"),
         ("joint/child", "link"),
         ("joint/mimic", "joint"),
     )
-    for path, key in places:
+    for path, key in name_attributes:
         for element in robot.iterfind(path):
             yield element, key

@@ -1,4 +1,4 @@
-"""An arm at joint values, with its hand open so far."""
+"""A configuration of an arm together with the opening of its hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ __all__ = ["ArmConfiguration"]
 
 
 class ArmConfiguration(NamedTuple):
-    """An arm at joint values (n,) with its hand open by ``opening`` (m)."""
+    """The joint values of an arm and the opening of its hand.
+
+    Attributes:
+        arm: the arm.
+        q: joint values (n,) (rad).
+        opening: distance between the finger pads (m).
+    """
 
     arm: Arm
     q: Array

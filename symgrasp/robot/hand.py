@@ -1,4 +1,4 @@
-"""Parallel hands as data, and how they fit a profile.
+"""Parallel hands: their dimensions, how their joints follow the opening, and where they fit a profile.
 
 The tool frame of a hand, between the finger tips:
 
@@ -24,8 +24,8 @@ from symgrasp.robot.assembly import Frame
 __all__ = ["HANDS", "Hand", "JointTable"]
 
 JointTable = float | Sequence[tuple[float, float]]
-"""How a joint follows the opening: its value for each metre of opening, or, where that is not in
-proportion, knots ``(opening, value)`` between which it is linear."""
+"""Joint value as a function of the opening: the ratio of value (rad or m) to opening (m), or knots
+``(opening, value)`` of a piecewise linear function."""
 
 
 @dataclass(frozen=True)
@@ -33,22 +33,22 @@ class Hand:
     """A parallel hand. All lengths in metres.
 
     Args:
-        name: what scenes call it.
-        links: all links of the hand that have a body.
-        touch_links: those that may touch the object (and nothing else): the fingers.
-        joints: the joints that open it → how they follow the opening; mimic joints follow them.
+        name: its name in scenes.
+        links: all links of the hand that have a collision shape.
+        touch_links: the links that may touch the object (and nothing else): the fingers.
+        joints: name of each joint that opens the hand → its value over the opening; mimic joints follow.
         min_opening: smallest distance between the finger pads.
         max_opening: largest distance between the finger pads.
         finger_depth: how deep an object may reach between the fingers, from the tool frame
             towards the palm.
         pad_width: extent of the finger pads along the object's axis (the tool's x).
         clearance: gap to leave on each side of the object.
-        radius_tolerance: largest change of the radius under the pads that still holds.
-        palm_width: extent of the palm along the object's axis; 0 leaves the palm's room to the
-            check for collisions.
-        palm_depth: from the tool frame to a face of the palm that wide.
-        tool: where the tool frame is, for arms that do not name a link of their own.
-        urdf: the hand's own URDF, for hands that do not come with the robot.
+        radius_tolerance: largest change of the radius under the pads at which a grasp still holds.
+        palm_width: extent of the palm along the object's axis; 0 leaves contact of the palm to the
+            collision check.
+        palm_depth: distance from the tool frame back to the face of the palm that has this width.
+        tool: the tool frame, for arms that do not name a link of their own.
+        urdf: the hand's own URDF, for hands that are not part of the robot's URDF.
 
     Raises:
         InputError: the numbers do not describe a hand.
@@ -88,30 +88,30 @@ class Hand:
                 raise InputError(where, f"joints.{joint}", table, expected)
 
     def opening(self, radius: float) -> float:
-        """Return how far (m) the fingers stand open around a radius (m)."""
+        """Return the opening (m) around a radius (m): ``2·radius + 2·clearance``, clipped to the range."""
         return float(np.clip(2 * (radius + self.clearance), self.min_opening, self.max_opening))
 
     def joint_values(self, opening: float) -> dict[str, float]:
-        """Return the values of the hand's joints at an opening (m)."""
+        """Return joint name → value of the hand's joints (rad or m) at an opening (m)."""
         return {name: _value(table, opening) for name, table in self.joints.items()}
 
     def standoff(self, radius: float) -> float:
-        """Return the distance d (m) of the tool frame from the axis that keeps the palm outside."""
+        """Return the distance d (m) of the tool frame from the axis: ``max(0, radius − finger_depth)``."""
         return max(0.0, radius - self.finger_depth)
 
     def spans(self, radius: float) -> bool:
-        """Whether the fingers go around a radius (m)."""
+        """Whether the diameter of a radius (m) is within the range of openings."""
         return self.min_opening <= 2 * radius <= self.max_opening
 
     def palm_has_room(self, profile: Profile, h: float) -> bool:
-        """Whether the object leaves the palm its place around height h (m)."""
+        """Whether the object stays out of the palm of a hand that grasps it at height h (m)."""
         if not self.palm_width:
             return True
         _, largest = profile.radius_span(h - self.palm_width / 2, h + self.palm_width / 2)
         return largest <= self.standoff(float(profile.radius(h))) + self.palm_depth
 
     def pads_rest(self, profile: Profile, h: float) -> bool:
-        """Whether the pads rest on the surface around height h (m): not over an end, not on a step."""
+        """Whether the pads lie on the surface around height h (m): not past an end, not across a step."""
         low, high = h - self.pad_width / 2, h + self.pad_width / 2
         if low < profile.h_min - 1e-9 or high > profile.h_max + 1e-9:
             return False
@@ -119,7 +119,7 @@ class Hand:
         return largest - smallest <= self.radius_tolerance
 
     def prefixed(self, prefix: str) -> Hand:
-        """Return the hand as it is on a robot where all its links and joints have a prefix."""
+        """Return the hand with a prefix before the names of all its links and joints."""
         return replace(
             self,
             links=tuple(prefix + link for link in self.links),
@@ -130,6 +130,7 @@ class Hand:
 
 
 def _value(table: JointTable, opening: float) -> float:
+    """Evaluate a joint table at an opening (m)."""
     if isinstance(table, float | int):
         return table * opening
     at, values = np.transpose(table)
@@ -186,4 +187,4 @@ HANDS: Mapping[str, Hand] = {
         urdf="package://pybullet_data/pr2_gripper.urdf",
     ),
 }
-"""The hands that a scene may name."""
+"""Name → hand, of the hands that a scene may refer to by name."""

@@ -1,14 +1,14 @@
-"""Handprints: the cells of the manifold that a hand covers (figure 7 of the paper).
+"""Handprints: the cells of the grasp manifold that a hand covers (figure 7 of the paper).
 
 **Theorem.** Two hands whose prints share no cell do not touch.
 
 *Proof.* Suppose that they share a point, at height h. Off the axis, f maps it to one (h, θ), and
 a print holds every cell that the image of any point of its hand lies in: both prints hold that
-cell. On the axis θ is undefined, and a body with a point there covers all angles of its row:
-both prints hold the whole row. Rows go on beyond both ends of the object, so no point lacks one.
+cell. On the axis θ is undefined, and a shape with a point there covers all angles of its row:
+both prints hold the whole row. Rows continue beyond both ends of the object, so every point has one.
 
-The converse does not hold: the print forgets the distance from the axis, so hands whose prints
-overlap may still pass each other, one behind the other.
+The converse does not hold: a print does not hold distances from the axis, so hands whose prints
+overlap may still be apart, one further out than the other.
 """
 
 from __future__ import annotations
@@ -24,30 +24,29 @@ from symgrasp.poses import Array
 
 __all__ = ["Handprint", "handprint", "hull_edges", "slab_corners"]
 
-HAIR = 1e-9
-"""Added on every side (m, rad), so that rounding never loses a touched cell."""
+ROUNDING_MARGIN = 1e-9
+"""Intervals are widened by this on both sides (m, rad), so that rounding never loses a touched cell."""
 
 ON_AXIS = 1e-6
-"""Distance (m) from the axis within which a point counts as on it: its angle is rounding noise."""
+"""A point closer to the axis than this (m) counts as on it, because its angle is rounding noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Handprint:
-    """The cells that a hand covers when it grasps row ``row`` at column 0.
+    """The cells that a hand covers when it grasps a given row at column 0.
 
-    Rows go on with the same height beyond both ends of the object, so that hands that reach past
-    an end are told apart as well.
+    Rows continue with the same height beyond both ends of the object, for hands that reach past an end.
 
     Attributes:
         cells: (rows, angles) bool, read-only; true where any point of the hand projects to.
-        first_row: the manifold's row (possibly negative) that ``cells[0]`` lies on.
+        first_row: the manifold's row (negative below the object) that ``cells[0]`` lies on.
     """
 
     cells: np.ndarray
     first_row: int
 
     def overlap(self, other: Handprint, columns: int) -> int:
-        """Return how many cells this print at column 0 shares with another at ``columns``."""
+        """Return how many cells this print at column 0 shares with another print at column ``columns``."""
         first = max(self.first_row, other.first_row)
         last = min(self.first_row + len(self.cells), other.first_row + len(other.cells))
         if first >= last:
@@ -57,7 +56,7 @@ class Handprint:
         return int(np.count_nonzero(mine & np.roll(theirs, columns, axis=1)))
 
     def on(self, manifold: Manifold, column: int) -> np.ndarray:
-        """Return the covered cells (heights, angles) of the object itself, at a column."""
+        """Return the covered cells (heights, angles) bool of the manifold, for a grasp at a column."""
         covered = np.zeros((manifold.heights, manifold.angles), dtype=bool)
         first, last = max(self.first_row, 0), min(self.first_row + len(self.cells), manifold.heights)
         if first < last:
@@ -65,32 +64,34 @@ class Handprint:
         return np.roll(covered, column, axis=1)
 
 
-def handprint(bodies: Sequence[Array], manifold: Manifold, row: int, roll: int, standoff: float) -> Handprint:
-    """Project the bodies of a hand that grasps ``row`` at column 0 onto the manifold.
+def handprint(hulls: Sequence[Array], manifold: Manifold, row: int, roll: int, standoff: float) -> Handprint:
+    """Project the convex hulls of a hand that grasps ``row`` at column 0 onto the manifold.
 
-    Exact for each convex body and row, then rounded up to whole cells: the slice of a convex
-    body between two heights is convex, so seen from the axis it covers one interval of angles,
-    which its corners bound, or every angle where the slice holds a point of the axis.
+    Exact for each hull and row, then rounded up to whole cells: the slice of a convex hull between
+    two heights is convex, so it covers one interval of angles about the axis, which its corners bound,
+    or every angle where the slice holds a point of the axis.
 
     Args:
-        bodies: vertices (n, 3) of each convex body in the tool frame, at the right opening.
+        hulls: vertices (n, 3) of each convex hull in the tool frame, at the opening of the grasp.
         manifold: the grid.
         row: height index of the grasp.
         roll: index into `ROLLS`.
         standoff: distance (m) of the tool frame from the axis.
     """
     T_object_tool = grasp_to_tool(np.eye(4), manifold.h[row], 0.0, ROLLS[roll], standoff)
-    placed = [points @ T_object_tool[:3, :3].T + T_object_tool[:3, 3] for points in bodies]
+    placed = [points @ T_object_tool[:3, :3].T + T_object_tool[:3, 3] for points in hulls]
     lowest = min(points[:, 2].min() for points in placed)
     highest = max(points[:, 2].max() for points in placed)
     to_row = lambda h: int(np.floor((h - manifold.profile.h_min) / manifold.dh))  # noqa: E731
-    first, last = to_row(lowest - HAIR), to_row(highest + HAIR)
+    first, last = to_row(lowest - ROUNDING_MARGIN), to_row(highest + ROUNDING_MARGIN)
     cells = np.zeros((last - first + 1, manifold.angles), dtype=bool)
     for points in placed:
         edges = hull_edges(points)
         for k in range(len(cells)):
             bottom = manifold.profile.h_min + (first + k) * manifold.dh
-            corners = slab_corners(points, edges, bottom - HAIR, bottom + manifold.dh + HAIR)
+            corners = slab_corners(
+                points, edges, bottom - ROUNDING_MARGIN, bottom + manifold.dh + ROUNDING_MARGIN
+            )
             if len(corners):
                 cells[k] |= _covered_columns(corners, manifold)
     cells.setflags(write=False)
@@ -98,14 +99,14 @@ def handprint(bodies: Sequence[Array], manifold: Manifold, row: int, roll: int, 
 
 
 def hull_edges(points: Array) -> np.ndarray:
-    """Return the index pairs (m, 2) of the edges of the triangles around the hull of points (n, 3)."""
+    """Return the index pairs (m, 2) of the edges of the triangulated convex hull of points (n, 3)."""
     triangles = ConvexHull(points).simplices
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
 def slab_corners(points: Array, edges: np.ndarray, bottom: float, top: float) -> Array:
-    """Return the xy corners (n, 2) of a convex body cut to ``bottom <= z <= top``."""
+    """Return the xy coordinates (n, 2) of the corners of a convex hull cut to ``bottom <= z <= top``."""
     inside = (points[:, 2] >= bottom) & (points[:, 2] <= top)
     corners = [points[inside, :2]]
     a, b = points[edges[:, 0]], points[edges[:, 1]]
@@ -117,12 +118,12 @@ def slab_corners(points: Array, edges: np.ndarray, bottom: float, top: float) ->
 
 
 def _covered_columns(corners: Array, manifold: Manifold) -> np.ndarray:
-    """Return the columns (angles,) covered by the convex hull of xy points, grasp at column 0."""
+    """Return which columns (angles,) the convex hull of xy points (n, 2) covers, for a grasp at column 0."""
     distance = np.hypot(corners[:, 0], corners[:, 1])
     angles = np.arctan2(corners[:, 1], corners[:, 0])
     relative = wrap(angles - angles[0])
-    low, high = relative.min() - HAIR, relative.max() + HAIR
-    # A convex region spans half a turn or more exactly when it holds the axis.
+    low, high = relative.min() - ROUNDING_MARGIN, relative.max() + ROUNDING_MARGIN
+    # A convex region spans half a turn or more exactly when it contains the axis.
     if distance.min() < ON_AXIS or high - low >= np.pi:
         return np.ones(manifold.angles, dtype=bool)
     columns = np.zeros(manifold.angles, dtype=bool)

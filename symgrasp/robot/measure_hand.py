@@ -1,4 +1,4 @@
-"""Measuring a parallel hand in its URDF: its fingers, how they open, its tool frame and its palm."""
+"""Measuring a parallel hand in its URDF: fingers, joint tables, tool frame and palm."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from symgrasp.files import resolve
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, from_rotation, inverse, quat_wxyz, rpy
 from symgrasp.robot.assembly import Frame
-from symgrasp.robot.gripper import Gripper, find_anatomy, find_gripper, snap, solid_links
+from symgrasp.robot.gripper import Gripper, find_gripper, find_hand_structure, links_with_shapes, snap_to_axis
 from symgrasp.robot.hand import Hand, JointTable
 from symgrasp.robot.handprint import hull_edges, slab_corners
 from symgrasp.robot.model import RobotModel
 
 __all__ = ["hand_yaml", "measure_hand"]
 
-STEPS = 65
-"""Steps from closed to open at which the fingers are measured."""
+SAMPLES = 65
+"""Number of finger configurations from closed to open that are measured."""
 
-TIP = 0.010
-"""Where the tool frame is put (m) behind the ends of the fingers, half a usual pad, if no link says."""
+TIP_DISTANCE = 0.010
+"""Distance (m) of the tool frame behind the finger tips where no link marks it: half a usual pad."""
 
-PALM_ROOM = 0.004
-"""Room to leave (m) between an object and the palm."""
+PALM_CLEARANCE = 0.004
+"""Distance (m) to keep between an object and the palm."""
 
-PALM_SKIN = 0.005
-"""The palm is measured this far (m) behind its foremost point, because fronts are rounded."""
+PALM_FACE_DEPTH = 0.005
+"""The width of the palm is measured this far (m) behind its foremost point, because fronts are rounded."""
 
-THIN = 1e-6
-"""Thickness (m) of what stands for a plane cut."""
+CUT_THICKNESS = 1e-6
+"""Thickness (m) of the slab that stands for a cut by a plane."""
 
-WIDE = 0.8
-"""Objects may reach as deep as the open fingers keep this share of their opening; what is narrower
-behind is the root of the fingers."""
+WIDE_SHARE = 0.8
+"""Objects may reach as deep as the open fingers keep this share of their opening; further back, where
+they are closer together, the roots of the fingers begin."""
 
 TABLE_ERROR = 2.5e-4
-"""By how much (m) the opening may differ from what the table of a joint says."""
+"""Largest error (m) of the opening that a joint table may cause."""
 
 
 def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand:
@@ -51,19 +51,19 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
     Args:
         urdf: the hand's URDF, or that of a robot with the hand on it: loaded, a path, or
             ``package://<python package>/<path>``.
-        tool: a link fixed to the palm, needed where a robot has several hands. Where it lies
-            before the palm, its origin becomes that of the tool frame; the axes are measured.
+        tool: a link fixed to the palm, needed where a robot has several hands. Where its origin lies
+            in front of the palm, it becomes that of the tool frame; the axes are measured.
 
     Raises:
-        UrdfError: the URDF is unusable, there is no such link, or nothing that opens and closes like a
+        UrdfError: the URDF is unusable, there is no such link, or no part opens and closes like a
             parallel hand.
     """
     model = urdf if isinstance(urdf, RobotModel) else _load(urdf)
-    anatomy = find_anatomy(model, tool)
-    gripper = find_gripper(model, anatomy)
-    palm, fingers = solid_links(model, anatomy.palm), solid_links(model, *gripper.sides)
+    structure = find_hand_structure(model, tool)
+    gripper = find_gripper(model, structure)
+    palm, fingers = links_with_shapes(model, structure.palm), links_with_shapes(model, *gripper.sides)
     T = _tool_pose(gripper, palm, tool)
-    width, face, front = _palm_face(gripper.motion.bodies(palm, 1.0, T)) if palm else (0.0, 0.0, np.inf)
+    width, face, front = _palm_face(gripper.motion.hulls(palm, 1.0, T)) if palm else (0.0, 0.0, np.inf)
     depth = _finger_depth(gripper, T, front)
     steps, openings = _openings(gripper, T, depth)
     return Hand(
@@ -77,8 +77,8 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
         pad_width=_round(min(gripper.pad(side, steps[0], T)[1] for side in (0, 1))),
         palm_width=_round(width),
         palm_depth=_round(face),
-        tool=_tool_frame(model, T, anatomy.base, tool),
-        urdf=str(model.path.resolve()) if anatomy.alone else None,
+        tool=_tool_frame(model, T, structure.base, tool),
+        urdf=str(model.path.resolve()) if structure.standalone else None,
     )
 
 
@@ -90,16 +90,16 @@ def _load(reference: str | Path) -> RobotModel:
 
 
 def hand_yaml(hand: Hand) -> str:
-    """Return a hand in the notation of the scene file, and in words as comments."""
+    """Return a hand as YAML in the notation of scene files, with a summary in comments."""
     mm = {key: f"{1e3 * value:.1f} mm" for key, value in vars(hand).items() if isinstance(value, float)}
-    words = [
+    summary = [
         f"# fingers: {', '.join(hand.touch_links)}, moved by {', '.join(hand.joints)}",
         f"# they open from {mm['min_opening']} to {mm['max_opening']}; their pads are {mm['pad_width']} wide",
         f"# objects may reach {mm['finger_depth']} behind the tool frame; the palm is {mm['palm_depth']}"
         f" behind it, {mm['palm_width']} wide there",
     ]
     if hand.urdf is not None:
-        words.append("# a hand of its own: the robot also needs mount: {link: LINK, pose: {…}}")
+        summary.append("# a hand of its own: the robot also needs mount: {link: LINK, pose: {…}}")
     content = {
         "name": hand.name,
         "urdf": hand.urdf,
@@ -115,10 +115,11 @@ def hand_yaml(hand: Hand) -> str:
         content[key] = getattr(hand, key)
     content = {key: value for key, value in content.items() if value is not None}
     text = yaml.safe_dump({"hand": content}, sort_keys=False, default_flow_style=None, width=100)
-    return "\n".join([*words, text])
+    return "\n".join([*summary, text])
 
 
 def _frame_content(frame: Frame) -> dict[str, Any]:
+    """Return a frame in the notation of scene files."""
     if frame.is_link:
         return {"link": frame.link}
     turn = np.rad2deg(rpy(frame.matrix())).round(4) + 0.0
@@ -131,7 +132,7 @@ def _tool_pose(gripper: Gripper, palm: Sequence[str], tool: str | None) -> Array
     fingers = [link for side in gripper.sides for link in side]
     behind = motion.centre(palm, 1.0) if palm else np.zeros(3)
     z = 0.5 * (motion.centre(fingers, 0.0) + motion.centre(fingers, 1.0)) - behind
-    z = snap(z - (z @ y) * y)
+    z = snap_to_axis(z - (z @ y) * y)
     z = z - (z @ y) * y
     z /= np.linalg.norm(z)
     if tool is not None:
@@ -140,34 +141,41 @@ def _tool_pose(gripper: Gripper, palm: Sequence[str], tool: str | None) -> Array
         T = inverse(links[model.link_index(motion.base)]) @ links[model.link_index(tool)]
         y = -y if y @ T[:3, 1] < 0 else y
         T = from_rotation(np.column_stack([np.cross(y, z), y, z]), T[:3, 3])
-        if all(points[:, 2].max() < 0 for points in motion.bodies(palm, 1.0, T)):
+        if all(points[:, 2].max() < 0 for points in motion.hulls(palm, 1.0, T)):
             return T
     T = from_rotation(np.column_stack([np.cross(y, z), y, z]))
-    reach = min(np.concatenate(motion.bodies(fingers, t, T))[:, 2].max() for t in (0.0, 1.0))
-    T[:3, 3] = (reach - TIP) * z
+    reach = min(np.concatenate(motion.hulls(fingers, t, T))[:, 2].max() for t in (0.0, 1.0))
+    T[:3, 3] = (reach - TIP_DISTANCE) * z
     (x0, _, out0), (x1, _, out1) = (gripper.pad(side, 1.0, T) for side in (0, 1))
     T[:3, 3] += T[:3, :3] @ [0.5 * (x0 + x1), 0.5 * (out0 - out1), 0.0]
     T[:3, 3] = T[:3, 3].round(4)
     return T
 
 
-def _palm_face(bodies: Sequence[Array]) -> tuple[float, float, float]:
-    """Return the palm's width along x, its distance behind the tool, and that of its foremost point.
+def _palm_face(hulls: Sequence[Array]) -> tuple[float, float, float]:
+    """Measure the palm.
 
-    The width is taken where y = 0, between the fingers, so that an object that reaches
-    behind that face within it surely meets the palm.
+    The width is taken at y = 0, between the fingers, so an object that reaches behind the face
+    within that width is certain to hit the palm.
+
+    Args:
+        hulls: vertices (n, 3) of the convex hulls of the palm in the tool frame.
+
+    Returns:
+        Width of the palm's face along x, distance of the face behind the tool frame, and distance of
+        the palm's foremost point behind the tool frame (m).
     """
-    front = max(float(points[:, 2].max()) for points in bodies)
-    face = front - PALM_SKIN
+    front = max(float(points[:, 2].max()) for points in hulls)
+    face = front - PALM_FACE_DEPTH
     width = 0.0
-    for points in bodies:
-        corners = slab_corners(points, hull_edges(points), face, face + THIN)
+    for points in hulls:
+        corners = slab_corners(points, hull_edges(points), face, face + CUT_THICKNESS)
         width = max(width, _width_at_middle(corners))
     return width, -face, -front
 
 
 def _width_at_middle(corners: Array) -> float:
-    """Return the width (m) about the origin of the hull of xy corners (n, 2) along the line y = 0."""
+    """Return the width (m) along y = 0, symmetric about the origin, of the hull of xy corners (n, 2)."""
     if len(corners) < 3:
         return 0.0
     a, b = corners[ConvexHull(corners).simplices].transpose(1, 0, 2)
@@ -178,18 +186,28 @@ def _width_at_middle(corners: Array) -> float:
 
 
 def _finger_depth(gripper: Gripper, T_base_tool: Array, palm: float) -> float:
-    """Return how deep (m) objects may reach: to the palm, or to where the open fingers narrow."""
+    """Return how deep (m) an object may reach: to the palm, or to where the open fingers narrow.
+
+    Args:
+        gripper: the fingers.
+        T_base_tool: pose (4, 4) of the tool frame in the base.
+        palm: distance (m) of the palm's foremost point behind the tool frame.
+    """
     fingers = [link for side in gripper.sides for link in side]
-    length = -min(float(p[:, 2].min()) for p in gripper.motion.bodies(fingers, 1.0, T_base_tool))
-    deepest = max(0.0, min(palm - PALM_ROOM, length))
-    wide = WIDE * gripper.gap(1.0, T_base_tool, 0.0)
-    depths = np.linspace(deepest, 0.0, STEPS)
+    length = -min(float(p[:, 2].min()) for p in gripper.motion.hulls(fingers, 1.0, T_base_tool))
+    deepest = max(0.0, min(palm - PALM_CLEARANCE, length))
+    wide = WIDE_SHARE * gripper.gap(1.0, T_base_tool, 0.0)
+    depths = np.linspace(deepest, 0.0, SAMPLES)
     return next((float(d) for d in depths if gripper.gap(1.0, T_base_tool, d) >= wide), 0.0)
 
 
 def _openings(gripper: Gripper, T_base_tool: Array, depth: float) -> tuple[Array, Array]:
-    """Return steps (m,) from where the fingers touch to fully open, and the openings (m,) there."""
-    steps = np.linspace(0.0, 1.0, STEPS)
+    """Return parameters t (m,) from where the fingers touch to fully open, and the openings (m,) there (m).
+
+    Raises:
+        UrdfError: the opening does not grow with t.
+    """
+    steps = np.linspace(0.0, 1.0, SAMPLES)
     gaps = np.array([gripper.gap(t, T_base_tool, depth) for t in steps])
     first = int(np.argmax(gaps > 0))
     if gaps[-1] <= 0 or (np.diff(gaps[first:]) <= 0).any():
@@ -206,7 +224,7 @@ def _openings(gripper: Gripper, T_base_tool: Array, depth: float) -> tuple[Array
 
 
 def _tables(gripper: Gripper, steps: Array, openings: Array) -> dict[str, JointTable]:
-    """Return how each joint follows the opening."""
+    """Return joint name → table over the opening, given the openings (m,) at the parameters steps (m,)."""
     motion = gripper.motion
     values = np.array([motion.joint_values(t) for t in steps])
     tables: dict[str, JointTable] = {}
@@ -224,7 +242,7 @@ def _tables(gripper: Gripper, steps: Array, openings: Array) -> dict[str, JointT
 
 
 def _tool_frame(model: RobotModel, T_base_tool: Array, base: str, tool: str | None) -> Frame:
-    """Return the tool frame on the given link, or else on the base."""
+    """Return the tool frame relative to the given link, or to the base if none is given."""
     link = tool or base
     links = model.forward(model.default_values())
     pose = inverse(links[model.link_index(link)]) @ links[model.link_index(base)] @ T_base_tool

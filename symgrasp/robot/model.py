@@ -1,4 +1,4 @@
-"""The kinematic tree of a URDF: joints, forward kinematics, limits, and the shapes of links."""
+"""The kinematic tree of a URDF: joints, limits, forward kinematics, and the collision shapes of links."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from symgrasp.robot.assembly import Mount, assemble
 __all__ = ["Joint", "RobotModel"]
 
 LARGEST_LIMIT = 1e4
-"""No joint turns or slides further than this (rad or m)."""
+"""Joint limits and sizes of shapes must be below this (rad or m)."""
 
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -33,6 +33,10 @@ class Joint:
     """One joint of the tree.
 
     Attributes:
+        name: its name in the URDF.
+        kind: its type in the URDF: revolute, continuous, prismatic or fixed.
+        parent: index of the parent link.
+        child: index of the child link.
         origin: pose (4, 4) of the joint in its parent link at zero.
         axis: unit axis (3,) in the joint frame.
         lower: lower limit (rad or m); -inf for a continuous joint.
@@ -56,13 +60,13 @@ class Joint:
 
 
 class RobotModel:
-    """The kinematic tree of a URDF and the shapes of its links.
+    """The kinematic tree of a URDF and the collision shapes of its links.
 
     Models of equal content are equal, so that what is computed for one serves its copies too.
 
     Args:
         path: the URDF file.
-        mounts: hands and frames that the file does not have.
+        mounts: hands and tool frames to add to what the file holds.
 
     Raises:
         UrdfError: a file is missing, not a URDF, uses an unknown joint type, or refers to a
@@ -70,9 +74,9 @@ class RobotModel:
 
     Attributes:
         path: the URDF file.
-        urdf: the URDF with all that is mounted, every mesh as an absolute path.
+        urdf: text of the URDF with the mounts added, every mesh as an absolute path.
         sha256: SHA-256 of that URDF and of its collision meshes, as they were when it was loaded.
-        name: the robot's name in it.
+        name: the robot's name in the URDF.
         link_names: all links; the first is the root.
         joints: all joints, parents before children.
         joint_names: the joints that take a value: neither fixed nor mimic.
@@ -128,6 +132,11 @@ class RobotModel:
             raise UrdfError(self.path, "mesh", str(path), "a readable mesh file") from error
 
     def _build_tree(self, urdf: yourdfpy.URDF, root: str) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
+        """Return joints and link names in the order of a breadth-first walk from the root.
+
+        Raises:
+            UrdfError: a joint is not connected to the root, or of an unknown type.
+        """
         links = [root]
         joints: list[Joint] = []
         index = {name: i for i, name in enumerate(self.joint_names)}
@@ -145,6 +154,11 @@ class RobotModel:
         return tuple(joints), tuple(links)
 
     def _joint(self, j: yourdfpy.Joint, index: Mapping[str, int], links: list[str]) -> Joint:
+        """Convert a joint of the URDF; ``index`` maps the joints that take a value to their positions.
+
+        Raises:
+            UrdfError: its axis, limits or mimic reference are unusable.
+        """
         origin = np.eye(4) if j.origin is None else np.asarray(j.origin, dtype=float)
         axis = np.array([1.0, 0.0, 0.0] if j.axis is None else j.axis, dtype=float)
         source, ratio, offset = -1, 1.0, 0.0
@@ -175,7 +189,7 @@ class RobotModel:
 
     @property
     def root(self) -> str:
-        """The link that everything hangs on."""
+        """The root link of the tree."""
         return self.link_names[0]
 
     def link_index(self, link: str) -> int:
@@ -209,7 +223,7 @@ class RobotModel:
         return poses
 
     def chain(self, link: str) -> list[Joint]:
-        """Return the joints from the root to a link."""
+        """Return the joints on the path from the root to a link, fixed ones included."""
         by_child = {joint.child: joint for joint in self.joints}
         joints: list[Joint] = []
         at = self.link_index(link)
@@ -219,7 +233,7 @@ class RobotModel:
         return joints
 
     def mount_links(self) -> frozenset[str]:
-        """Return the links that no joint moves."""
+        """Return the links that no joint moves: the root and what is fixed to it."""
         return frozenset(name for name in self.link_names if not any(j.source >= 0 for j in self.chain(name)))
 
     def colliding_links(self) -> tuple[str, ...]:
@@ -227,16 +241,20 @@ class RobotModel:
         return tuple(filter(self.has_shape, self.link_names))
 
     def neighbours(self) -> frozenset[frozenset[str]]:
-        """Return the pairs of links with shapes that a joint, or only shapeless links, connect."""
-        solid = set(self.colliding_links())
-        anchor: dict[str, str | None] = {self.root: self.root if self.root in solid else None}
+        """Return the pairs of links with collision shapes that are adjacent in the tree.
+
+        Links without a shape between two links do not keep them from being adjacent.
+        """
+        colliding = set(self.colliding_links())
+        # link → nearest link with a shape, from it up to the root
+        nearest: dict[str, str | None] = {self.root: self.root if self.root in colliding else None}
         pairs = set()
         for joint in self.joints:
             parent, child = self.link_names[joint.parent], self.link_names[joint.child]
-            above = anchor[parent]
-            if child in solid and above is not None:
+            above = nearest[parent]
+            if child in colliding and above is not None:
                 pairs.add(frozenset((above, child)))
-            anchor[child] = child if child in solid else above
+            nearest[child] = child if child in colliding else above
         return frozenset(pairs)
 
     def hulls(self, link: str) -> tuple[Array, ...]:
@@ -254,13 +272,14 @@ class RobotModel:
         return bool(self._collisions[link])
 
     def __eq__(self, other: object) -> bool:
+        """Models of the same files are equal, so results cached for one serve the other."""
         return isinstance(other, RobotModel) and self.sha256 == other.sha256
 
     def __hash__(self) -> int:
         return hash(self.sha256)
 
     def collision_urdf(self) -> bytes:
-        """Return the URDF without what is only seen; every link has a mass, or PyBullet complains."""
+        """Return the URDF without visual shapes, and with a mass for every link, as PyBullet demands."""
         root = ET.fromstring(self.urdf)
         for link in root.iter("link"):
             for visual in link.findall("visual"):
@@ -274,10 +293,10 @@ class RobotModel:
 
 
 def _check_shape(path: Path, link: str, shape: yourdfpy.Collision) -> None:
-    """Check the sizes of a collision shape; a mesh may be mirrored by a negative scale.
+    """Check that the sizes of a collision shape are positive; a mesh may be mirrored by a negative scale.
 
     Raises:
-        UrdfError: a size is not a positive number, or a scale is zero or none.
+        UrdfError: the shape has no geometry, a size is not a positive number, or a scale is zero.
     """
     geometry = shape.geometry
     if geometry is None:
@@ -297,6 +316,7 @@ def _check_shape(path: Path, link: str, shape: yourdfpy.Collision) -> None:
 
 
 def _root_link(urdf: yourdfpy.URDF) -> str:
+    """Return the only link that is no child of a joint; raise ValueError where there are none or several."""
     children = {joint.child for joint in urdf.robot.joints}
     roots = [link.name for link in urdf.robot.links if link.name not in children]
     if len(roots) != 1:
@@ -305,12 +325,20 @@ def _root_link(urdf: yourdfpy.URDF) -> str:
 
 
 def _motion(joint: Joint, value: Array) -> Array:
+    """Return the poses (..., 4, 4) of a joint's frame relative to zero, at values (...) (rad or m)."""
     if joint.kind == "prismatic":
         return from_rotation(np.eye(3), value[..., None] * joint.axis)
     return from_rotation(rotation_about(joint.axis, value))
 
 
 def _hull(shape: yourdfpy.Collision, find: Callable[[str, str], Path], link: str) -> Array:
+    """Return the vertices (n, 3) of a convex hull that contains a collision shape, in the shape's frame.
+
+    Args:
+        shape: the shape.
+        find: returns the file of a mesh reference, given also the link for messages.
+        link: the link that the shape belongs to.
+    """
     geometry = shape.geometry
     assert geometry is not None  # the parser requires it
     if geometry.box is not None:

@@ -1,4 +1,4 @@
-"""Robots in the world, and their arms: the chains of joints that grasp."""
+"""Robots placed in the world, and their arms: the kinematic chains that grasp."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ class Robot:
 
 
 class Arm:
-    """The chain of joints from a robot's base to a tool with a hand: what grasps.
+    """The kinematic chain from a robot's base to a tool with a hand.
 
-    All other joints of the robot rest at home, prismatic ones and those that another arm of the
-    robot shares among them. Kinematics is a product of exponentials read off the URDF:
+    All other joints of the robot stay at home, also prismatic joints of the chain and those that it
+    shares with another arm. Kinematics is a product of exponentials read off the URDF:
     ``T_base_tool(q) = Trans(P0)·Rot(H0, q0)·Trans(P1)· … ·Rot(Hn-1, qn-1)·Trans(Pn)·R0``.
 
     Args:
         name: its name in the scene.
-        robot: whose arm it is.
+        robot: the robot that it belongs to.
         tool: the tool link.
         hand: the hand at the tool.
         shared: joints of the chain that belong to another arm as well.
@@ -55,6 +55,7 @@ class Arm:
 
     Attributes:
         joint_names: its n joints, from base to tool.
+        indices: (n,) their indices into the robot's joint values.
         lower: joint limits (n,), -inf for a continuous joint.
         upper: joint limits (n,), inf for a continuous joint.
         H: unit axes (n, 3) in the base frame at zero.
@@ -91,6 +92,7 @@ class Arm:
         self.H, self.P, self.R0 = self._screws(joints)
 
     def _screws(self, joints: list[Joint]) -> tuple[Array, Array, Array]:
+        """Return H, P and R0, with the joints of the arm at zero and all others at home."""
         q = self.robot.home.copy()
         q[self.indices] = 0.0
         links = self.robot.model.forward(q)
@@ -128,12 +130,13 @@ class Arm:
         return self.robot.T_world_base @ self.tool_pose(q)
 
     def within_limits(self, q: ArrayLike) -> tuple[Array, np.ndarray]:
-        """Take the full turns that bring joint values (..., n) inside the limits, if any do.
+        """Add full turns to joint values (..., n) so that they are inside the limits, where possible.
 
-        The turn nearest to the middle of the range fits whenever any turn does.
+        Each value is brought nearest to the middle of its range, which is inside whenever any full turn
+        is.
 
         Returns:
-            The turned joint values (..., n), and whether all of them are inside (...).
+            The joint values (..., n) with the turns added, and whether all n are inside (...).
         """
         q = np.asarray(q, dtype=float)
         bounded = np.isfinite(self.lower) & np.isfinite(self.upper)
@@ -157,21 +160,31 @@ class Arm:
                 values[self.robot.model.joint_names.index(joint)] = value
         return values
 
-    def hand_bodies(self, opening: float) -> list[Array]:
-        """Return the vertices (n, 3) of the hand's convex bodies in the tool frame at an opening (m)."""
+    def hand_hulls(self, opening: float) -> list[Array]:
+        """Return the vertices (n, 3) of the hand's convex hulls in the tool frame at an opening (m).
+
+        Raises:
+            InputError: no link of the hand has a collision shape.
+        """
         model = self.robot.model
         links = model.forward(self.robot_values(self.home, opening))
         T_tool_base = inverse(links[self._tool_index])
-        bodies = []
+        hulls = []
         for link in self.hand.links:
             pose = T_tool_base @ links[model.link_index(link)]
-            bodies += [points @ pose[:3, :3].T + pose[:3, 3] for points in model.hulls(link)]
-        if not bodies:
+            hulls += [points @ pose[:3, :3].T + pose[:3, 3] for points in model.hulls(link)]
+        if not hulls:
             raise InputError(model.path, f"hand {self.hand.name}", list(self.hand.links), "links with bodies")
-        return bodies
+        return hulls
 
     def handprint(self, manifold: Manifold, row: int, roll: int) -> Handprint:
-        """Return the print of the hand that grasps a row at column 0, open as it is at that height."""
+        """Return the handprint of a grasp at column 0, with the opening for the radius at that row.
+
+        Args:
+            manifold: the grid.
+            row: height index of the grasp.
+            roll: index into `ROLLS`.
+        """
         radius = float(manifold.profile.radius(manifold.h[row]))
-        bodies = self.hand_bodies(self.hand.opening(radius))
-        return handprint(bodies, manifold, row, roll, self.hand.standoff(radius))
+        hulls = self.hand_hulls(self.hand.opening(radius))
+        return handprint(hulls, manifold, row, roll, self.hand.standoff(radius))

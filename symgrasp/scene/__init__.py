@@ -1,1 +1,1 @@
-"""Scenes: the file format, and robots, object, obstacles and tasks built from it."""
+"""Scenes: their file format, and the robots, object, obstacles and tasks built from it."""

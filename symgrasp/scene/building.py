@@ -1,4 +1,4 @@
-"""From the content of a scene file to robots, arms, obstacles and tasks: every name and file resolved."""
+"""Building robots, arms, obstacles and tasks from a scene file, with every name and file resolved."""
 
 from __future__ import annotations
 
@@ -31,25 +31,34 @@ __all__ = ["SceneBuilder"]
 
 
 class SceneBuilder:
-    """Resolves the names and files of a scene file."""
+    """Builds the parts of a scene from its file.
+
+    Args:
+        file: the validated content of the file.
+        source: its name for error messages.
+        folder: the folder that file references are relative to.
+    """
 
     def __init__(self, file: SceneFile, source: str, folder: Path) -> None:
         self.file, self.source, self.folder = file, source, folder
         self._models: dict[tuple[Path, tuple[Mount, ...]], RobotModel] = {}
 
     def build(self) -> SceneParts:
-        """Check everything that the format alone cannot, and load robots and object.
+        """Resolve names and files, load robots and object, and check what the format alone cannot.
 
         Raises:
-            SceneError, UrdfError, ProfileError, MeshError: something is missing or unusable.
+            SceneError: a name or a file is unknown, a name is used twice, or a value is out of range.
+            UrdfError: a robot's URDF is unusable.
+            ProfileError: the object's profile is unusable.
+            MeshError: the object's mesh is unusable.
         """
         profile = self._profile(self.file.object)
         self.file = file = self._absolute(profile)
         self._unique("robots", (r.name for r in file.robots))
         self._unique("obstacles", (o.name for o in file.obstacles))
         self._unique("tasks", (t.name for t in file.tasks))
-        bodies = [r.name for r in file.robots] + [o.name for o in file.obstacles] + [file.object.name]
-        self._unique("robots, obstacles and object", bodies)
+        names = [r.name for r in file.robots] + [o.name for o in file.obstacles] + [file.object.name]
+        self._unique("robots, obstacles and object", names)
         robots: dict[str, Robot] = {}
         arms: dict[str, Arm] = {}
         for i, entry in enumerate(file.robots):
@@ -62,11 +71,12 @@ class SceneBuilder:
             robots,
             arms,
             profile,
-            tuple(map(self._obstacle, file.obstacles)),
+            tuple(self._obstacle(o) for o in file.obstacles),
             {t.name: self._task(i, t, arms) for i, t in enumerate(file.tasks)},
         )
 
     def _unique(self, field: str, names: Iterable[str]) -> None:
+        """Raise SceneError if a name occurs twice."""
         seen: set[str] = set()
         for name in names:
             if name in seen:
@@ -74,6 +84,7 @@ class SceneBuilder:
             seen.add(name)
 
     def _profile(self, entry: ObjectFile) -> Profile:
+        """Return the object's profile: as given, from the library, or measured from a mesh."""
         if entry.profile is not None:
             return Profile(entry.profile, self.source + ": object")
         if entry.library is not None:
@@ -86,9 +97,10 @@ class SceneBuilder:
         return Profile.from_mesh(path, entry.scale)
 
     def _absolute(self, profile: Profile) -> SceneFile:
-        """Check every file reference; make the relative ones absolute so the content can travel.
+        """Return the file with absolute references and the profile's knots, valid from any folder.
 
-        The object's profile is written out, whatever it came from.
+        Raises:
+            SceneError: a referenced file does not exist.
         """
         robots = tuple(self._absolute_robot(f"robots[{i}]", r) for i, r in enumerate(self.file.robots))
         obstacles = []
@@ -99,8 +111,9 @@ class SceneBuilder:
                 reference = self._reference(f"obstacles[{i}].{kind}", reference, kind)
                 o = o.model_copy(update={kind: reference})
             obstacles.append(o)
-        thing = ObjectFile(name=self.file.object.name, profile=[tuple(p) for p in profile.points.tolist()])
-        update = {"robots": robots, "obstacles": tuple(obstacles), "object": thing}
+        knots = [tuple(p) for p in profile.points.tolist()]
+        object_file = ObjectFile(name=self.file.object.name, profile=knots)
+        update = {"robots": robots, "obstacles": tuple(obstacles), "object": object_file}
         return self.file.model_copy(update=update)
 
     def _absolute_robot(self, field: str, robot: RobotFile) -> RobotFile:
@@ -119,6 +132,7 @@ class SceneBuilder:
         return hand.model_copy(update={"urdf": self._reference(f"{field}.urdf", hand.urdf, "URDF")})
 
     def _reference(self, field: str, reference: str, kind: str) -> str:
+        """Return a file reference made absolute; raise SceneError if there is no such file."""
         path = resolve(reference, self.folder)
         if path is None:
             expected = "package://<python package>/<path>, or a path relative to the scene"
@@ -126,11 +140,13 @@ class SceneBuilder:
         return reference if reference.startswith("package://") else str(path.resolve())
 
     def _path(self, reference: str) -> Path:
+        """Return the file of a reference that `_reference` has checked."""
         path = resolve(reference, self.folder)
-        assert path is not None  # _absolute has checked it
+        assert path is not None  # checked by _reference
         return path
 
     def _robot(self, i: int, entry: RobotFile) -> tuple[Robot, list[Arm]]:
+        """Return the robot with index i in the file, and its arms."""
         field = f"robots[{i}]"
         fields = [field] if entry.arms is None else [f"{field}.arms[{k}]" for k in range(len(entry.arms))]
         files = entry.arm_files()
@@ -150,12 +166,13 @@ class SceneBuilder:
         return robot, [Arm(a.name, robot, tool, hand, shared) for a, tool, hand in parts]
 
     def _model(self, path: Path, mounts: tuple[Mount, ...]) -> RobotModel:
+        """Return the model of a URDF with mounts, shared by robots that are alike."""
         if (path, mounts) not in self._models:
             self._models[path, mounts] = RobotModel(path, mounts)
         return self._models[path, mounts]
 
     def _mount(self, field: str, arm: ArmFile, hand: Hand, robot: RobotFile) -> list[Mount]:
-        """Return what puts the arm's hand on the robot: nothing where the robot comes with it."""
+        """Return the mount of the arm's hand; none where the hand is part of the robot's URDF."""
         if arm.mount is None:
             return []
         if hand.urdf is None:
@@ -177,12 +194,14 @@ class SceneBuilder:
         return hand.tool.link if hand.tool.is_link else f"{arm.name}_tool"
 
     def _chain(self, field: str, tool: str, model: RobotModel) -> list[str]:
+        """Return the names of the revolute joints from the root to the tool link."""
         if tool not in model.link_names:
             expected = f"a link of {model.path.name}: " + one_of(model.link_names, tool)
             raise SceneError(self.source, f"{field}.tool", tool, expected)
         return [j.name for j in model.chain(tool) if j.source >= 0 and j.kind != "prismatic"]
 
     def _hand(self, field: str, arm: ArmFile) -> Hand:
+        """Return an arm's hand, with the prefix of its mount."""
         if isinstance(arm.hand, str):
             if arm.hand not in HANDS:
                 raise SceneError(self.source, f"{field}.hand", arm.hand, one_of(HANDS, arm.hand))
@@ -206,9 +225,19 @@ class SceneBuilder:
         shared: frozenset[str],
         hands: list[Hand],
     ) -> Array:
+        """Return the parked values (n,) of all joints of a robot.
+
+        Args:
+            i: index of the robot in the file.
+            entry: the robot in the file.
+            model: its URDF.
+            chains: joint names of each arm.
+            shared: names of the joints that several arms share.
+            hands: the hand of each arm, open unless the file says otherwise.
+        """
         field = f"robots[{i}].home"
         values = model.default_values()
-        for hand in hands:  # parked hands stand open, unless the scene says otherwise
+        for hand in hands:
             for name, value in hand.joint_values(hand.max_opening).items():
                 if name in model.joint_names:
                     values[model.joint_names.index(name)] = value

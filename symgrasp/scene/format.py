@@ -21,12 +21,12 @@ __all__ = [
     "RobotFile",
     "SceneFile",
     "TaskFile",
-    "describe",
+    "describe_error",
     "scene_schema",
 ]
 
 LARGEST = 1e4
-"""No number in a scene is larger: metres, degrees and factors stay far below."""
+"""Largest absolute value of a number in a scene file (m, degrees or a factor)."""
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
@@ -62,7 +62,7 @@ class PoseFile(_Strict):
 
     @staticmethod
     def of(pose: ArrayLike) -> PoseFile:
-        """Write a matrix (4, 4) as position and quaternion."""
+        """Return a pose matrix (4, 4) as position and quaternion."""
         pose = np.asarray(pose, dtype=float)
         return PoseFile(position=tuple(pose[:3, 3].tolist()), quat_wxyz=tuple(quat_wxyz(pose).tolist()))
 
@@ -74,7 +74,7 @@ class FrameFile(_Strict):
     pose: PoseFile = PoseFile()
 
     def frame(self) -> Frame:
-        """Return it as the library has it."""
+        """Return the frame as the robot room has it."""
         pose = self.pose.matrix()
         return Frame(self.link, tuple(pose[:3, 3].tolist()), tuple(quat_wxyz(pose).tolist()))
 
@@ -140,7 +140,7 @@ class RobotFile(_Strict):
         return self
 
     def arm_files(self) -> tuple[ArmFile, ...]:
-        """Return the arms; a single arm bears the robot's name."""
+        """Return the robot's arms; a single arm has the robot's name."""
         if self.arms is not None:
             return self.arms
         assert self.hand is not None
@@ -199,6 +199,7 @@ class ObstacleFile(_Strict):
 
 
 SHAPES = ("box", "cylinder", "sphere", "mesh", "urdf")
+"""The keys of an obstacle that give its shape."""
 
 
 class TaskFile(_Strict):
@@ -239,10 +240,18 @@ def scene_schema() -> dict[str, Any]:
     return SceneFile.model_json_schema()
 
 
-def describe(error: ValidationError, content: Any) -> tuple[str, object, str]:
-    """Turn the first problem of a validation into field, value and what was expected."""
+def describe_error(error: ValidationError, content: Any) -> tuple[str, object, str]:
+    """Describe the first problem that pydantic found, for `InputError`.
+
+    Args:
+        error: what pydantic raised.
+        content: the content that it validated.
+
+    Returns:
+        The field, its value, and what was expected.
+    """
     first = error.errors(include_url=False)[0]
-    # Union members add their class name to the location; a path into the content has none.
+    # pydantic's location also names members of unions; steps that do not lead into the content are skipped.
     path: list[str | int] = []
     at = content
     for step in first["loc"]:

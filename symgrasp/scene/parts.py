@@ -1,4 +1,4 @@
-"""What a scene is made of besides robots: obstacles and tasks."""
+"""Obstacles, tasks, and the parts that a scene is made of."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ __all__ = ["Obstacle", "SceneParts", "Task"]
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """A fixed body.
+    """A body that does not move.
 
     Attributes:
-        name: its name.
+        name: its name in the scene.
         kind: box, cylinder, sphere, mesh or urdf.
         size: box: full sizes (3,); cylinder: radius, height; sphere: radius; otherwise empty.
         path: the mesh or URDF file, otherwise None.
-        T_world_obstacle: its pose (4, 4).
+        T_world_obstacle: pose (4, 4) of its frame; boxes, cylinders and spheres are centred at the origin.
         model: the links of a URDF, otherwise None.
         file_sha256: SHA-256 of the mesh file, or of the URDF and its collision meshes; empty where the
             body has no file.
@@ -45,9 +45,9 @@ class Task:
     """A pose of the object, and the arms that hold it there.
 
     Attributes:
-        name: its name.
-        arms: names of the arms.
-        T_world_object: object pose (4, 4); turning it about its own z changes nothing.
+        name: its name in the scene.
+        arms: names of the arms that hold the object.
+        T_world_object: object pose (4, 4); its rotation about the object's own z axis is free.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Task:
 
 
 class SceneParts(NamedTuple):
-    """What a scene is made of; see `symgrasp.scene.scene.Scene`."""
+    """The parts of a scene; see `symgrasp.scene.scene.Scene` for the attributes."""
 
     file: SceneFile
     robots: Mapping[str, Robot]

@@ -1,4 +1,4 @@
-"""Scenes: robots, an object of revolution, obstacles and tasks; validated, immutable, every name resolved."""
+"""Scenes: robots, an object of revolution, obstacles and tasks, validated and with all names resolved."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.building import SceneBuilder
-from symgrasp.scene.format import MapSettings, ObjectFile, PoseFile, SceneFile, TaskFile, describe
+from symgrasp.scene.format import MapSettings, ObjectFile, PoseFile, SceneFile, TaskFile, describe_error
 from symgrasp.scene.map_content import map_content
 from symgrasp.scene.parts import Obstacle, Task
 from symgrasp.scene.shipped import shipped_scenes
@@ -28,15 +28,15 @@ __all__ = ["Scene", "load_scene"]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Robots, an object of revolution, obstacles and tasks.
+    """Robots, an object of revolution, obstacles and tasks; immutable, ``with_…`` return changed copies.
 
     Attributes:
-        source: the file it came from, for messages.
-        file: the validated content with every file reference made absolute.
+        source: the file it came from, for error messages.
+        file: the validated content of the file, with every file reference made absolute.
         robots: name → robot.
         arms: name → arm, over all robots.
         profile: the object's r(h).
-        obstacles: the fixed bodies.
+        obstacles: the obstacles.
         tasks: name → task, in order.
     """
 
@@ -52,10 +52,14 @@ class Scene:
     def load(scene: str | Path) -> Scene:
         """Load a shipped scene by name, or any scene by path.
 
+        Args:
+            scene: a shipped name, or the path of a YAML file.
+
         Raises:
-            SceneError: no such scene, not YAML, or a field is wrong.
+            SceneError: there is no such scene, it is not YAML, or a field is wrong.
             UrdfError: a robot's URDF is unusable.
             ProfileError: the object's profile is unusable.
+            MeshError: the object's mesh is unusable.
         """
         path = Path(scene)
         if path.suffix not in (".yaml", ".yml"):
@@ -71,10 +75,15 @@ class Scene:
 
     @staticmethod
     def parse(text: str, source: str = "scene", folder: Path = Path()) -> Scene:
-        """Build a scene from YAML text; relative files are sought in ``folder``.
+        """Build a scene from YAML text.
+
+        Args:
+            text: the content of a scene file.
+            source: its name for error messages.
+            folder: the folder that file references are relative to.
 
         Raises:
-            SceneError, UrdfError, ProfileError: as `load`.
+            SceneError, UrdfError, ProfileError, MeshError: see `load`.
         """
         try:
             content = parse_yaml(text)
@@ -86,20 +95,20 @@ class Scene:
 
     @staticmethod
     def from_content(content: Mapping[str, Any], source: str = "scene", folder: Path = Path()) -> Scene:
-        """Build a scene from the content of a file.
+        """Build a scene from the parsed content of a scene file; see `parse` for the arguments.
 
         Raises:
-            SceneError, UrdfError, ProfileError: as `load`.
+            SceneError, UrdfError, ProfileError, MeshError: see `load`.
         """
         try:
             file = SceneFile.model_validate(content)
         except ValidationError as error:
-            raise SceneError(source, *describe(error, content)) from None
+            raise SceneError(source, *describe_error(error, content)) from None
         return Scene(source, *SceneBuilder(file, source, folder).build())
 
     @cached_property
     def content(self) -> dict[str, Any]:
-        """The full content as plain data, enough to build the same scene again."""
+        """The content of the scene file as plain data, from which `from_content` builds the same scene."""
         return self.file.model_dump(mode="json", exclude_none=True)
 
     @cached_property
@@ -126,16 +135,16 @@ class Scene:
 
     @property
     def settings(self) -> MapSettings:
-        """How finely maps are computed."""
+        """The resolution of the maps, and the retreat and margin that they demand."""
         return self.file.map
 
     @cached_property
     def manifold(self) -> Manifold:
-        """The grid over the object's surface."""
+        """The grasp manifold of the object, at the resolution of the settings."""
         return Manifold(self.profile, self.settings.heights, self.settings.angles)
 
     def arm(self, name: str | None = None) -> Arm:
-        """Return an arm by name, or the first.
+        """Return an arm by name, or the first arm if no name is given.
 
         Raises:
             SceneError: there is no such arm.
@@ -147,7 +156,7 @@ class Scene:
         return self.arms[name]
 
     def task(self, name: str | None = None) -> Task:
-        """Return a task by name, or the first.
+        """Return a task by name, or the first task if no name is given.
 
         Raises:
             SceneError: there is no such task.
@@ -159,7 +168,11 @@ class Scene:
         return self.tasks[name]
 
     def with_task(self, task: Task) -> Scene:
-        """Return the scene with the task of that name replaced; robots and object are shared."""
+        """Return the scene with the task of the same name replaced; robots and object are shared.
+
+        Raises:
+            SceneError: there is no task of that name.
+        """
         self.task(task.name)
         file = TaskFile(name=task.name, arms=task.arms, pose=PoseFile.of(task.T_world_object))
         files = tuple(file if t.name == task.name else t for t in self.file.tasks)
@@ -173,7 +186,7 @@ class Scene:
         """Return the scene with these tasks in this order; robots and object are shared.
 
         Raises:
-            SceneError: there is none, a name is taken or no name, or an arm is unknown.
+            SceneError: there are no tasks, a name is used twice or empty, or an arm is unknown.
         """
         tasks = tuple(tasks)
         names = [task.name for task in tasks]
@@ -188,7 +201,7 @@ class Scene:
             try:
                 files.append(TaskFile(name=task.name, arms=task.arms, pose=PoseFile.of(task.T_world_object)))
             except ValidationError as error:
-                raise SceneError(f"tasks[{i}]", *describe(error, {"name": task.name})) from None
+                raise SceneError(f"tasks[{i}]", *describe_error(error, {"name": task.name})) from None
         return replace(
             self,
             file=self.file.model_copy(update={"tasks": tuple(files)}),
@@ -199,31 +212,35 @@ class Scene:
         """Return the scene with another object in place of its own; robots and obstacles are shared.
 
         Raises:
-            SceneError: the name is no name, or that of a robot or obstacle.
+            SceneError: the name is empty or too long, or that of a robot or obstacle.
         """
         try:
-            thing = ObjectFile(name=name, profile=[tuple(p) for p in profile.points.tolist()])
+            object_file = ObjectFile(name=name, profile=[tuple(p) for p in profile.points.tolist()])
         except ValidationError as error:
-            raise SceneError("object", *describe(error, {"name": name})) from None
+            raise SceneError("object", *describe_error(error, {"name": name})) from None
         if name in (*self.robots, *(o.name for o in self.obstacles)):
             raise SceneError("object", "name", name, "a name that no robot or obstacle of the scene has")
-        return replace(self, file=self.file.model_copy(update={"object": thing}), profile=profile)
+        return replace(self, file=self.file.model_copy(update={"object": object_file}), profile=profile)
 
     @property
-    def mounted(self) -> dict[str, str]:
-        """Return arm → hand, by their names, of the arms whose hand another may replace."""
+    def replaceable_hands(self) -> dict[str, str]:
+        """Name of each arm whose hand can be replaced by `with_hand` → name of its hand."""
         arms = [arm for robot in self.file.robots for arm in robot.arm_files()]
         return {a.name: a.hand for a in arms if a.mount and a.tool is None and isinstance(a.hand, str)}
 
     def with_hand(self, arm: str, hand: str) -> Scene:
-        """Return the scene with another hand on an arm, where the scene mounts one.
+        """Return the scene with another hand on an arm.
+
+        Args:
+            arm: name of the arm, one of `replaceable_hands`.
+            hand: name of a hand with a URDF of its own.
 
         Raises:
             SceneError: the arm's hand cannot be replaced, or there is no such hand that can be mounted.
-            UrdfError: the hand does not go with the robot.
+            UrdfError: a name of the hand's URDF is taken on the robot.
         """
-        if arm not in self.mounted:
-            raise SceneError(self.source, "arm", arm, one_of(self.mounted, arm))
+        if arm not in self.replaceable_hands:
+            raise SceneError(self.source, "arm", arm, one_of(self.replaceable_hands, arm))
         content = self.file.model_dump(mode="json", exclude_none=True)
         for robot in content["robots"]:
             for entry in robot.get("arms", [robot]):
@@ -240,7 +257,7 @@ class Scene:
         try:
             settings = MapSettings.model_validate({**self.settings.model_dump(), **changes})
         except ValidationError as error:
-            raise SceneError("map settings", *describe(error, changes)) from None
+            raise SceneError("map settings", *describe_error(error, changes)) from None
         return replace(self, file=self.file.model_copy(update={"map": settings}))
 
 

@@ -12,7 +12,7 @@ __all__ = ["list_scenes", "shipped_scenes"]
 
 
 def shipped_scenes() -> dict[str, Path]:
-    """Return the scenes that come with the package: name → file, in order."""
+    """Return the scenes that come with the package: name → file, in alphabetical order."""
     return {path.stem: path for path in sorted(SCENES_DIR.glob("*.yaml"))}
 
 

@@ -1,18 +1,18 @@
-"""Collisions in PyBullet: the only part that knows it.
+"""Collision checks and distances of a scene in PyBullet, which no other room uses.
 
-Every question is put as "which links are closer than a distance", which Bullet answers from the
-poses alone; its contact cache, which remembers earlier configurations, is not used. Collision
-margins are set to zero, so distances are those of the shapes themselves.
+All checks ask PyBullet for closest points within a distance, which depend on the present poses alone; its
+contact cache, which depends on earlier configurations, is not used. Collision margins are set to zero, so
+distances are those of the shapes themselves.
 """
 
 from symgrasp.world.bullet import BulletWorld
-from symgrasp.world.collision import Body, Collision, NearBodies
+from symgrasp.world.collision import BodyName, Collision, NearBodies
 from symgrasp.world.opening import open_world
 from symgrasp.world.self_pairs import checked_self_pairs
 from symgrasp.world.shapes import Shape
 from symgrasp.world.tasks import RESTING_DEPTH, check_tasks
 
 __all__ = [
-    "RESTING_DEPTH", "Body", "BulletWorld", "Collision", "NearBodies", "Shape", "check_tasks",
+    "RESTING_DEPTH", "BodyName", "BulletWorld", "Collision", "NearBodies", "Shape", "check_tasks",
     "checked_self_pairs", "open_world",
 ]  # fmt: skip

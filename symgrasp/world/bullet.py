@@ -1,54 +1,42 @@
-"""All bodies of a scene in PyBullet, and the questions about them."""
+"""A scene in PyBullet: placing its robots and its object, and asking for collisions and distances."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
 
-from symgrasp.errors import MeshError, SceneError, SymgraspError
-from symgrasp.meshes import depth_inside, read_mesh
+from symgrasp.errors import SceneError, SymgraspError
+from symgrasp.meshes import depth_inside
 from symgrasp.poses import Array, axis_frame
 from symgrasp.reason import Reason
-from symgrasp.robot.model import RobotModel
-from symgrasp.robot.robot import Arm, Robot
-from symgrasp.scene.parts import Obstacle
+from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
-from symgrasp.world.client import link_names, load_urdf, pybullet, xyzw
-from symgrasp.world.collision import Body, Collision, NearBodies
-from symgrasp.world.self_pairs import checked_self_pairs
+from symgrasp.world.bodies import SceneBodies
+from symgrasp.world.client import pybullet, xyzw
+from symgrasp.world.collision import BodyName, Collision, NearBodies
+from symgrasp.world.queries import Query, arm_queries, body_query, parked_queries
 from symgrasp.world.shapes import Shape, link_shapes
 
 __all__ = ["BulletWorld"]
 
-MOST_TRIANGLES = 60_000
-"""More than this PyBullet does not take in one mesh."""
+LOWERED = 0.003
+"""Distance (m) by which the object is lowered to find out whether something supports it."""
 
+SUPPORTED_DEPTH = 0.0015
+"""The object is supported when lowering it by `LOWERED` makes it sink deeper by more than this (m)."""
 
-_KEPT_AT_A_DISTANCE = (Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION)
-
-
-class _Query(NamedTuple):
-    """One closest-points call: all links of two bodies, or two links; ``key`` is what `Near` calls it."""
-
-    reason: Reason
-    key: str | frozenset[str]
-    a: int
-    b: int
-    link_a: int | None = None
-    link_b: int | None = None
-    skip_a: frozenset[int] = frozenset()
-    skip_b: frozenset[int] = frozenset()
+MARGIN_REASONS = (Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION)
+"""Kinds of collision for which the scene's margin is a distance to keep."""
 
 
 class BulletWorld:
-    """All bodies of a scene in one PyBullet DIRECT client of its own; use it in a ``with`` block.
+    """All bodies of a scene in a PyBullet DIRECT client of their own; use it in a ``with`` block.
 
-    Robots start at home; the object starts at the first task.
+    Robots start at home; the object starts at the pose of the first task.
 
     Args:
         scene: the scene.
@@ -56,6 +44,13 @@ class BulletWorld:
     Raises:
         UrdfError: PyBullet could not use all shapes of a URDF.
         MeshError: an obstacle's mesh is unusable.
+        SceneError: PyBullet cannot make another shape.
+        SymgraspError: PyBullet has no free physics client.
+
+    Attributes:
+        scene: the scene.
+        margin: distance (m) to keep from obstacles and other robots; the scene's at first.
+        bodies: the bodies in PyBullet.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -65,18 +60,12 @@ class BulletWorld:
         if self._client < 0:
             raise SymgraspError("PyBullet has no free physics client; close worlds you no longer need")
         try:
-            self._links: dict[int, tuple[str, ...]] = {}  # body → names of links -1, 0, 1, …
-            self._names: dict[int, str] = {}
-            self._robots = {r.name: self._load_robot(r) for r in scene.robots.values()}
-            self._solids: list[tuple[str, trimesh.Trimesh]] = []  # closed meshes, in the world
-            self._obstacles = [self._load_obstacle(o) for o in scene.obstacles]
-            self._object = self._load_object()
-            self._joints = {name: self._movable(name) for name in self._robots}
+            self.bodies = SceneBodies(self._client, scene)
             self._values: dict[str, Array] = {}  # joint values of each robot, as set last
-            self._queries = {arm.name: self._arm_queries(arm) for arm in scene.arms.values()}
-            self._parked_queries = {name: self._parked(name) for name in self._robots}
+            self._queries = {arm.name: arm_queries(self.bodies, arm) for arm in scene.arms.values()}
+            self._parked_queries = {name: parked_queries(self.bodies, name) for name in scene.robots}
             self.set_object(scene.task().T_world_object)
-            for name in self._robots:
+            for name in scene.robots:
                 self.park(name)
         except pybullet.error as error:
             self.close()
@@ -97,141 +86,22 @@ class BulletWorld:
             pybullet.disconnect(self._client)
             self._client = -1
 
-    # -- building ---------------------------------------------------------------------------
-
-    def _register(self, body: int, name: str, links: Sequence[str]) -> int:
-        self._names[body] = name
-        self._links[body] = tuple(links)
-        for link in range(-1, len(links) - 1):
-            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=self._client)
-        return body
-
-    def _load_urdf(self, model: RobotModel, name: str, pose: Array) -> int:
-        body = load_urdf(self._client, model, pose)
-        return self._register(body, name, link_names(self._client, body))
-
-    def _load_robot(self, robot: Robot) -> int:
-        return self._load_urdf(robot.model, robot.name, robot.T_world_base)
-
-    def _load_obstacle(self, o: Obstacle) -> int:
-        if o.kind == "urdf":
-            assert o.model is not None
-            return self._load_urdf(o.model, o.name, o.T_world_obstacle)
-        client = self._client
-        if o.kind == "box":
-            half = [0.5 * s for s in o.size]
-            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
-        elif o.kind == "cylinder":
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_CYLINDER, radius=o.size[0], height=o.size[1], physicsClientId=client
-            )
-        elif o.kind == "sphere":
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_SPHERE, radius=o.size[0], physicsClientId=client
-            )
-        else:
-            shape = self._mesh_shape(o)
-        return self._body(shape, o.name, o.T_world_obstacle)
-
-    def _mesh_shape(self, o: Obstacle) -> int:
-        """Keep the true surface: hollow meshes stay hollow.
-
-        An arm inside a closed mesh would go unnoticed by its surface alone, but an arm hangs
-        together and on its base, so some moving link crosses the surface. The object does not, so
-        for closed meshes it is asked whether they hold its middle.
-        """
-        assert o.path is not None
-        mesh = read_mesh(o.path, f"obstacle {o.name}")
-        if len(mesh.faces) > MOST_TRIANGLES:
-            expected = f"at most {MOST_TRIANGLES} triangles; simplify the mesh"
-            raise MeshError(o.path, f"obstacle {o.name}", f"{len(mesh.faces)} triangles", expected)
-        solid = mesh.copy()
-        solid.merge_vertices()  # STL repeats every corner
-        if solid.is_watertight:
-            solid.apply_transform(o.T_world_obstacle)
-            self._solids.append((o.name, solid))
-        return pybullet.createCollisionShape(
-            pybullet.GEOM_MESH,
-            vertices=mesh.vertices.tolist(),
-            indices=mesh.faces.ravel().tolist(),
-            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-            physicsClientId=self._client,
-        )
-
-    def _body(self, shape: int, name: str, pose: Array) -> int:
-        if shape < 0:
-            raise SymgraspError(f"PyBullet cannot make the shape of {name!r}")
-        body = pybullet.createMultiBody(
-            0.0,
-            shape,
-            basePosition=pose[:3, 3].tolist(),
-            baseOrientation=xyzw(pose),
-            physicsClientId=self._client,
-        )
-        return self._register(body, name, [""])
-
-    def _load_object(self) -> list[int]:
-        bodies = []
-        for vertices in self.scene.profile.convex_pieces():
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_MESH, vertices=vertices.tolist(), physicsClientId=self._client
-            )
-            bodies.append(self._body(shape, self.scene.file.object.name, np.eye(4)))
-        return bodies
-
-    def _movable(self, robot: str) -> list[tuple[int, int, float, float]]:
-        """Return (PyBullet joint, index into the robot's values, ratio, offset) of all moving joints."""
-        index = {link: i - 1 for i, link in enumerate(self._links[self._robots[robot]])}
-        model = self.scene.robots[robot].model
-        return [
-            (index[model.link_names[j.child]], j.source, j.ratio, j.offset)
-            for j in model.joints
-            if j.source >= 0
-        ]
-
-    def _arm_queries(self, arm: Arm) -> list[_Query]:
-        """List what is checked for an arm, in the order of the reasons."""
-        robot = arm.robot
-        body = self._robots[robot.name]
-        index = {link: i - 1 for i, link in enumerate(self._links[body])}
-        mount = frozenset(index[link] for link in robot.model.mount_links())
-        touch = frozenset(index[link] for link in arm.hand.touch_links)
-        queries = [
-            _Query(Reason.SELF_COLLISION, frozenset((a, b)), body, body, index[a], index[b])
-            for a, b in checked_self_pairs(robot.model)
-        ]
-        queries += [self._query(Reason.OBJECT_COLLISION, body, p, skip_a=touch) for p in self._object]
-        queries += [self._query(Reason.SCENE_COLLISION, body, o, skip_a=mount) for o in self._obstacles]
-        others = [other for other in self._robots.values() if other != body]
-        return queries + [self._query(Reason.ROBOT_COLLISION, body, other) for other in others]
-
-    def _query(self, reason: Reason, a: int, b: int, skip_a: frozenset[int] = frozenset()) -> _Query:
-        """Return the query for all links of two bodies."""
-        return _Query(reason, self._names[b], a, b, skip_a=skip_a)
-
-    def _parked(self, name: str) -> list[_Query]:
-        """List what is checked for a robot that holds nothing: the object, and the other robots."""
-        body = self._robots[name]
-        queries = [self._query(Reason.OBJECT_COLLISION, body, piece) for piece in self._object]
-        others = [other for other in self._robots.values() if other != body]
-        return queries + [self._query(Reason.ROBOT_COLLISION, body, other) for other in others]
-
     # -- state ------------------------------------------------------------------------------
 
     def set_object(self, T_world_object: ArrayLike) -> None:
-        """Place the object by its origin and axis; its spin about the axis does not matter."""
+        """Place the object at a pose (4, 4), of which only origin and z axis count: it is symmetric."""
         pose = self._object_pose = axis_frame(T_world_object)
-        for body in self._object:
+        for body in self.bodies.object:
             pybullet.resetBasePositionAndOrientation(
                 body, pose[:3, 3].tolist(), xyzw(pose), physicsClientId=self._client
             )
 
     def set_arm(self, arm: Arm, q: ArrayLike, opening: float) -> None:
-        """Put an arm at joint values (n,) with its hand open by ``opening`` (m), the robot's rest at home."""
+        """Set an arm to q (n,), its hand to an opening (m), and its robot's other joints to home."""
         self._set(arm.robot.name, arm.robot_values(q, opening))
 
     def set_arms(self, configurations: Iterable[tuple[Arm, ArrayLike, float]]) -> None:
-        """Put several arms at (arm, joint values, opening), and everything else at home."""
+        """Set several arms to (arm, joint values (n,), opening (m)), and all other joints to home."""
         values = {name: robot.home.copy() for name, robot in self.scene.robots.items()}
         for arm, q, opening in configurations:
             robot = values[arm.robot.name]
@@ -242,12 +112,12 @@ class BulletWorld:
             self._set(name, joints)
 
     def park(self, robot: str) -> None:
-        """Put a robot at home."""
+        """Set all joints of a robot, given by name, to home."""
         self._set(robot, self.scene.robots[robot].home)
 
     @contextmanager
-    def kept(self) -> Iterator[None]:
-        """Leave robots, object and margin as they were before the ``with`` block."""
+    def preserving_state(self) -> Iterator[None]:
+        """Restore robots, object and margin at the end of the ``with`` block."""
         values, pose, margin = dict(self._values), self._object_pose, self.margin
         try:
             yield
@@ -259,168 +129,158 @@ class BulletWorld:
 
     def _set(self, robot: str, values: Array) -> None:
         self._values[robot] = values
-        joints = self._joints[robot]
+        joints = self.bodies.joints[robot]
         pybullet.resetJointStatesMultiDof(
-            self._robots[robot],
-            [j for j, *_ in joints],
-            [[ratio * float(values[source]) + offset] for _, source, ratio, offset in joints],
+            self.bodies.robots[robot],
+            [j.joint for j in joints],
+            [[j.ratio * float(values[j.source]) + j.offset] for j in joints],
             physicsClientId=self._client,
         )
-
-    def link_pose(self, robot: str, link: str) -> Array:
-        """Return the pose (4, 4) of a robot's link in the world, as PyBullet has it."""
-        body = self._robots[robot]
-        index = self._links[body].index(link) - 1
-        if index < 0:
-            return self.scene.robots[robot].T_world_base
-        state = pybullet.getLinkState(
-            body, index, computeForwardKinematics=True, physicsClientId=self._client
-        )
-        pose = np.eye(4)
-        pose[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
-        pose[:3, 3] = state[4]
-        return pose
 
     # -- shapes -----------------------------------------------------------------------------
 
     def shapes(self, name: str) -> dict[str, list[Shape]]:
         """Return the convex shapes of each link of a robot, or of an obstacle that is a URDF."""
-        body = next(body for body, own in self._names.items() if own == name)
-        links = enumerate(self._links[body], start=-1)
+        body = next(body for body, own in self.bodies.names.items() if own == name)
+        links = enumerate(self.bodies.links[body], start=-1)
         return {link: shapes for index, link in links if (shapes := link_shapes(self._client, body, index))}
 
-    # -- questions --------------------------------------------------------------------------
+    # -- collisions and distances ------------------------------------------------------------
 
-    def first_collision(self, arm: Arm, near: NearBodies | None = None) -> Collision | None:
+    def first_collision(self, arm: Arm, among: NearBodies | None = None) -> Collision | None:
         """Return the deepest collision of the first stage at which the arm collides, or None.
 
-        Stages in order: with its own robot, the object, obstacles, other robots. Links that no
-        joint moves are not checked against obstacles; the hand's touch links may touch the object.
+        The stages, in the order of `Reason`: its own robot, the object, the obstacles, other robots.
+        Links that no joint moves are not checked against obstacles; the hand's touch links may touch
+        the object.
 
         Args:
             arm: the arm.
-            near: what could be in the way; everything if None.
+            among: what to check against; everything if None.
         """
         stage: list[Collision] = []
         for query in self._queries[arm.name]:
-            if near is not None and query.key not in near:
+            if among is not None and query.key not in among:
                 continue
             if stage and query.reason != stage[0].reason:
                 break
-            stage += self._ask(query)
+            stage += self._collisions(query)
         return max(stage, key=lambda c: c.depth, default=None)
 
     def arm_collisions(self, arm: Arm) -> list[Collision]:
-        """Return all collisions of an arm: by stage in the order of `first_collision`, then deepest first.
+        """Return all collisions of an arm, by stage in the order of `first_collision`, then deepest first.
 
-        Each pair of bodies comes once, so the first one is that of `first_collision`.
+        Each pair of bodies appears once; the first entry is what `first_collision` returns.
         """
-        found = _deepest(c for query in self._queries[arm.name] for c in self._ask(query))
+        found = _deepest(c for query in self._queries[arm.name] for c in self._collisions(query))
         return sorted(found, key=lambda c: c.reason)
 
     def collisions(self, arms: Sequence[Arm]) -> list[Collision]:
         """Return all collisions of several arms at once, deepest first.
 
-        Of a robot with several arms, the touch links of all of them may touch the object. Robots
-        without any of these arms are taken to be parked, and must be free of the object as well.
+        The touch links of all these arms may touch the object, also where a robot has several. Robots with
+        none of these arms are checked as parked: against the object and other robots.
         """
         touch = {(a.robot.name, link) for a in arms for link in a.hand.touch_links}
         found = [
             c
             for arm in arms
             for query in self._queries[arm.name]
-            for c in self._ask(query)
+            for c in self._collisions(query)
             if not (c.reason == Reason.OBJECT_COLLISION and c.a in touch)
         ]
-        busy = {arm.robot.name for arm in arms}
+        grasping = {arm.robot.name for arm in arms}
         for name, queries in self._parked_queries.items():
-            if name not in busy:
-                found += [c for query in queries for c in self._ask(query)]
+            if name not in grasping:
+                found += [c for query in queries for c in self._collisions(query)]
         return _deepest(found)
 
     def object_contacts(self, margin: float = 0.0) -> list[Collision]:
-        """Return the obstacles that the object is inside of, or within ``margin`` (m) of, deepest first."""
+        """Return the obstacles that the object is inside of, or within a margin (m) of, deepest first."""
         found = [
             c
-            for piece in self._object
-            for obstacle in self._obstacles
-            for c in self._ask(self._query(Reason.SCENE_COLLISION, piece, obstacle), margin)
+            for piece in self.bodies.object
+            for obstacle in self.bodies.obstacles
+            for c in self._collisions(
+                body_query(self.bodies, Reason.SCENE_COLLISION, piece, obstacle), margin
+            )
         ]
-        found += self._engulfed()
+        found += self._closed_meshes_around_object()
         return sorted(found, key=lambda c: -c.depth)
 
     def object_in_robots(self, holders: Sequence[str]) -> list[Collision]:
-        """Return the links of other robots than the ``holders`` that the object is inside of."""
+        """Return the links that the object is inside of, of all robots but those named as holders."""
         return [
             c._replace(a=c.b, b=c.a)
             for name, queries in self._parked_queries.items()
             if name not in holders
             for query in queries
             if query.reason == Reason.OBJECT_COLLISION
-            for c in self._ask(query)
+            for c in self._collisions(query)
         ]
 
-    def _engulfed(self) -> list[Collision]:
-        """Return the closed meshes that hold the object's middle: their surface alone would not tell."""
+    def _closed_meshes_around_object(self) -> list[Collision]:
+        """Return the closed meshes around the middle of the object: PyBullet has their surfaces only."""
         profile = self.scene.profile
         middle = self._object_pose @ [0.0, 0.0, 0.5 * (profile.h_min + profile.h_max), 1.0]
         found = []
-        for name, mesh in self._solids:
+        for name, mesh in self.bodies.closed_meshes:
             depth = depth_inside(mesh, middle[:3])
             if depth > 0:
-                names = (Body(self.scene.file.object.name, ""), Body(name, ""))
+                names = (BodyName(self.scene.file.object.name, ""), BodyName(name, ""))
                 found.append(Collision(Reason.SCENE_COLLISION, *names, depth))
         return found
 
-    def rests(self, T_world_object: ArrayLike) -> bool:
-        """Whether the object stands on something at a pose: lowered by 3 mm, it would sink into it."""
+    def object_rests(self, T_world_object: ArrayLike) -> bool:
+        """Whether an obstacle supports the object at a pose (4, 4): lowered a little, it would sink into it.
+
+        The object stays at that pose.
+        """
         pose = np.array(T_world_object, dtype=float)
         self.set_object(pose)
         before = max((c.depth for c in self.object_contacts()), default=0.0)
-        pose[2, 3] -= 0.003
+        pose[2, 3] -= LOWERED
         self.set_object(pose)
         after = max((c.depth for c in self.object_contacts()), default=0.0)
         self.set_object(T_world_object)
-        return after > before + 0.0015
+        return after > before + SUPPORTED_DEPTH
 
     def clearance(self, arm: Arm, limit: float) -> float:
-        """Return the smallest distance (m) of all pairs that are checked for an arm, at most ``limit``."""
-        return min((limit - c.depth for c in self.near(arm, limit)), default=limit)
+        """Return the smallest distance (m) of the pairs checked for an arm, at most ``limit`` (m)."""
+        return min((limit - c.depth for c in self.pairs_within(arm, limit)), default=limit)
 
-    def near(self, arm: Arm, distance: float, among: NearBodies | None = None) -> list[Collision]:
-        """Return the pairs checked for an arm that are closer than a distance (m), as if it were a margin.
+    def pairs_within(self, arm: Arm, distance: float, among: NearBodies | None = None) -> list[Collision]:
+        """Return the pairs checked for an arm that are closer than a distance.
 
         Args:
             arm: the arm.
-            distance: how close.
-            among: what is asked about; everything if None.
+            distance: the distance (m); the depths of the result are relative to it.
+            among: what to check against; everything if None.
         """
         queries = (q for q in self._queries[arm.name] if among is None or q.key in among)
-        return [c for query in queries for c in self._ask(query, distance)]
+        return [c for query in queries for c in self._collisions(query, distance)]
 
     def margin_for(self, reason: Reason) -> float:
         """Return the distance (m) that bodies must keep, by the kind of collision.
 
-        A margin is kept from what the arm must not touch; the hand is close to the object by design,
-        and some links are always close to each other.
+        It is zero to the object, which the hand is close to by design, and within a robot, where some
+        links are always close to each other.
         """
-        return self.margin if reason in _KEPT_AT_A_DISTANCE else 0.0
+        return self.margin if reason in MARGIN_REASONS else 0.0
 
-    def _ask(self, query: _Query, margin: float | None = None) -> list[Collision]:
+    def _collisions(self, query: Query, margin: float | None = None) -> list[Collision]:
+        """Return the pairs of a query that are closer than a margin (m), by default that of its reason."""
         if margin is None:
             margin = self.margin_for(query.reason)
         links = () if query.link_a is None else (query.link_a, query.link_b)
         points = pybullet.getClosestPoints(query.a, query.b, margin, *links, physicsClientId=self._client)
+        name = self.bodies.body_name
+        # Fields of a point: 3 and 4 are the links of a and b, 8 is the distance, negative for penetration.
         return [
-            Collision(
-                query.reason, self._body_name(query.a, p[3]), self._body_name(query.b, p[4]), margin - p[8]
-            )
+            Collision(query.reason, name(query.a, p[3]), name(query.b, p[4]), margin - p[8])
             for p in points or ()
-            if p[8] < margin and p[3] not in query.skip_a and p[4] not in query.skip_b
+            if p[8] < margin and p[3] not in query.skip_a
         ]
-
-    def _body_name(self, body: int, link: int) -> Body:
-        return Body(self._names[body], self._links[body][link + 1])
 
 
 def _deepest(found: Iterable[Collision]) -> list[Collision]:

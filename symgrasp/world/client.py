@@ -1,4 +1,4 @@
-"""PyBullet itself, loaded without a word, and what it needs to be told about URDFs and poses."""
+"""Importing PyBullet without its printed output, and converting URDFs and poses to and from it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from symgrasp.robot.model import RobotModel
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Send what C code prints, on either stream, to nowhere."""
+    """Discard what C code prints to standard output and standard error."""
     flush = ctypes.CDLL(None).fflush
     sys.stdout.flush()
     flush(None)
@@ -34,24 +34,36 @@ def _silenced() -> Iterator[None]:
             os.close(copy)
 
 
-with _silenced():  # it prints its build time
+with _silenced():  # PyBullet prints its build time when it is imported
     import pybullet
 
 __all__ = ["link_names", "load_urdf", "pose_of", "pybullet", "xyzw"]
 
 
 def pose_of(position: Sequence[float], xyzw: Sequence[float]) -> Array:
-    """Return the pose (4, 4) that PyBullet tells as a position and a quaternion."""
+    """Return the pose (4, 4) of a position (3,) and an xyzw quaternion (4,), as PyBullet has them."""
     return from_position_quat(position, xyzw_to_wxyz(xyzw))
 
 
 def xyzw(pose: Array) -> list[float]:
-    """Return the orientation of a pose (4, 4) as PyBullet takes it."""
+    """Return the orientation of a pose (4, 4) as an xyzw quaternion (4,), as PyBullet takes it."""
     return wxyz_to_xyzw(quat_wxyz(pose)).tolist()
 
 
 def load_urdf(client: int, model: RobotModel, pose: Array) -> int:
-    """Load the collision shapes of a URDF, and see that every one of them arrived."""
+    """Load the collision shapes of a URDF with a fixed base.
+
+    Args:
+        client: PyBullet's id of the physics client.
+        model: the URDF.
+        pose: pose (4, 4) of the root link in the world.
+
+    Returns:
+        PyBullet's body id.
+
+    Raises:
+        UrdfError: PyBullet cannot load it, or a link that has shapes has none there.
+    """
     with tempfile.NamedTemporaryFile(suffix=".urdf") as file:
         file.write(model.collision_urdf())
         file.flush()
@@ -73,7 +85,7 @@ def load_urdf(client: int, model: RobotModel, pose: Array) -> int:
 
 
 def link_names(client: int, body: int) -> list[str]:
-    """Return the names of the links -1, 0, 1, … of a body."""
+    """Return the names of the links -1 (the base), 0, 1, … of a body, in this order."""
     joints = range(pybullet.getNumJoints(body, client))
     base = pybullet.getBodyInfo(body, client)[0].decode()
     return [base, *(pybullet.getJointInfo(body, j, client)[12].decode() for j in joints)]

@@ -1,4 +1,4 @@
-"""Bodies by name, and pairs of them that are too close."""
+"""Names of bodies, and collisions: pairs of bodies that are too close."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ from typing import NamedTuple
 
 from symgrasp.reason import Reason
 
-__all__ = ["Body", "Collision", "NearBodies"]
+__all__ = ["BodyName", "Collision", "NearBodies"]
 
 
-class Body(NamedTuple):
-    """A link of a robot, or a whole obstacle or object (with an empty or inner link name)."""
+class BodyName(NamedTuple):
+    """The name of a link of a robot, or of an obstacle or the object.
+
+    Attributes:
+        body: name of the robot, obstacle or object in the scene.
+        link: name of the link; empty for the object and for obstacles that are not URDFs.
+    """
 
     body: str
     link: str
@@ -24,17 +29,18 @@ class Collision(NamedTuple):
     """Two bodies that are closer than they may be.
 
     Attributes:
-        reason: the kind of collision, seen from the arm.
-        a: the link of the robot.
-        b: what it hits.
-        depth: how much closer (m) than allowed; the penetration where the margin is zero.
+        reason: the kind of collision, as seen by the arm.
+        a: a link of the arm's robot, or the object where that is what was checked.
+        b: what it collides with.
+        depth: how much closer (m) they are than the margin; the penetration where that is zero.
     """
 
     reason: Reason
-    a: Body
-    b: Body
+    a: BodyName
+    b: BodyName
     depth: float
 
 
 NearBodies = Collection[str | frozenset[str]]
-"""What could be in the way of an arm: bodies by their names, and pairs of the robot's own links."""
+"""What to check an arm against (the result of a broad phase): names of bodies, and pairs of link names of
+its own robot."""

@@ -1,4 +1,4 @@
-"""Which links of a robot can collide with each other."""
+"""The pairs of a robot's links that must be checked for self-collision, found by sampling."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from symgrasp.world.client import link_names, load_urdf, pybullet
 __all__ = ["checked_self_pairs"]
 
 SELF_SAMPLES = 2000
-"""Random configurations that tell which links of a robot always or never collide."""
+"""Number of random configurations that show which pairs of links always or never collide."""
 
 NEVER_GAP = 0.02
-"""Links that come closer than this (m) in some sample are always checked, collided or not."""
+"""Pairs that come closer than this (m) in some sample are checked, even if they collide in none."""
 
 
 @lru_cache(maxsize=32)
 def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of a robot's links that can collide, but need not.
+    """Return the pairs of links that collide in some configurations, but not in all.
 
-    Left out are neighbours, pairs that overlap in every one of many random configurations (a
-    flange and the hand on it), and pairs that stay well apart in all of them.
+    Left out are adjacent links, pairs that overlap in all of `SELF_SAMPLES` random configurations (a
+    flange and the hand on it), and pairs that stay further apart than `NEVER_GAP` in all of them.
     """
     client = pybullet.connect(pybullet.DIRECT)
     try:
@@ -31,10 +31,10 @@ def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
         index = {link: i - 1 for i, link in enumerate(link_names(client, body))}
         for link in index.values():
             pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=client)
-        solid = model.colliding_links()
-        neighbours = model.neighbours()
+        links = model.colliding_links()
+        adjacent = model.neighbours()
         pairs = [
-            (a, b) for i, a in enumerate(solid) for b in solid[i + 1 :] if frozenset((a, b)) not in neighbours
+            (a, b) for i, a in enumerate(links) for b in links[i + 1 :] if frozenset((a, b)) not in adjacent
         ]
         moving = [(index[model.link_names[j.child]], j) for j in model.joints if j.source >= 0]
         lower = np.where(np.isfinite(model.lower), model.lower, -np.pi)

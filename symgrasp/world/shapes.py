@@ -1,4 +1,4 @@
-"""The convex shapes that PyBullet really has, read back from it."""
+"""The convex collision shapes of links, read back from PyBullet as it has them."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from symgrasp.world.client import pose_of, pybullet
 __all__ = ["Shape", "link_shapes"]
 
 WALL_GAP = 0.5
-"""Distance (m) from which the rounding of a link is measured."""
+"""Distance (m) between a link and the wall that its rounding is measured against."""
 
 LINK_MARGIN = 1e-3
-"""Bullet rounds the shapes of links by this (m); what is set for a compound does not reach its parts."""
+"""Collision margin (m) that Bullet keeps for the parts of a compound: setting it on the compound has no
+effect on them."""
 
 
 class Shape(NamedTuple):
-    """A convex collision shape as PyBullet has it: a hull, blown up by a ball.
+    """A convex collision shape as PyBullet has it: a convex hull, enlarged by a ball (Minkowski sum).
 
     Attributes:
         vertices: (n, 3) corners of the hull in the link frame.
         rounding: radius (m) of the ball.
-        slack: by how much (m) the true shape may fall short of this one; inf where the parts of a
-            link cannot be told apart and this is the hull of them all.
+        slack: by how much (m) the true shape may be smaller than this one; inf where PyBullet does not
+            tell the parts of a link apart and this is the hull of them all.
     """
 
     vertices: Array
@@ -35,7 +36,13 @@ class Shape(NamedTuple):
 
 
 def link_shapes(client: int, body: int, link: int) -> list[Shape]:
-    """Return the convex shapes of a link, by its PyBullet index (-1 for the base); none if it has none."""
+    """Return the convex shapes of a link.
+
+    Args:
+        client: PyBullet's id of the physics client.
+        body: PyBullet's body id.
+        link: PyBullet's link index, -1 for the base.
+    """
     data = pybullet.getCollisionShapeData(body, link, physicsClientId=client)
     if not data:
         return []
@@ -55,12 +62,13 @@ def link_shapes(client: int, body: int, link: int) -> list[Shape]:
 
 
 def _mesh(client: int, body: int, link: int, index: int) -> Array:
+    """Return the vertices (n, 3) of a link's shape, of all for index -1, in Bullet's link frame."""
     _, vertices = pybullet.getMeshData(body, link, collisionShapeIndex=index, physicsClientId=client)
     return np.reshape(np.array(vertices, dtype=float), (-1, 3))
 
 
 def _rounding(client: int, body: int, link: int, vertices: Array) -> float:
-    """Measure by how much Bullet blows up the hull of vertices: against a wall above the link."""
+    """Return by how much (m) Bullet enlarges the hull of vertices (n, 3), measured against a wall."""
     if link < 0:
         position, orientation = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
     else:
@@ -80,9 +88,9 @@ def _rounding(client: int, body: int, link: int, vertices: Array) -> float:
 
 
 def _primitive(kind: int, size: Sequence[float], pose: Array) -> Shape | None:
-    """Return the shape of a box, ball or capsule, and None for a hull."""
+    """Return a box, sphere or capsule as a `Shape` in the link frame, and None for any other kind."""
     if kind == pybullet.GEOM_BOX:
-        # Rounded inwards: edges and corners fall short of the box by less than their diagonal.
+        # Bullet rounds boxes inwards: only edges and corners are missing, by less than its margin.
         corners, rounding, slack = np.array(list(np.ndindex(2, 2, 2))) - 0.5, 0.0, LINK_MARGIN
         corners = corners * size
     elif kind == pybullet.GEOM_SPHERE:

@@ -1,4 +1,4 @@
-"""Whether a scene's tasks make sense: the object is inside of nothing."""
+"""Checking the tasks of a scene: the object must not be inside another body."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from symgrasp.world.opening import open_world
 __all__ = ["RESTING_DEPTH", "check_tasks"]
 
 RESTING_DEPTH = 1e-3
-"""How deep (m) an object may sink into what it stands on and still count as resting."""
+"""How deep (m) the object may be inside another body and still count as resting on it."""
 
 
 def check_tasks(scene: Scene) -> None:
-    """Check that the object is clear of all obstacles in every task; resting contact is fine.
+    """Check that in every task the object is outside of obstacles and of robots that do not hold it.
+
+    Resting contact is allowed, see `RESTING_DEPTH`.
 
     Raises:
-        SceneError: it is not; names both bodies and the depth.
+        SceneError: it is inside one; the text names both bodies and the depth.
     """
     with open_world(scene) as world:
         for i, task in enumerate(scene.tasks.values()):

@@ -12,21 +12,22 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
-from symgrasp.engine.checks import FREE_BAND, HIT_BAND, new_scratch, place_arm, place_hand
+from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.distance import distance_bounds
-from symgrasp.engine.geometry import ArmGeometry
-from symgrasp.engine.solids import Piece, pack, pose_rows
-from symgrasp.feasibility.exact import ExactEngine
+from symgrasp.engine.geometry import ArmGeometry, arm_geometry
+from symgrasp.engine.kinematics import new_scratch, place_arm, place_hand
+from symgrasp.engine.pieces import Piece, pack, pose_rows
 from symgrasp.poses import axis_frame
+from symgrasp.robot.robot import Arm
 from symgrasp.world import BulletWorld
 from tests.conftest import SHIPPED, load_small
 
 NEAR = 0.1
 
 
-def bounds(solids, pose, a: int, b: int) -> tuple[float, float]:
+def bounds(pieces, pose, a: int, b: int) -> tuple[float, float]:
     """Both bounds as sharp as they get."""
-    return distance_bounds(solids, pose, a, b, math.inf, math.inf, -math.inf, np.zeros((4, 3)))
+    return distance_bounds(pieces, pose, a, b, math.inf, math.inf, -math.inf, np.zeros((4, 3)))
 
 
 def distance_of_hulls(a: np.ndarray, b: np.ndarray) -> float:
@@ -46,8 +47,8 @@ def test_bounds_enclose_the_distance_of_random_hulls(seed):
     poses = np.tile(np.eye(4), (2, 1, 1))
     poses[:, :3, :3] = Rotation.random(2, rng).as_matrix()
     poses[:, :3, 3] = rng.normal(0, 0.3, (2, 3))
-    solids = pack([Piece(c, r) for c, r in zip(corners, rounding, strict=True)])
-    lower, upper = bounds(solids, pose_rows(poses), 0, 1)
+    pieces = pack([Piece(c, r) for c, r in zip(corners, rounding, strict=True)])
+    lower, upper = bounds(pieces, pose_rows(poses), 0, 1)
     placed = [c @ T[:3, :3].T + T[:3, 3] for c, T in zip(corners, poses, strict=True)]
     apart = distance_of_hulls(*placed)
     thick = rounding.sum()
@@ -68,23 +69,29 @@ def test_bounds_enclose_what_pybullet_measures(name):
     with BulletWorld(scene) as world:
         arms = scene.task().arms
         for arm_name in arms:
-            engine = ExactEngine(world, scene.arm(arm_name), scene.manifold)
+            arm = scene.arm(arm_name)
+            radii = scene.profile.radius(scene.manifold.h)
+            openings = np.array([arm.hand.opening(float(radius)) for radius in radii])
+            world.set_arms([(arm, arm.home, float(openings[0]))])
+            geometry = arm_geometry(world, arm, openings)
+            geometry.pose[geometry.moving.objects] = pose_rows(axis_frame(scene.task().T_world_object))
             for _ in range(60 // len(arms)):
-                compared += compare(engine, world, rng)
+                compared += compare(world, arm, geometry, openings, rng)
     assert compared > 100
 
 
-def compare(engine: ExactEngine, world: BulletWorld, rng: np.random.Generator) -> int:
+def compare(
+    world: BulletWorld, arm: Arm, geometry: ArmGeometry, openings: np.ndarray, rng: np.random.Generator
+) -> int:
     """Compare one random configuration; return the number of pairs of bodies."""
-    arm, row = engine.arm, int(rng.integers(engine.manifold.heights))
+    row = int(rng.integers(len(openings)))
     q = rng.uniform(arm.lower, arm.upper)
-    opening = arm.hand.opening(float(engine.manifold.profile.radius(engine.manifold.h[row])))
-    world.set_arms([(arm, q, opening)])
+    world.set_arms([(arm, q, float(openings[row]))])
     measured: dict[frozenset[str], float] = defaultdict(lambda: math.inf)
-    for c in world.near(arm, NEAR):
+    for c in world.pairs_within(arm, NEAR):
         key = frozenset((str(c.a), str(c.b)))
         measured[key] = min(measured[key], NEAR - c.depth)
-    for key, (lower, upper) in by_bodies(engine, world, q, row).items():
+    for key, (lower, upper) in by_bodies(arm, geometry, q, row).items():
         if key in measured:
             assert lower <= measured[key] + FREE_BAND, key
             assert measured[key] <= upper + HIT_BAND, key
@@ -92,24 +99,21 @@ def compare(engine: ExactEngine, world: BulletWorld, rng: np.random.Generator) -
 
 
 def by_bodies(
-    engine: ExactEngine, world: BulletWorld, q, row: int
+    arm: Arm, geometry: ArmGeometry, q: np.ndarray, row: int
 ) -> dict[frozenset[str], tuple[float, float]]:
     """Return for every pair of bodies of which one moves the bounds of the true shapes' distance."""
-    arm_geometry: ArmGeometry = engine._geometry
-    arm, body, solids = engine.arm, arm_geometry.body, arm_geometry.solids
-    pose = arm_geometry.pose.copy()
-    pose[body.objects] = pose_rows(axis_frame(world._object_pose))
-    scratch = new_scratch(pose, solids, len(q))
+    moving, pieces = geometry.moving, geometry.pieces
+    scratch = new_scratch(geometry.pose, pieces, len(q))
     T_base_world = np.ascontiguousarray(arm.robot.T_world_base)
-    place_hand(body, solids, scratch, T_base_world, np.ascontiguousarray(arm.tool_pose(q)), row)
-    place_arm(body, solids, scratch, q)
+    place_hand(moving, pieces, scratch, T_base_world, np.ascontiguousarray(arm.tool_pose(q)), row)
+    place_arm(moving, pieces, scratch, q)
     found: dict[frozenset[str], tuple[float, float]] = {}
-    for a in range(len(body.frame)):
-        for b in range(len(arm_geometry.names)):
-            if arm_geometry.names[a] != arm_geometry.names[b]:
-                key = frozenset((str(arm_geometry.names[a]), str(arm_geometry.names[b])))
-                lower, upper = bounds(solids, scratch.pose, a, b)
-                upper += solids.size[a, 1] + solids.size[b, 1]
+    for a in range(len(moving.frame)):
+        for b in range(len(geometry.names)):
+            if geometry.names[a] != geometry.names[b]:
+                key = frozenset((str(geometry.names[a]), str(geometry.names[b])))
+                lower, upper = bounds(pieces, scratch.pose, a, b)
+                upper += pieces.size[a, 1] + pieces.size[b, 1]
                 known = found.get(key, (math.inf, math.inf))
                 found[key] = min(lower, known[0]), min(upper, known[1])
     return found

@@ -98,7 +98,7 @@ def assert_consistent(found: Explanation, world: BulletWorld, arm: Arm) -> None:
 
 
 def ask_pybullet(v, world: BulletWorld, arm: Arm, found: Explanation) -> None:
-    with world.kept():
+    with world.preserving_state():
         world.margin = world.scene.settings.margin
         world.set_arms([(arm, v.ended, found.opening)])
         world.set_object(explained_pose(world))
@@ -178,7 +178,7 @@ def test_the_world_stays_as_it_was():
         world.set_arms([(left, left.home + 0.1, 0.03), (right, right.home - 0.1, 0.02)])
         world.set_object(T)
         world.margin = 0.123
-        before = [c for arm in (left, right) for c in world.near(arm, 0.3)]
+        before = [c for arm in (left, right) for c in world.pairs_within(arm, 0.3)]
 
         def stop(share: float) -> None:
             raise Cancelled
@@ -187,7 +187,7 @@ def test_the_world_stays_as_it_was():
         with pytest.raises(Cancelled):
             maker.explain("left", None, cell, progress=stop)
         assert world.margin == 0.123
-        assert [c for arm in (left, right) for c in world.near(arm, 0.3)] == before
+        assert [c for arm in (left, right) for c in world.pairs_within(arm, 0.3)] == before
 
 
 def test_a_cell_of_another_grid_and_task():

@@ -1,4 +1,4 @@
-"""The compiled closed form against EAIK, against forward kinematics, and against itself."""
+"""The compiled closed form against EAIK, against forward kinematics, and one sample against all."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from symgrasp.poses import from_position_quat, pose_error, rotation_about
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
+from tests.ik.redundancy import solve_at
 
 ARMS = ("panda", "iiwa", "backwards", "six")
 
@@ -97,7 +98,7 @@ def test_recall(name, arms):
     gaps = []
     for q in samples(arm, 3000, 1):
         phi = 0.0 if ik.locked is None else float(q[ik.locked])
-        gaps.append(distance(ik.solve_at(arm.tool_pose(q), phi).q, q).min(initial=np.inf))
+        gaps.append(distance(solve_at(ik, arm.tool_pose(q), phi).q, q).min(initial=np.inf))
     assert np.max(gaps) < 1e-3
     assert np.count_nonzero(np.array(gaps) > 1e-6) <= 3
 
@@ -107,36 +108,32 @@ def test_every_solution_reaches_the_pose(name, arms):
     arm = arms[name]
     ik = SphericalIK(arm, 8)
     poses = arm.tool_pose(samples(arm, 400, 2))
-    q, exists, inside = ik.solve_batch(poses)
-    assert exists.sum() > 1000
-    assert not (inside & ~exists).any()
-    pose = np.nonzero(exists)[0]
-    position, rotation = pose_error(arm.tool_pose(q[exists]), poses[pose])
+    found = [ik.solve(T) for T in poses]
+    q, inside = np.concatenate([s.q for s in found]), np.concatenate([s.inside for s in found])
+    assert len(q) > 1000
+    reached = np.repeat(poses, [len(s.q) for s in found], axis=0)
+    position, rotation = pose_error(arm.tool_pose(q), reached)
     assert position.max() < 1e-9
     assert rotation.max() < 1e-9
-    within = ((q >= arm.lower) & (q <= arm.upper)).all(axis=-1)
-    np.testing.assert_array_equal(within[exists], inside[exists])
+    np.testing.assert_array_equal(((q >= arm.lower) & (q <= arm.upper)).all(axis=-1), inside)
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_an_answer_does_not_depend_on_its_batch(name, arms):
-    """Bit for bit: alone, at one sample, and among others in another order."""
+def test_an_answer_does_not_depend_on_what_else_is_asked(name, arms):
+    """Bit for bit: at all samples, at one, and of poses in another order."""
     arm = arms[name]
     ik = SphericalIK(arm, 5)
     poses = arm.tool_pose(samples(arm, 60, 3))
-    q, exists, inside = ik.solve_batch(poses)
-    order = np.random.default_rng(4).permutation(len(poses))
-    shuffled = ik.solve_batch(poses[order])
-    np.testing.assert_array_equal(shuffled[1], exists[order])
-    np.testing.assert_array_equal(shuffled[0][shuffled[1]], q[order][exists[order]])
-    for k, T in enumerate(poses):
-        alone = ik.solve(T)
-        np.testing.assert_array_equal(alone.q, q[k][exists[k]])
-        np.testing.assert_array_equal(alone.inside, inside[k][exists[k]])
+    every = [ik.solve(T) for T in poses]
+    for k in np.random.default_rng(4).permutation(len(poses)):
+        again = ik.solve(poses[k])
+        for one, other in zip(again, every[k], strict=True):
+            np.testing.assert_array_equal(one, other)
         for sample in range(len(ik.phi)):
-            part = ik.solve_sample(T, sample)
-            np.testing.assert_array_equal(part.q, alone.q[alone.sample == sample])
-            np.testing.assert_array_equal(part.branch, alone.branch[alone.sample == sample])
+            part, own = ik.solve_sample(poses[k], sample), again.sample == sample
+            np.testing.assert_array_equal(part.q, again.q[own])
+            np.testing.assert_array_equal(part.branch, again.branch[own])
+            np.testing.assert_array_equal(part.inside, again.inside[own])
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa"])
@@ -160,7 +157,7 @@ def test_aligned_axes_of_the_triple(arms):
     for q in samples(arm, 100, 6):
         q[1] = 0.0
         T = arm.tool_pose(q)
-        found = ik.solve_at(T, float(q[6]))
+        found = solve_at(ik, T, float(q[6]))
         assert (np.abs(found.q[:, [3, 4, 5]] - q[[3, 4, 5]]).max(axis=1) < 1e-5).any()
         position, _ = pose_error(arm.tool_pose(found.q), T)
         assert position.max() < 1e-6

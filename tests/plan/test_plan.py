@@ -29,6 +29,7 @@ from symgrasp.scene.format import scene_schema
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import load_small, write_scene
+from tests.world.link_pose import link_pose
 
 
 @cache
@@ -68,7 +69,7 @@ def test_a_plan_holds_in_a_fresh_world(make):
             world.set_arms(configurations)
             assert not world.collisions(arms)
             for arm, hold in zip(arms, task.holds, strict=True):
-                tool = world.link_pose(arm.robot.name, arm.tool)
+                tool = link_pose(world, arm.robot.name, arm.tool)
                 position, rotation = pose_error(tool, hold.tool_pose.array())
                 assert position < 2e-6  # PyBullet reads the URDF in single precision
                 assert rotation < 2e-6

@@ -300,7 +300,7 @@ def test_hands_that_meet_do_meet():
     apart, passing = gaps.table(0, 1), gaps.passing(0, 1)
     rng = np.random.default_rng(0)
     radius = float(grid.profile.radius(grid.h[0]))
-    bodies = arms[0].hand_bodies(arms[0].hand.opening(radius))
+    bodies = arms[0].hand_hulls(arms[0].hand.opening(radius))
     standoff = arms[0].hand.standoff(radius)
 
     def placed(line, column):

@@ -1,4 +1,4 @@
-"""The shipped hands on arms, and their bodies, for several tests."""
+"""The shipped hands on arms, and random points of convex hulls, for several tests."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def arms_with_hands() -> dict[str, Arm]:
     return dict(Scene.from_content(scene).arms)
 
 
-def random_points_in(bodies: list[Array], rng: np.random.Generator, count: int = 4000) -> Array:
-    """Random points of the convex bodies: between three corners, out to the corners themselves."""
+def random_points_in(hulls: list[Array], rng: np.random.Generator, count: int = 4000) -> Array:
+    """Random points of the convex hulls: between three corners, out to the corners themselves."""
     points = []
-    for vertices in bodies:
+    for vertices in hulls:
         corners = vertices[rng.integers(len(vertices), size=(count, 3))]
         points.append(np.einsum("nk,nkd->nd", rng.dirichlet([0.4, 0.4, 0.4], count), corners))
     return np.concatenate(points)

@@ -81,7 +81,7 @@ def test_the_palm_always_has_room_on_a_straight_object(radius, h, name):
 def test_where_there_is_no_room_the_palm_is_inside_the_object(name):
     """The face that the check stands for lies in the palm, so it never refuses what would fit."""
     arm = arms_with_hands()[name]
-    palm = Delaunay(arm.hand_bodies(arm.hand.max_opening)[0])
+    palm = Delaunay(arm.hand_hulls(arm.hand.max_opening)[0])
     x = np.linspace(-0.5, 0.5, 21) * (arm.hand.palm_width - 2e-4)
     face = np.column_stack([x, np.zeros(21), np.full(21, -arm.hand.palm_depth - 2e-4)])
     assert (palm.find_simplex(face) >= 0).all()
@@ -93,7 +93,7 @@ def test_the_fingers_of_the_shipped_hands_stand_as_far_open_as_asked(name, openi
     """Between the fingers, from the finger depth to the tips, no point is nearer than the opening."""
     arm = arms_with_hands()[name]
     palms = len([link for link in arm.hand.links if link not in arm.hand.touch_links])
-    points = random_points_in(arm.hand_bodies(opening)[palms:], np.random.default_rng(0), 100_000)
+    points = random_points_in(arm.hand_hulls(opening)[palms:], np.random.default_rng(0), 100_000)
     y = points[points[:, 2] >= -arm.hand.finger_depth, 1]
     assert y[y > 0].min() - y[y < 0].max() == pytest.approx(opening, abs=1e-3)
     assert abs(y[y > 0].min() + y[y < 0].max()) < 4e-3  # the tool frame is in the middle

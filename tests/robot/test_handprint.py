@@ -31,7 +31,7 @@ def test_no_point_of_the_hand_projects_outside_its_print(name, row, roll, column
     grid = Manifold(BOTTLE, 20, 24)
     radius = float(BOTTLE.radius(grid.h[row]))
     standoff = arm.hand.standoff(radius)
-    bodies = arm.hand_bodies(arm.hand.opening(radius))
+    bodies = arm.hand_hulls(arm.hand.opening(radius))
     print_ = arm.handprint(grid, row, roll)
     tool = grasp_to_tool(np.eye(4), grid.h[row], grid.theta[column], ROLLS[roll], standoff)
     points = random_points_in(bodies, np.random.default_rng(seed)) @ tool[:3, :3].T + tool[:3, 3]
@@ -49,7 +49,7 @@ def test_a_print_is_not_wasteful(name):
     arm = arms_with_hands()[name]
     grid = Manifold(BOTTLE, 20, 24)
     standoff = 0.01  # no body of any of the hands holds the axis, which would cover a whole row
-    bodies = arm.hand_bodies(0.08)
+    bodies = arm.hand_hulls(0.08)
     print_ = handprint(bodies, grid, 8, 0, standoff)
     tool = grasp_to_tool(np.eye(4), grid.h[8], grid.theta[0], 0.0, standoff)
     points = random_points_in(bodies, np.random.default_rng(0), 200_000) @ tool[:3, :3].T + tool[:3, 3]
@@ -160,7 +160,7 @@ class Bodies:
         arm = arms_with_hands()[name]
         radius = float(grid.profile.radius(grid.h[row]))
         tool = grasp_to_tool(np.eye(4), grid.h[row], 0.0, ROLLS[roll], arm.hand.standoff(radius))
-        hulls = arm.hand_bodies(arm.hand.opening(radius))
+        hulls = arm.hand_hulls(arm.hand.opening(radius))
         bodies = [self._body(points @ tool[:3, :3].T + tool[:3, 3]) for points in hulls]
         return Placed(arm.handprint(grid, row, roll), bodies)
 

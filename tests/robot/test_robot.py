@@ -68,21 +68,21 @@ def test_full_turns_are_taken_back_into_the_limits(panda):
     assert not arm.within_limits(outside)[1].any()
 
 
-def test_neighbours_look_through_links_without_a_body(panda):
+def test_neighbours_look_through_links_without_a_shape(panda):
     assert frozenset(("panda_link7", "panda_hand")) in panda.neighbours()
     assert panda.mount_links() == {"panda_link0"}
 
 
-def test_hand_bodies_open_with_the_hand(panda):
+def test_hand_hulls_open_with_the_hand(panda):
     arm = make_arm(panda)
     for opening in (0.0, 0.03, 0.08):
-        _, left, right = arm.hand_bodies(opening)
+        _, left, right = arm.hand_hulls(opening)
         gap = left[:, 1].min() - right[:, 1].max()
         assert gap == pytest.approx(opening, abs=5e-4)  # the pads are modelled 0.1 mm proud
 
 
 def test_palm_stays_behind_the_finger_depth(panda):
-    palm, *_ = make_arm(panda).hand_bodies(0.04)
+    palm, *_ = make_arm(panda).hand_hulls(0.04)
     assert palm[:, 2].max() < -HANDS["franka"].finger_depth
 
 

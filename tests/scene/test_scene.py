@@ -295,9 +295,9 @@ def test_an_object_needs_a_name_of_its_own(name):
 
 def test_a_mounted_hand_can_be_replaced():
     scene = Scene.load("log_iiwa_and_panda")
-    assert scene.mounted == {"iiwa": "wsg50"}
+    assert scene.replaceable_hands == {"iiwa": "wsg50"}
     changed = scene.with_hand("iiwa", "pr2")
-    assert changed.mounted == {"iiwa": "pr2"}
+    assert changed.replaceable_hands == {"iiwa": "pr2"}
     assert changed.arm("iiwa").hand == HANDS["pr2"]
     assert set(HANDS["pr2"].links) <= set(changed.arm("iiwa").robot.model.link_names)
     assert changed.arm("panda").hand == scene.arm("panda").hand

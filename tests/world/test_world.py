@@ -14,6 +14,7 @@ from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
 from symgrasp.world import BulletWorld, check_tasks
 from tests.conftest import load_small, write_scene
+from tests.world.link_pose import link_pose
 
 
 def names(collisions):
@@ -28,7 +29,7 @@ def test_links_are_where_forward_kinematics_puts_them():
             world.set_arm(arm, q, 0.05)
             links = arm.robot.model.forward(arm.robot_values(q, 0.05))
             for link, pose in zip(arm.robot.model.link_names, links, strict=True):
-                here = world.link_pose(arm.robot.name, link)
+                here = link_pose(world, arm.robot.name, link)
                 np.testing.assert_allclose(here, arm.robot.T_world_base @ pose, atol=1e-6)
 
 
@@ -110,10 +111,10 @@ def test_touch_links_may_touch_the_object_only():
     arm = scene.arm()
     with BulletWorld(scene) as world:
         world.set_arm(arm, arm.home, 0.08)
-        tip = world.link_pose("panda", "panda_leftfinger") @ translation([0, 0.005, 0.045])
+        tip = link_pose(world, "panda", "panda_leftfinger") @ translation([0, 0.005, 0.045])
         world.set_object(tip)  # the bottle's foot is inside the finger
         assert world.first_collision(arm) is None
-        world.set_object(world.link_pose("panda", "panda_hand"))
+        world.set_object(link_pose(world, "panda", "panda_hand"))
         hit = world.first_collision(arm)
         assert hit is not None
         assert (hit.reason, hit.a.link) == (Reason.OBJECT_COLLISION, "panda_hand")
@@ -205,10 +206,10 @@ def test_a_parked_robot_in_the_object_is_noticed(content, tmp_path):
 def test_resting_is_standing_on_something():
     scene = load_small("bottle_on_table")
     with BulletWorld(scene) as world:
-        assert world.rests(scene.task().T_world_object)
-        assert not world.rests(translation([0.55, 0, 0.1]))
+        assert world.object_rests(scene.task().T_world_object)
+        assert not world.object_rests(translation([0.55, 0, 0.1]))
         beside = translation([0.62 - 0.125 - 0.0376, -0.26, 0.15])  # touches the parcel from the side
-        assert not world.rests(beside)
+        assert not world.object_rests(beside)
 
 
 def test_worlds_do_not_disturb_each_other():

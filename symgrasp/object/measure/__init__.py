@@ -1,1 +1,1 @@
-"""Measures objects of revolution in meshes: axis, radii, symmetry."""
+"""Measuring an object of revolution from a triangle mesh: its axis, profile and deviation from symmetry."""

@@ -20,42 +20,49 @@ from symgrasp.poses import Array, from_rotation, inverse, rotation_about, transl
 __all__ = ["find_axis", "frame_along"]
 
 COLUMNS, FINE_COLUMNS = 48, 240
-"""Half-planes at which a candidate axis is judged, and at which the best one is refined."""
+"""Number of half-planes that a candidate axis is scored at, and that the best one is refined at."""
 
 ROWS, RINGS = 128, 32
-"""Heights at which the wall is sampled, and radii at which the ends are."""
+"""Number of heights at which the side wall is sampled, and of radii at which the two ends are."""
 
-STEPS = 20
-"""Most steps of the refinement; it usually converges in five."""
+MOST_STEPS = 20
+"""Largest number of steps of the refinement; it usually converges in five."""
 
-CONVERGED = 1e-6
-"""A step that moves no part of the object further than this share of its size is the last."""
+CONVERGED_STEP = 1e-6
+"""The refinement ends with a step that moves no part of the object further than this share of its size."""
 
-WORSE = 1.1
-"""A refinement that raises the score by more than this factor has lost its way."""
+DIVERGED = 1.1
+"""A refinement that raises the score (lower is better) by this factor has diverged and is dropped."""
 
-REFINED, HOPELESS = 3, 4.0
-"""How many of the candidates are refined at most; none whose score is this many times the best."""
+MOST_REFINED, HOPELESS_RATIO = 3, 4.0
+"""Largest number of candidates that are refined, and the largest ratio of their scores to the best one."""
 
-ALIKE = np.cos(np.deg2rad(2.0))
-"""Candidates whose directions are this close are one."""
+SAME_DIRECTION = np.cos(np.deg2rad(2.0))
+"""Candidates the cosine of whose angle is at least this have the same direction; one of them is refined."""
 
-EVEN = 1.02
-"""Candidates whose deviations are within this factor are equally good: a ball has many axes."""
+EQUALLY_GOOD = 1.02
+"""Candidates whose scores are within this factor are equally good: any line through its centre is an axis
+of a ball."""
 
 
-class _Samples(NamedTuple):
-    """Points of the outer surface beside their mean over the angle, in a candidate's frame."""
+class _SurfaceSamples(NamedTuple):
+    """Points of the outer surface in a candidate's axis frame, and their deviations from the mean over θ.
+
+    Attributes:
+        rho: (n,) distances from the axis (m).
+        h: (n,) heights along the axis (m).
+        theta: (n,) angles about the axis (rad).
+        normal: (n, 2) outward normals of the mean surface as (ρ, h).
+        deviation: (n,) signed distances outwards from the mean surface (m).
+        weight: (n,) areas that the points stand for, on any common scale.
+    """
 
     rho: Array
     h: Array
     theta: Array
     normal: Array
-    """(n, 2) outward normal of the mean surface as (ρ, h)"""
     deviation: Array
-    """(n,) signed distance outwards from the mean surface (m)"""
     weight: Array
-    """(n,) area that the point stands for, on any common scale"""
 
 
 def find_axis(mesh: trimesh.Trimesh) -> Array:
@@ -67,31 +74,38 @@ def find_axis(mesh: trimesh.Trimesh) -> Array:
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     size = float(np.linalg.norm(mesh.extents))
-    # Candidates are judged around the origin, so that nothing is lost far away from it.
+    # Candidates are scored around the origin, because coordinates far from it are less precise.
     local = vertices - centre
     candidates = _candidates(mesh, centre)
-    judged = [(_score(_sample(local, faces, pose, COLUMNS)), k, pose) for k, pose in enumerate(candidates)]
-    refined = [(*_refine(local, faces, pose, size, COLUMNS), k) for k, pose in _promising(judged)]
-    limit = EVEN * min(score for score, _, _ in refined)
+    scored = [(_score(_sample(local, faces, pose, COLUMNS)), k, pose) for k, pose in enumerate(candidates)]
+    refined = [(*_refine(local, faces, pose, size, COLUMNS), k) for k, pose in _best_directions(scored)]
+    limit = EQUALLY_GOOD * min(score for score, _, _ in refined)
     # Equally good ones keep the order of the candidates, which begins with the file's own axes.
     _, best = min((k, n) for n, (score, _, k) in enumerate(refined) if score <= limit)
     _, pose = _refine(local, faces, refined[best][1], size, FINE_COLUMNS)
     return translation(centre) @ pose
 
 
-def _promising(judged: list[tuple[float, int, Array]]) -> list[tuple[int, Array]]:
-    """Return the number and frame of the best candidates, each direction once."""
-    ordered = sorted(judged, key=lambda entry: entry[:2])
+def _best_directions(scored: list[tuple[float, int, Array]]) -> list[tuple[int, Array]]:
+    """Choose the candidates to refine: those with the best scores, each direction once.
+
+    Args:
+        scored: (score, index, axis frame (4, 4)) of every candidate.
+
+    Returns:
+        Index and axis frame of each chosen candidate, best first.
+    """
+    ordered = sorted(scored, key=lambda entry: entry[:2])
     chosen: list[tuple[int, Array]] = []
     for score, k, pose in ordered:
-        new = all(abs(pose[:3, 2] @ other[:3, 2]) < ALIKE for _, other in chosen)
-        if new and len(chosen) < REFINED and score <= HOPELESS * ordered[0][0] + 1e-9:
+        new = all(abs(pose[:3, 2] @ other[:3, 2]) < SAME_DIRECTION for _, other in chosen)
+        if new and len(chosen) < MOST_REFINED and score <= HOPELESS_RATIO * ordered[0][0] + 1e-9:
             chosen.append((k, pose))
     return chosen
 
 
 def frame_along(axis: Array, origin: Array) -> Array:
-    """Return the pose (4, 4) with that origin and z axis, its x axis as near as may be to x."""
+    """Return the pose (4, 4) with this z axis (3,) and origin (3,), its x axis as near to x as possible."""
     z = axis / np.linalg.norm(axis)
     across = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     x = across - (across @ z) * z
@@ -100,18 +114,21 @@ def frame_along(axis: Array, origin: Array) -> Array:
 
 
 def _candidates(mesh: trimesh.Trimesh, centre: Array) -> list[Array]:
-    """Return possible axis frames (4, 4), as seen from ``centre``."""
+    """Return candidate axis frames (4, 4) relative to ``centre``: of the file, of inertia, and of normals."""
     points, normals = mesh.triangles_center - centre, np.asarray(mesh.face_normals)
     areas = mesh.area_faces
     middle = np.average(points, axis=0, weights=areas)
     _, principal = np.linalg.eigh(np.cov((points - middle).T, aweights=areas))
     file_axes = [(axis, middle) for axis in np.eye(3)[::-1]]
     inertia = [(axis, middle) for axis in principal.T]
-    return [frame_along(axis, p) for axis, p in file_axes + inertia + _met_by_normals(points, normals, areas)]
+    return [
+        frame_along(axis, p)
+        for axis, p in file_axes + inertia + _lines_met_by_normals(points, normals, areas)
+    ]
 
 
-def _met_by_normals(points: Array, normals: Array, areas: Array) -> list[tuple[Array, Array]]:
-    """Return (direction, point) of the lines that the normals come closest to meeting.
+def _lines_met_by_normals(points: Array, normals: Array, areas: Array) -> list[tuple[Array, Array]]:
+    """Return (direction (3,), point (3,)) of the three lines that the normals come closest to meeting.
 
     The line through q along a has the moment m = q × a; it meets the normal n through p when
     ``n·m + (p × n)·a = 0``. Least squares over m leave an eigenvector problem for a. It is
@@ -137,22 +154,26 @@ def _met_by_normals(points: Array, normals: Array, areas: Array) -> list[tuple[A
 def _refine(
     vertices: Array, faces: np.ndarray, pose: Array, size: float, columns: int
 ) -> tuple[float, Array]:
-    """Move an axis frame to where the deviations have no first harmonic; return its score too."""
+    """Move an axis frame until the deviations have no first harmonic over θ.
+
+    Returns:
+        Score and pose (4, 4) of the refined frame, or of the given one where the refinement diverged.
+    """
     samples = _sample(vertices, faces, pose, columns)
     start = (_score(samples), pose)
-    for _ in range(STEPS):
+    for _ in range(MOST_STEPS):
         turn, shift = _correction(samples)
         angle = float(np.linalg.norm(turn))
         pose = pose @ from_rotation(rotation_about(turn / (angle or 1.0), angle), shift)
         samples = _sample(vertices, faces, pose, columns)
-        if angle * size + np.linalg.norm(shift) < CONVERGED * size:
+        if angle * size + np.linalg.norm(shift) < CONVERGED_STEP * size:
             break
     score = _score(samples)
-    return (score, pose) if score < WORSE * start[0] else start
+    return (score, pose) if score < DIVERGED * start[0] else start
 
 
-def _correction(samples: _Samples) -> tuple[Array, Array]:
-    """Return the turn (3,) (rad) and shift (3,) (m) of the frame that explain the deviations.
+def _correction(samples: _SurfaceSamples) -> tuple[Array, Array]:
+    """Return the rotation vector (3,) (rad) and shift (3,) (m) of the frame that explain the deviations.
 
     A rigid motion moves the surface along its normal by ``n · (t + ω × p)``; this is fitted by
     weighted least squares with Tukey's weights, which leave handles and inner walls out.
@@ -167,18 +188,18 @@ def _correction(samples: _Samples) -> tuple[Array, Array]:
     spread = 1.4826 * np.median(np.abs(samples.deviation)) + 1e-7
     inside = np.clip(1.0 - (samples.deviation / (4.685 * spread)) ** 2, 0.0, None)
     root = np.sqrt(samples.weight) * inside
-    # Small singular values belong to turns that hardly show, as those of a ball: leave them alone.
+    # Small singular values belong to turns that hardly change the surface, as those of a ball: ignore them.
     solution, *_ = np.linalg.lstsq(columns * root[:, None], samples.deviation * root, rcond=1e-3)
     return np.array([*solution[2:] / length, 0.0]), np.array([*solution[:2], 0.0])
 
 
-def _score(samples: _Samples) -> float:
-    """Return how far a surface is from symmetric (m), with little say for single large bumps."""
+def _score(samples: _SurfaceSamples) -> float:
+    """Return the weighted mean deviation (m) with exponent ½, so that few large deviations count little."""
     return float(np.average(np.sqrt(np.abs(samples.deviation)), weights=samples.weight) ** 2)
 
 
-def _sample(vertices: Array, faces: np.ndarray, pose: Array, columns: int) -> _Samples:
-    """Sample the wall and both ends of a mesh in a candidate's frame."""
+def _sample(vertices: Array, faces: np.ndarray, pose: Array, columns: int) -> _SurfaceSamples:
+    """Sample the side wall and both ends of a mesh in a candidate's axis frame ``pose`` (4, 4)."""
     to_frame = inverse(pose)
     local = vertices @ to_frame[:3, :3].T + to_frame[:3, 3]
     theta, cuts = column_angles(columns), cut(local, faces, columns)
@@ -187,20 +208,20 @@ def _sample(vertices: Array, faces: np.ndarray, pose: Array, columns: int) -> _S
     radii = (np.arange(RINGS) + 0.5) * (np.hypot(local[:, 0], local[:, 1]).max() / RINGS)
     wall, _ = envelope(cuts.column, cuts.h, cuts.r, heights, columns)
     # An angle without a surface counts as radius zero, or a wrong axis would look symmetric.
-    parts = [_beside_mean(heights, np.maximum(wall, 0.0), theta, "wall")]
+    parts = [_deviation_from_mean(heights, np.maximum(wall, 0.0), theta, "wall")]
     for sign in (-1.0, 1.0):
         end, _ = envelope(cuts.column, cuts.r, sign * cuts.h, radii, columns)
         whole = np.isfinite(end).all(axis=1)
         if whole.sum() >= 2:
-            parts.append(_beside_mean(radii[whole], end[whole], theta, "end", sign))
-    return _Samples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+            parts.append(_deviation_from_mean(radii[whole], end[whole], theta, "end", sign))
+    return _SurfaceSamples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _beside_mean(x: Array, y: Array, theta: Array, kind: str, sign: float = 1.0) -> _Samples:
-    """Compare one envelope y (rows, columns) over x (rows,) with its median over the angle.
+def _deviation_from_mean(x: Array, y: Array, theta: Array, kind: str, sign: float = 1.0) -> _SurfaceSamples:
+    """Return the deviations of an envelope y (rows, columns) over x (rows,) from its median over the angle.
 
-    The wall is a radius over heights. An end is a height, times the sign that makes it grow
-    outwards, over radii.
+    For the wall, y is the radius and x the height. For an end, x is the radius and y the height times
+    ``sign``, which makes it grow outwards.
     """
     mean = np.median(y, axis=1)
     slope = np.gradient(mean, x)
@@ -213,7 +234,7 @@ def _beside_mean(x: Array, y: Array, theta: Array, kind: str, sign: float = 1.0)
     else:
         rho, h, normal, step = spread, sign * y, (along, sign * across), x[1] - x[0]
         weight = spread * step
-    return _Samples(
+    return _SurfaceSamples(
         rho.ravel(),
         h.ravel(),
         np.broadcast_to(theta, y.shape).ravel(),

@@ -11,23 +11,23 @@ import trimesh
 from symgrasp.errors import MeshError
 from symgrasp.object.measure.axis import find_axis
 from symgrasp.object.measure.meridian import column_angles
-from symgrasp.object.measure.mesh_io import read_body
+from symgrasp.object.measure.mesh_io import read_single_object
 from symgrasp.object.measure.outline import distance_outside, simplify
-from symgrasp.object.measure.surface import COLUMNS, EDGE, Surface, stand_up, survey
+from symgrasp.object.measure.surface import COLUMNS, EDGE, OuterSurface, orient_upright, sample_surface
 from symgrasp.poses import Array, translation
 
-__all__ = ["SIMPLIFIED", "Measurement", "measure_mesh"]
+__all__ = ["SIMPLIFY_TOLERANCE", "Measurement", "measure_mesh"]
 
-SIMPLIFIED = 1.5e-4
-"""Largest difference (m) of r(h) between a measured profile and the few knots that stand for it."""
+SIMPLIFY_TOLERANCE = 1.5e-4
+"""Largest difference (m) of r(h) between the measured profile and its simplification to few knots."""
 
-COVERED = 0.9
-"""Share of the angles at which an open mesh must have a surface, at every height."""
+LEAST_COVERED = 0.9
+"""Smallest share of the angles at which an open mesh must have a surface, at every height."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What a mesh says about the object of revolution it shows.
+    """The object of revolution measured from a mesh: its profile, its pose and its deviation from symmetry.
 
     The object frame stands at the bottom end of the axis, z along it. Which end is the bottom: the
     lower one where the axis is within 10° of the file's vertical (y in GLB, z otherwise); else
@@ -42,9 +42,8 @@ class Measurement:
         heights: (k,) heights of the rows of `deviation` (m).
         angles: (m,) angles of its columns (rad).
         deviation: (k, m) how far the surface lies outside the profile (m), negative inside;
-            measured at right angles to the profile, so on a wall along the axis it is the radial
-            deviation, and a shoulder that is tilted counts for what it is. NaN where an open mesh
-            has no surface.
+            measured perpendicular to the profile, so on a wall parallel to the axis it is the radial
+            deviation. NaN where an open mesh has no surface.
         tolerance: largest deviation that was accepted (m).
         simplification: largest difference (m) of r(h) between the measured profile and ``points``.
     """
@@ -64,11 +63,6 @@ class Measurement:
         return np.nanmax(np.abs(self.deviation), axis=1)
 
     @property
-    def rms(self) -> Array:
-        """Root mean square deviation (k,) over the angle at each height (m)."""
-        return np.sqrt(np.nanmean(self.deviation**2, axis=1))
-
-    @property
     def worst(self) -> tuple[float, float, float]:
         """The largest absolute deviation (m), with its height (m) and angle (rad)."""
         row, column = np.unravel_index(np.nanargmax(np.abs(self.deviation)), self.deviation.shape)
@@ -82,9 +76,9 @@ class Measurement:
 
 
 def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | None = None) -> Measurement:
-    """Measure the object of revolution that a mesh shows, wherever it lies in its file.
+    """Measure the object of revolution that a mesh shows, in any pose within its file.
 
-    Only the outer surface counts; the inside of a hollow object may look as it likes.
+    Only the outer surface counts; the inside of a hollow object may have any shape.
 
     Args:
         path: an STL, OBJ, PLY, OFF or GLB file.
@@ -93,27 +87,29 @@ def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | Non
             radius if not given.
 
     Raises:
-        MeshError: the file is unusable (see `symgrasp.object.measure.mesh_io.read_body`), its surface is not
-            closed around an axis, or it deviates from symmetry by more than the tolerance.
+        MeshError: the file is unusable (see `symgrasp.object.measure.mesh_io.read_single_object`), its
+            surface is not closed around an axis, or it deviates from symmetry by more than the tolerance.
     """
     source = str(path)
     if tolerance is not None and not tolerance > 0:
         raise MeshError(source, "tolerance", tolerance, "a length in metres above zero")
-    mesh = read_body(path, scale)
-    T_mesh_object = stand_up(mesh, find_axis(mesh), vertical=1 if source.lower().endswith(".glb") else 2)
-    surface = survey(mesh, T_mesh_object)
+    mesh = read_single_object(path, scale)
+    T_mesh_object = orient_upright(
+        mesh, find_axis(mesh), vertical=1 if source.lower().endswith(".glb") else 2
+    )
+    surface = sample_surface(mesh, T_mesh_object)
     _check_closed(source, mesh, surface)
-    curve = _curve(surface)
-    points = simplify(curve, SIMPLIFIED)
+    curve = _measured_profile(surface)
+    points = simplify(curve, SIMPLIFY_TOLERANCE)
     bottom = points[0, 0]
-    outline = simplify(curve, 0.05 * SIMPLIFIED)
+    outline = simplify(curve, 0.05 * SIMPLIFY_TOLERANCE)
     deviation = _deviation(surface, outline, mesh.is_watertight)
     limit = max(1.5e-3, 0.03 * float(points[:, 1].max())) if tolerance is None else tolerance
     angles = _wrap(column_angles(COLUMNS))
     _check_symmetric(source, surface, outline, deviation, limit)
     rows = surface.even & (surface.levels > points[0, 0]) & (surface.levels < points[-1, 0])
     order = np.argsort(angles)
-    return _frozen(
+    return _read_only(
         Measurement(
             source,
             points - [bottom, 0.0],
@@ -127,14 +123,15 @@ def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | Non
     )
 
 
-def _frozen(measurement: Measurement) -> Measurement:
+def _read_only(measurement: Measurement) -> Measurement:
+    """Make the arrays of a measurement read-only, and return it."""
     for name in ("points", "T_mesh_object", "heights", "angles", "deviation"):
         getattr(measurement, name).setflags(write=False)
     return measurement
 
 
-def _check_closed(source: str, mesh: trimesh.Trimesh, surface: Surface) -> None:
-    """Refuse an open mesh with heights at which no surface goes around the axis."""
+def _check_closed(source: str, mesh: trimesh.Trimesh, surface: OuterSurface) -> None:
+    """Raise MeshError if an open mesh has a height at which its surface does not go around the axis."""
     if mesh.is_watertight:
         return
     low, high = surface.levels[0], surface.levels[-1]
@@ -142,7 +139,7 @@ def _check_closed(source: str, mesh: trimesh.Trimesh, surface: Surface) -> None:
     rows = (surface.levels > low + margin) & (surface.levels < high - margin)
     covered = (surface.radius[rows] > 0).mean(axis=1)
     worst = int(np.argmin(covered))
-    if covered[worst] < COVERED:
+    if covered[worst] < LEAST_COVERED:
         at = surface.levels[rows][worst] - low
         raise MeshError(
             source, "surface", f"open: found at {covered[worst]:.0%} of the angles at height {at:.3f} m",
@@ -151,20 +148,21 @@ def _check_closed(source: str, mesh: trimesh.Trimesh, surface: Surface) -> None:
 
 
 def _check_symmetric(
-    source: str, surface: Surface, outline: Array, deviation: Array, tolerance: float
+    source: str, surface: OuterSurface, outline: Array, deviation: Array, tolerance: float
 ) -> None:
-    """Refuse a surface that deviates by more than the tolerance anywhere, also between the columns."""
+    """Raise MeshError if the surface deviates by more than the tolerance, at a grid point or at a vertex."""
     grid = np.nan_to_num(deviation).ravel()
-    # Vertices are what sticks out furthest; those inside may belong to the inside of a hollow object.
+    # Vertices between the columns can stick out further than the grid shows. Those inside the profile are
+    # left out, because they may belong to the inner wall of a hollow object.
     corners = np.maximum(distance_outside(surface.corners[:, :2], outline), 0.0)
     at = np.column_stack(
         [np.repeat(surface.levels, COLUMNS), np.tile(column_angles(COLUMNS), len(deviation))]
     )
     values = np.concatenate([grid, corners])
-    places = np.concatenate([at, surface.corners[:, [0, 2]]])
+    positions = np.concatenate([at, surface.corners[:, [0, 2]]])
     worst = int(np.argmax(np.abs(values)))
     if abs(values[worst]) > tolerance:
-        height, angle = places[worst, 0] - outline[0, 0], np.rad2deg(_wrap(places[worst, 1]))
+        height, angle = positions[worst, 0] - outline[0, 0], np.rad2deg(_wrap(positions[worst, 1]))
         raise MeshError(
             source, "symmetry", f"{1e3 * values[worst]:+.1f} mm at height {height:.3f} m, angle {angle:.0f}°",
             f"a surface of revolution to within {1e3 * tolerance:.2g} mm",
@@ -172,13 +170,14 @@ def _check_symmetric(
 
 
 def _wrap(angle: Array) -> Array:
+    """Wrap angles (rad) into [-π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def _curve(surface: Surface) -> Array:
+def _measured_profile(surface: OuterSurface) -> Array:
     """Return the measured profile (n, 2) as [h, r], before it is simplified."""
-    # The median treats both ways of noise alike: on walls it averages radii, and beside a flat end
-    # or shoulder, where some angles already have a surface and others not yet, it finds the height.
+    # The median over θ suits noise in r and in h alike: on walls it averages radii, and at a flat end or
+    # shoulder, where only some angles have a surface at a height, it switches where half of them do.
     radii = np.median(surface.rho, axis=1)
     beside = np.abs(surface.rho - radii[:, None])[surface.rho > 0]
     noise = 1.4826 * float(np.median(beside))
@@ -190,15 +189,19 @@ def _curve(surface: Surface) -> Array:
 
 
 def _smooth_end(curve: Array, rings: Array, end: Array, noise: float) -> Array:
-    """Replace the first end of a profile, where it is flat but for noise, by a smooth one.
+    """Replace the lower end of a profile by a disc or a paraboloid, where it is one up to noise.
 
-    Near the axis few vertices share all angles, so the median does not average their noise.
+    Near the axis the same few vertices are seen at all angles, so the median over θ does not average
+    out their noise.
 
     Args:
         curve: (n, 2) as [h, r].
         rings: (m,) radii.
         end: (m,) height of the end surface at those radii.
         noise: standard deviation of the surface (m).
+
+    Returns:
+        The profile (m, 2) with the new end, or the given one where its end is neither.
     """
     spread = np.maximum.accumulate(end) - np.minimum.accumulate(end)  # NaN from the first gap on
     flat = spread <= np.minimum(6.0 * noise, 2.5 * noise + rings / 20.0) + 2.0 * EDGE
@@ -207,9 +210,9 @@ def _smooth_end(curve: Array, rings: Array, end: Array, noise: float) -> Array:
         return curve
     radii, width = rings[disc], rings[disc][-1]
     height = float(np.average(end[disc], weights=radii))
-    # Beyond a flat disc the wall begins; a round end goes on growing.
-    violations = np.interp(end[disc][-1] + 3.0 * noise, *curve.T)
-    if violations > 1.15 * width + (rings[1] - rings[0]):
+    # At the rim of a flat disc the wall begins, so r stays; at a round end r goes on growing.
+    beyond = np.interp(end[disc][-1] + 3.0 * noise, *curve.T)
+    if beyond > 1.15 * width + (rings[1] - rings[0]):
         return _round_end(curve, radii, end[disc])
     near, far = (curve[np.searchsorted(curve[:, 0], height + k * noise, side="right")] for k in (3, 6))
     slope = (far[1] - near[1]) / (far[0] - near[0]) if far[0] > near[0] else 0.0
@@ -218,19 +221,22 @@ def _smooth_end(curve: Array, rings: Array, end: Array, noise: float) -> Array:
 
 
 def _round_end(curve: Array, rings: Array, end: Array) -> Array:
-    """Replace the tip of a profile by the paraboloid that fits its rings, by their area."""
+    """Replace the tip of a profile by the paraboloid fitted to its rings, weighted by their areas."""
     columns = np.column_stack([np.ones_like(rings), rings**2])
     root = np.sqrt(rings)
     (apex, bend), *_ = np.linalg.lstsq(columns * root[:, None], end * root, rcond=None)
     r, rise = np.linspace(0.0, rings[-1], 12), bend * rings[-1] ** 2
-    violations = (curve[:, 0] > apex + rise) & (np.maximum.accumulate(curve[:, 1]) > rings[-1])
-    if len(rings) < 3 or rise < 10 * EDGE or not violations.any():
+    beyond = (curve[:, 0] > apex + rise) & (np.maximum.accumulate(curve[:, 1]) > rings[-1])
+    if len(rings) < 3 or rise < 10 * EDGE or not beyond.any():
         return curve
-    return np.concatenate([np.column_stack([apex + bend * r**2, r]), curve[violations]])
+    return np.concatenate([np.column_stack([apex + bend * r**2, r]), curve[beyond]])
 
 
-def _deviation(surface: Surface, outline: Array, closed: bool) -> Array:
-    """Return how far (levels, COLUMNS) the surface lies outside the measured profile (m)."""
+def _deviation(surface: OuterSurface, outline: Array, closed: bool) -> Array:
+    """Return by how much (levels, COLUMNS) the surface lies outside the measured profile (m).
+
+    NaN where an open mesh has no surface.
+    """
     points = np.column_stack([np.repeat(surface.levels, COLUMNS), surface.radius.ravel()])
     distance = distance_outside(points, outline).reshape(surface.radius.shape)
     return distance if closed else np.where(surface.radius == 0, np.nan, distance)

@@ -1,9 +1,8 @@
-"""Cutting a mesh by half-planes through an axis, and the outlines seen from outside.
+"""Sections of a mesh by half-planes through an axis (meridian sections), and their outer envelopes.
 
 A half-plane that ends in the axis and stands at angle θ cuts a mesh in line segments of (h, r).
-Seen from the side, their envelope over h is the outer radius; seen from an end, their envelope
-over r is the height of that end. Both are exact for the triangles, so nothing is lost to rays
-that slip through between them.
+The upper envelope of r over h is the outer radius; the envelope of h over r is the height of an
+end. Both are exact for the triangles: unlike ray casting, no ray can slip through between them.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ class Cuts(NamedTuple):
         column: (n,) index of the half-plane.
         h: (n, 2) heights of both ends.
         r: (n, 2) distances of both ends from the axis.
-        rho: (n, 2) the radius interpolated between the corners of the triangle. Corners lie on
-            the true surface and chords inside it, so this undoes the facets of a mesh.
+        rho: (n, 2) the radius interpolated linearly from those of the triangle's corners. Corners lie
+            on the true surface and flat facets inside it, so this undoes the faceting of a mesh.
     """
 
     column: np.ndarray
@@ -35,7 +34,7 @@ class Cuts(NamedTuple):
 
 
 def column_angles(columns: int) -> Array:
-    """Return the angles (columns,) (rad) of half-planes at equal distances all around."""
+    """Return the angles (columns,) (rad) of evenly spaced half-planes."""
     return np.linspace(0.0, 2 * np.pi, columns, endpoint=False) + np.pi / columns
 
 
@@ -47,7 +46,7 @@ def cut(vertices: Array, faces: np.ndarray, columns: int) -> Cuts:
         faces: (m, 3) vertex indices.
         columns: number of half-planes.
     """
-    face, column = _met(vertices, faces, columns)
+    face, column = _overlapping(vertices, faces, columns)
     corners = vertices[faces[face]]
     angle = column_angles(columns)[column][:, None]
     side = corners[..., 1] * np.cos(angle) - corners[..., 0] * np.sin(angle)
@@ -55,12 +54,12 @@ def cut(vertices: Array, faces: np.ndarray, columns: int) -> Cuts:
     rho = np.hypot(vertices[:, 0], vertices[:, 1])[faces[face]]
     crossing, ends = _crossings(side, np.stack([along, corners[..., 2], rho], axis=-1))
     outside = (ends[..., 0] >= 0).any(axis=1)
-    ends = _beyond_axis(ends[outside])
+    ends = _clip_at_axis(ends[outside])
     return Cuts(column[crossing][outside], ends[..., 1], ends[..., 0], ends[..., 2])
 
 
-def _met(vertices: Array, faces: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return (face, column) of all triangles and half-planes that may meet, and few others."""
+def _overlapping(vertices: Array, faces: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return (face (k,), column (k,)): every pair of triangle and half-plane whose angles overlap."""
     angle = np.arctan2(vertices[:, 1], vertices[:, 0])[faces]
     relative = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi
     low, high = relative.min(axis=1), relative.max(axis=1)
@@ -75,16 +74,20 @@ def _met(vertices: Array, faces: np.ndarray, columns: int) -> tuple[np.ndarray, 
 
 
 def _crossings(side: Array, values: Array) -> tuple[np.ndarray, Array]:
-    """Interpolate the values (n, 3, v) of corners where a triangle crosses ``side == 0``.
+    """Interpolate the values at the corners of triangles along the line ``side == 0``.
+
+    Args:
+        side: (n, 3) signed distances of the corners from the plane.
+        values: (n, 3, v) values at the corners.
 
     Returns:
-        Which triangles cross, and the values (m, 2, v) at both ends of the crossing.
+        Indices (m,) of the triangles that cross, and the values (m, 2, v) at both ends of the crossing.
     """
     above = side >= 0
     count = above.sum(axis=1)
     crossing = np.flatnonzero((count == 1) | (count == 2))
     side, values, above, count = side[crossing], values[crossing], above[crossing], count[crossing]
-    # The corner that lies alone on its side, then the two others.
+    # One corner lies alone on its side of the plane; the crossing runs between its two edges.
     alone = np.argmax(above == (count == 1)[:, None], axis=1)
     row = np.arange(len(crossing))
     ends = np.empty((len(crossing), 2, values.shape[2]))
@@ -95,8 +98,8 @@ def _crossings(side: Array, values: Array) -> tuple[np.ndarray, Array]:
     return crossing, ends
 
 
-def _beyond_axis(ends: Array) -> Array:
-    """Cut segments (m, 2, v) off where their first value, the distance along, is negative."""
+def _clip_at_axis(ends: Array) -> Array:
+    """Cut off the part of segments (m, 2, v) that lies behind the axis, where the first value is negative."""
     for k in (0, 1):
         behind = ends[:, k, 0] < 0
         inner, outer = ends[behind, k], ends[behind, 1 - k]
@@ -109,7 +112,7 @@ def _beyond_axis(ends: Array) -> Array:
 def envelope(
     column: np.ndarray, x: Array, y: Array, levels: Array, columns: int, companion: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return the largest y of segments at given x, for every column.
+    """Return the upper envelope of segments: the largest y at given x, for every column.
 
     Args:
         column: (n,) column of each segment.
@@ -120,7 +123,8 @@ def envelope(
         companion: (n, 2) a second value of both ends, y itself if not given.
 
     Returns:
-        y (k, columns), -inf where there is no segment, and the companion at the same point (NaN).
+        y (k, columns), -inf where there is no segment, and the companion at the same point, NaN where
+        there is none.
     """
     companion = y if companion is None else companion
     first = np.searchsorted(levels, x.min(axis=1), side="left")
@@ -128,7 +132,7 @@ def envelope(
     segment = np.repeat(np.arange(len(x)), count)
     level = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + first[segment]
     start, run = x[segment, 0], x[segment, 1] - x[segment, 0]
-    # A segment at one x shows its larger end.
+    # A vertical segment contributes its larger end.
     upright = np.where(y[segment, 1] > y[segment, 0], 1.0, 0.0)
     s = np.where(run == 0, upright, (levels[level] - start) / np.where(run == 0, 1.0, run))
     found = y[segment, 0] + s * (y[segment, 1] - y[segment, 0])

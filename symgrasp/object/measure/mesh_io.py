@@ -1,4 +1,4 @@
-"""Reading the mesh of one object that is to be measured, refusing what cannot be one."""
+"""Reading the mesh of a single object of plausible size from a file."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from symgrasp.errors import MeshError, one_of
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array
 
-__all__ = ["LARGEST", "MESH_ENDINGS", "SMALLEST", "read_body"]
+__all__ = ["LARGEST", "MESH_ENDINGS", "SMALLEST", "read_single_object"]
 
 MESH_ENDINGS = (".glb", ".obj", ".off", ".ply", ".stl")
 """File endings of the mesh formats that objects are measured from."""
 
 SMALLEST, LARGEST = 0.005, 10.0
-"""Sizes (m) that an object to be grasped may have; anything else is in other units."""
+"""Range of sizes (m) of an object to be grasped; a mesh outside it is taken to be in other units."""
 
-CONTACT = 1e-4
-"""Parts whose convex hulls come closer than this (m) are one body."""
+CONTACT_GAP = 1e-4
+"""Parts whose convex hulls come closer than this (m) belong to one object."""
 
 MOST_PARTS = 1000
-"""More unconnected parts than this are not sorted into bodies one by one."""
+"""Meshes with more unconnected parts than this are refused rather than sorted into objects."""
 
-FLAT = 1e-4
-"""A mesh that is thinner than this (m) is a sheet."""
+FLAT_THICKNESS = 1e-4
+"""A mesh that is thinner than this (m) is a flat sheet."""
 
 
-def read_body(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
+def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     """Read the mesh of a single object, in metres, with coinciding vertices merged.
 
     Args:
@@ -58,13 +58,13 @@ def read_body(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
         raise MeshError(path, "surface", "no area", "triangles that enclose an object")
     mesh.remove_unreferenced_vertices()
     _check_size(path, mesh, scale)
-    _check_solid(path, mesh)
-    _check_single(path, mesh)
+    _check_not_flat(path, mesh)
+    _check_one_object(path, mesh)
     return mesh
 
 
 def _check_content(path: Path) -> None:
-    """Compare what the file holds with what its ending says."""
+    """Raise MeshError unless the file can be read and its content is of the format that its ending says."""
     ending = path.suffix.lower()
     if ending not in MESH_ENDINGS:
         raise MeshError(path, "ending", path.suffix, one_of(MESH_ENDINGS, ending))
@@ -74,13 +74,13 @@ def _check_content(path: Path) -> None:
         raise MeshError(path, "file", error.strerror or str(error), "a mesh file that can be read") from error
     if not content.strip():
         raise MeshError(path, "content", "empty file", f"a mesh in {ending[1:].upper()} format")
-    kind = _kind(content)
+    kind = _ending_of_content(content)
     if kind != ending:
         found = f"{kind[1:].upper()} data" if kind else f"other or incomplete data ({len(content)} bytes)"
         raise MeshError(path, "content", found, f"a complete {ending[1:].upper()} file, as its ending says")
 
 
-def _kind(content: bytes) -> str | None:
+def _ending_of_content(content: bytes) -> str | None:
     """Return the ending that fits the content of a mesh file, or None."""
     if content.startswith(b"glTF"):
         return ".glb"
@@ -99,6 +99,7 @@ def _kind(content: bytes) -> str | None:
 
 
 def _check_size(path: Path, mesh: trimesh.Trimesh, scale: float) -> None:
+    """Raise MeshError if the largest extent of the mesh is outside `SMALLEST` to `LARGEST`."""
     size = float(mesh.extents.max())
     if size > LARGEST:
         raise MeshError(
@@ -112,15 +113,16 @@ def _check_size(path: Path, mesh: trimesh.Trimesh, scale: float) -> None:
         )  # fmt: skip
 
 
-def _check_solid(path: Path, mesh: trimesh.Trimesh) -> None:
+def _check_not_flat(path: Path, mesh: trimesh.Trimesh) -> None:
+    """Raise MeshError if the mesh is a flat sheet."""
     offset = mesh.vertices - mesh.vertices.mean(axis=0)
     thinnest = np.linalg.eigh(offset.T @ offset)[1][:, 0]
-    if np.ptp(offset @ thinnest) < FLAT:
+    if np.ptp(offset @ thinnest) < FLAT_THICKNESS:
         raise MeshError(path, "surface", "a flat sheet", "triangles that enclose an object")
 
 
-def _check_single(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Refuse bodies that lie apart; parts that touch, overlap or enclose each other are one."""
+def _check_one_object(path: Path, mesh: trimesh.Trimesh) -> None:
+    """Raise MeshError if the mesh shows several objects: parts that neither touch nor enclose each other."""
     labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
     count = int(labels.max()) + 1
     # Faces that only share a vertex are not adjacent, but their hulls touch.
@@ -128,12 +130,12 @@ def _check_single(path: Path, mesh: trimesh.Trimesh) -> None:
         raise MeshError(path, "bodies", f"{count} unconnected parts", "one connected body")
     areas = np.bincount(labels, mesh.area_faces)
     parts = [mesh.vertices[np.unique(mesh.faces[labels == k])] for k in np.argsort(-areas)]
-    body, apart = _corners(parts[0]), [_corners(part) for part in parts[1:]]
+    largest, apart = _corners(parts[0]), [_corners(part) for part in parts[1:]]
     absorbed = True
     while apart and absorbed:
-        touching = [not _separable(body, part) for part in apart]
+        touching = [not _separable(largest, part) for part in apart]
         absorbed = any(touching)
-        body = np.concatenate([body, *(p for p, t in zip(apart, touching, strict=True) if t)])
+        largest = np.concatenate([largest, *(p for p, t in zip(apart, touching, strict=True) if t)])
         apart = [p for p, t in zip(apart, touching, strict=True) if not t]
     if apart:
         where = ", ".join(f"{x:.3g}" for x in apart[0].mean(axis=0))
@@ -143,17 +145,17 @@ def _check_single(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def _corners(points: Array) -> Array:
-    """Return the corners (m, 3) of the convex hull of points, also of flat ones."""
+    """Return the corners (m, 3) of the convex hull of points (n, 3), which may lie in a plane."""
     return points[ConvexHull(points, qhull_options="QJ").vertices] if len(points) > 4 else points
 
 
 def _separable(a: Array, b: Array) -> bool:
-    """Whether a plane keeps two point sets (n, 3) apart by more than `CONTACT` (m)."""
+    """Whether a plane separates two point sets (n, 3) by more than `CONTACT_GAP` (m): a linear program."""
     centre = a.mean(axis=0)
     # Find n, c with n·a - c >= 1 and n·b - c <= -1: the gap is 2 / |n|, so |n| is bounded.
     rows = np.concatenate([-(a - centre), b - centre])
     sign = np.concatenate([np.ones(len(a)), -np.ones(len(b))])
-    bound = 2.0 / CONTACT
+    bound = 2.0 / CONTACT_GAP
     result = linprog(
         np.zeros(4),
         A_ub=np.column_stack([rows, sign]),

@@ -1,4 +1,4 @@
-"""Outlines in the half-plane (h, r): simplification and distances."""
+"""Outlines (h, r) of solids of revolution in a half-plane through the axis: simplification and distances."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from symgrasp.poses import Array
 __all__ = ["distance_outside", "simplify"]
 
 SPACING = 1e-4
-"""Outlines are sampled this densely (m) to find the segment that a point is nearest to."""
+"""Distance (m) of the samples on an outline that tell which segment a point is nearest to."""
 
 
 def distance_outside(points: Array, outline: Array) -> Array:
-    """Return how far points lie outside a solid of revolution, negative inside it.
+    """Return the signed distances (n,) (m) of points from a solid of revolution, negative inside it.
 
     Args:
         points: (n, 2) as [h, r].
@@ -37,10 +37,10 @@ def distance_outside(points: Array, outline: Array) -> Array:
 
 
 def simplify(outline: Array, tolerance: float) -> Array:
-    """Return few of the knots (n, 2) as [h, r] that keep r(h) within a tolerance (m) everywhere.
+    """Return a subset of the knots (n, 2) as [h, r] that keeps r(h) within a tolerance (m) everywhere.
 
-    The algorithm of Ramer, Douglas and Peucker with the distance along r: the knot that stands out
-    most is kept first, so shoulders stay sharp.
+    The algorithm of Ramer, Douglas and Peucker with the distance along r: the knot with the largest
+    error is kept first, so shoulders stay sharp.
     """
     h, r = outline.T
     kept = np.zeros(len(outline), dtype=bool)

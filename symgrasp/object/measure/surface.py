@@ -11,34 +11,34 @@ from symgrasp.object.measure.axis import frame_along
 from symgrasp.object.measure.meridian import cut, envelope
 from symgrasp.poses import Array, inverse
 
-__all__ = ["COLUMNS", "EDGE", "Surface", "stand_up", "survey"]
+__all__ = ["COLUMNS", "EDGE", "OuterSurface", "orient_upright", "sample_surface"]
 
 COLUMNS = 240
-"""Angles at which the surface is measured."""
+"""Number of angles at which the surface is sampled."""
 
 STEP, FEWEST_ROWS, MOST_ROWS = 1e-4, 200, 4000
-"""Distance (m) of the heights at which it is measured, and how many they are."""
+"""Distance (m) of the evenly spaced heights at which it is sampled, and the bounds of their number."""
 
 RINGS = 96
-"""Radii at which the ends are measured."""
+"""Number of radii at which the two ends are sampled."""
 
 EDGE = 1e-6
-"""Distance (m) from a ring of vertices at which the profile is measured on either side of it."""
+"""The profile is sampled this far (m) below and above every ring of vertices."""
 
 UPRIGHT = np.cos(np.deg2rad(10.0))
-"""An axis this near to the file's own vertical is taken to stand in the file as it stands."""
+"""An axis within 10° of the file's vertical (this is the cosine) is taken to point up in the file."""
 
 
-class Surface(NamedTuple):
+class OuterSurface(NamedTuple):
     """The outer surface of a mesh in its object frame, over a grid.
 
     Attributes:
         levels: (k,) heights of the rows.
         even: (k,) bool, which of them are evenly spaced.
         radius: (k, COLUMNS) distance of the outermost surface from the axis, 0 where there is none.
-        rho: (k, COLUMNS) the same with facets undone, 0 where there is none.
+        rho: (k, COLUMNS) the same with the faceting of the mesh undone, see `Cuts`; 0 where there is none.
         rings: (RINGS,) radii.
-        ends: (2, RINGS) height of the bottom and of the top at those radii, NaN where open.
+        ends: (2, RINGS) height of the bottom and of the top at those radii, NaN where the end is open.
         corners: (n, 3) height, distance from the axis and angle of the vertices.
     """
 
@@ -51,8 +51,8 @@ class Surface(NamedTuple):
     corners: Array
 
 
-def survey(mesh: trimesh.Trimesh, T_mesh_object: Array) -> Surface:
-    """Measure the outer surface of a mesh in an object frame."""
+def sample_surface(mesh: trimesh.Trimesh, T_mesh_object: Array) -> OuterSurface:
+    """Sample the outer surface of a mesh around the z axis of its object frame ``T_mesh_object`` (4, 4)."""
     to_object = inverse(T_mesh_object)
     vertices = mesh.vertices @ to_object[:3, :3].T + to_object[:3, 3]
     cuts = cut(vertices, np.asarray(mesh.faces), COLUMNS)
@@ -65,14 +65,16 @@ def survey(mesh: trimesh.Trimesh, T_mesh_object: Array) -> Surface:
         ends.append(np.where(np.isfinite(heights).all(axis=1), sign * np.median(heights, axis=1), np.nan))
     x, y, h = vertices.T
     corners = np.column_stack([h, np.hypot(x, y), np.arctan2(y, x)])
-    return Surface(levels, even, np.maximum(radius, 0.0), np.nan_to_num(rho), rings, np.array(ends), corners)
+    return OuterSurface(
+        levels, even, np.maximum(radius, 0.0), np.nan_to_num(rho), rings, np.array(ends), corners
+    )
 
 
 def _levels(heights: Array) -> tuple[Array, np.ndarray]:
-    """Return heights to measure at, and which are even.
+    """Return the heights (k,) to sample at, given those of the vertices, and which are evenly spaced (k,).
 
-    Where many vertices share a height the profile may bend or jump there, so it is measured just
-    below and just above: that is what keeps shoulders sharp.
+    Where many vertices share a height the profile may bend or jump, so it is sampled just below and
+    just above: that keeps shoulders sharp.
     """
     bottom, top = heights.min(), heights.max()
     count = int(np.clip((top - bottom) / STEP, FEWEST_ROWS, MOST_ROWS))
@@ -88,23 +90,29 @@ def _levels(heights: Array) -> tuple[Array, np.ndarray]:
     return levels, first < count
 
 
-def stand_up(mesh: trimesh.Trimesh, T_mesh_axis: Array, vertical: int) -> Array:
-    """Turn an axis frame so that its z points from the bottom to the top of the object."""
+def orient_upright(mesh: trimesh.Trimesh, T_mesh_axis: Array, vertical: int) -> Array:
+    """Return an axis frame (4, 4) whose z axis points from the bottom to the top of the object.
+
+    Args:
+        mesh: the mesh.
+        T_mesh_axis: pose (4, 4) whose z axis is the axis of revolution, pointing either way.
+        vertical: index of the file's vertical coordinate.
+    """
     axis, origin = T_mesh_axis[:3, 2], T_mesh_axis[:3, 3]
     if abs(axis[vertical]) >= UPRIGHT:
         return frame_along(axis * np.sign(axis[vertical]), origin)
-    surface = survey(mesh, T_mesh_axis)
+    surface = sample_surface(mesh, T_mesh_axis)
     upright = _points_up(surface)
     if upright is None:
         upright = bool(axis[2] >= 0)
     return frame_along(axis if upright else -axis, origin)
 
 
-def _points_up(surface: Surface) -> bool | None:
-    """Whether the bottom of an object is the end with the lower h; None where both look alike."""
+def _points_up(surface: OuterSurface) -> bool | None:
+    """Whether the end with the lower h is the bottom, see `Measurement`; None where both ends look alike."""
     low, high = surface.levels[0], surface.levels[-1]
     height = high - low
-    # How far an end lies back near the axis, as in the mouth of a glass; a hole goes all through.
+    # Depth of the hollow around the axis at each end, as in a glass; an open end counts as a through hole.
     inner = np.median(surface.ends[:, : RINGS // 8], axis=1)
     hollow = np.nan_to_num(np.abs(inner - [low, high]), nan=height)
     if abs(hollow[0] - hollow[1]) > 0.1 * height:

@@ -95,7 +95,7 @@ def test_a_link_is_short_and_readable():
 def test_objects_of_the_library_and_hands_come_back():
     cache = SharedCache("log_iiwa_and_panda")
     scene, object_choice = cache.linked(parse_link("object=log_70mm&hand.iiwa=pr2"))
-    assert scene.mounted["iiwa"] == "pr2"
+    assert scene.replaceable_hands["iiwa"] == "pr2"
     assert object_choice
     assert object_choice.option == "log_70mm"
     state = replace(State.of(scene, "log_iiwa_and_panda"), object_choice=object_choice)

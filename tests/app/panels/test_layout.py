@@ -12,8 +12,8 @@ import sys
 
 import pytest
 
-from app.server.serve import serve
 from app.html.readout import grasp_html, map_title, notes_html, solution_html, status_html
+from app.server.serve import serve
 from app.state import changes, job_changes
 from app.state.requests import MapResult
 from app.state.state import State

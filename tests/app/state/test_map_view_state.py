@@ -33,9 +33,10 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.poses import rotation_z
 from symgrasp.reason import Reason
-from symgrasp.world import Body, BulletWorld
+from symgrasp.world import BodyName, BulletWorld
 from tests.app.state.test_state import opened
 from tests.conftest import load_small
+from tests.world.link_pose import link_pose
 
 
 @pytest.fixture(scope="module")
@@ -299,16 +300,16 @@ def test_the_red_shapes_are_those_of_the_bodies():
     with BulletWorld(scene) as world:
         world.park("panda")
         for link in ("panda_link4", "panda_hand"):
-            mesh, at = body_mesh(scene, Body("panda", link), pose)
+            mesh, at = body_mesh(scene, BodyName("panda", link), pose)
             corners = [shape.vertices for shape in world.shapes("panda")[link]]
-            seen = transform_points(np.vstack(corners), world.link_pose("panda", link))
+            seen = transform_points(np.vstack(corners), link_pose(world, "panda", link))
             assert np.abs(bounds(transform_points(mesh.vertices, at)) - bounds(seen)).max() < 0.004
     for o in scene.obstacles:
-        mesh, at = body_mesh(scene, Body(o.name, ""), pose)
+        mesh, at = body_mesh(scene, BodyName(o.name, ""), pose)
         size = {"box": o.size, "cylinder": (2 * o.size[0], 2 * o.size[0], o.size[-1])}[o.kind]
         assert np.abs(mesh.extents - size).max() < 0.004
         assert np.array_equal(at, o.T_world_obstacle)
-    mesh, at = body_mesh(scene, Body(scene.file.object.name, ""), pose)
+    mesh, at = body_mesh(scene, BodyName(scene.file.object.name, ""), pose)
     profile = scene.profile
     expected = [[-profile.r_max] * 2 + [profile.h_min], [profile.r_max] * 2 + [profile.h_max]]
     assert np.abs(bounds(mesh.vertices) - expected).max() < 0.004
@@ -339,7 +340,7 @@ def test_the_candidates_are_drawn_by_redundancy_and_branch(bench):
 def test_names_in_verdicts_are_escaped(bench):
     state = opened()
     hit = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
-    evil = Body("<img src=x>", "<b>")
+    evil = BodyName("<img src=x>", "<b>")
     shown_candidate = hit.shown_candidate
     collisions = tuple(c._replace(a=evil) for c in shown_candidate.collisions)
     first = replace(shown_candidate, collisions=collisions)

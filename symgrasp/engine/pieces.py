@@ -1,8 +1,8 @@
-"""Convex pieces packed into arrays: what the compiled distance computation works on.
+"""Convex pieces, of which all collision geometry is made, packed into arrays for compiled code.
 
-A piece is the convex hull of its vertices, blown up by a ball (its rounding); or, revolved, the hull
-of the circles that its vertices (r, 0, h) draw about its own z. The shape that PyBullet has may fall
-short of the piece by its slack, and never exceeds it.
+A piece is the convex hull of its vertices, enlarged by a ball (its rounding); or, if revolved, the convex
+hull of the circles that its vertices (r, 0, h) describe about its z axis. The shape that PyBullet has is
+contained in the piece, and smaller by at most the slack.
 """
 
 from __future__ import annotations
@@ -15,26 +15,28 @@ from scipy.spatial import ConvexHull, QhullError
 
 from symgrasp.poses import Array
 
-__all__ = ["SEEDS", "Piece", "Solids", "pack", "pose_rows"]
+__all__ = ["SEEDS", "PackedPieces", "Piece", "pack", "pose_rows"]
 
 BRUTE = 12
-"""Up to this many vertices are searched one by one; more are climbed along the edges of the hull."""
+"""Hulls of at most this many vertices are searched vertex by vertex for their extreme point; larger ones by
+hill climbing along their edges."""
 
 SEED_GRID = 4
-"""Climbs start from the best vertex for the nearest of this many by this many directions on each
-face of a cube."""
+"""Hill climbing starts from the extreme vertex for one of a set of directions: a grid of this many by this
+many on each face of a cube."""
 
 SEEDS = 6 * SEED_GRID * SEED_GRID
+"""Number of these directions."""
 
 
 class Piece(NamedTuple):
-    """A convex piece in the frame of what it moves with.
+    """A convex piece, in the frame of the link or body that it belongs to.
 
     Attributes:
-        vertices: (n, 3) corners.
-        rounding: radius (m) of the ball around it.
-        slack: by how much (m) the true shape may fall short; inf where nothing is known.
-        revolved: whether the vertices are turned about z.
+        vertices: (n, 3) vertices.
+        rounding: radius (m) of the ball that the hull is enlarged by.
+        slack: by how much (m) the true shape may be smaller; inf where that is unknown.
+        revolved: whether the vertices are to be rotated about z.
     """
 
     vertices: Array
@@ -43,17 +45,17 @@ class Piece(NamedTuple):
     revolved: bool = False
 
 
-class Solids(NamedTuple):
-    """Many pieces, as numba wants them. V vertices in all, P pieces.
+class PackedPieces(NamedTuple):
+    """P pieces with V vertices in all, as arrays.
 
     Attributes:
         vertices: (V, 3).
         edge_start: (V + 1,) where the neighbours of each vertex begin in ``edges``.
-        edges: neighbours of the vertices on their hull.
-        seeds: (S, SEEDS) vertices to begin a climb at; see `SEED_GRID`.
-        ranges: (P, 3) first vertex, end of the vertices, and row of ``seeds`` or -1.
+        edges: indices of the vertices that share an edge of the hull with each vertex.
+        seeds: (S, SEEDS) vertices to start hill climbing from, see `SEED_GRID`; S hulls are large.
+        ranges: (P, 3) first vertex, one past the last vertex, and row of ``seeds`` or -1.
         size: (P, 9) rounding, slack, whether revolved, and centre and half extents of the box around
-            it without its rounding.
+            the piece in its own frame, without its rounding.
     """
 
     vertices: Array
@@ -64,8 +66,8 @@ class Solids(NamedTuple):
     size: Array
 
 
-def pack(pieces: Sequence[Piece]) -> Solids:
-    """Pack pieces into arrays."""
+def pack(pieces: Sequence[Piece]) -> PackedPieces:
+    """Pack pieces into arrays; their vertices are reduced to those of their hulls where it pays."""
     vertices: list[Array] = []
     starts: list[np.ndarray] = []
     edges: list[np.ndarray] = []
@@ -88,7 +90,7 @@ def pack(pieces: Sequence[Piece]) -> Solids:
             low[:2], high[:2] = -high[0], high[0]
         size[k] = [piece.rounding, piece.slack, piece.revolved, *(0.5 * (low + high)), *(0.5 * (high - low))]
         first, edge = first + len(corners), edge + len(neighbours)
-    return Solids(
+    return PackedPieces(
         np.concatenate(vertices) if vertices else np.zeros((0, 3)),
         np.concatenate([*starts, [edge]]).astype(np.uint32),
         np.concatenate([*edges, np.zeros(0)]).astype(np.uint32),
@@ -99,20 +101,20 @@ def pack(pieces: Sequence[Piece]) -> Solids:
 
 
 def pose_rows(poses: Array) -> Array:
-    """Write poses (..., 4, 4) as rows (..., 12): the rotation's rows, then the position."""
+    """Return poses (..., 4, 4) as rows (..., 12): the rotation matrix row by row, then the position."""
     poses = np.asarray(poses, dtype=float)
     rotation = poses[..., :3, :3].reshape(*poses.shape[:-2], 9)
     return np.concatenate([rotation, poses[..., :3, 3]], axis=-1)
 
 
 def _hull(points: Array) -> tuple[Array, np.ndarray | None]:
-    """Return the corners of a hull and, where it is worth climbing, its triangles."""
+    """Return the vertices of the hull of points and, where it is large enough to climb on, its triangles."""
     points = np.unique(np.asarray(points, dtype=float), axis=0)
     if len(points) <= BRUTE:
         return points, None
     try:
         hull = ConvexHull(points)
-    except QhullError:  # flat: there is no surface to climb on
+    except QhullError:  # the points lie in a plane, so there are no triangles
         return points, None
     order = np.full(len(points), -1)
     order[hull.vertices] = np.arange(len(hull.vertices))
@@ -129,7 +131,7 @@ def _neighbours(count: int, triangles: np.ndarray | None) -> tuple[np.ndarray, n
 
 
 def _seed_directions() -> Array:
-    """Return the middles (SEEDS, 3) of the cube's cells, in the order `seed` counts them."""
+    """Return the centres (SEEDS, 3) of the cells on the cube, in the order of `distance._seed`."""
     middle = (np.arange(SEED_GRID) + 0.5) / SEED_GRID * 2.0 - 1.0
     u, v = (part.ravel() for part in np.meshgrid(middle, middle, indexing="ij"))
     faces = []

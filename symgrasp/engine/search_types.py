@@ -1,0 +1,117 @@
+"""Input and result of the compiled search of a map, and the arrays that it works on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.poses import Array
+
+__all__ = [
+    "BLOCKED",
+    "FEASIBLE",
+    "HIT",
+    "LIMITS",
+    "RETREAT_UNDECIDED",
+    "UNDECIDED_KEPT",
+    "UNREACHABLE",
+    "BranchScratch",
+    "RowChecks",
+    "SearchInput",
+    "SearchResult",
+]
+
+UNDECIDED_KEPT = 32
+"""Largest number of undecided candidates of a cell that are listed; where there are more, all candidates
+have to be decided."""
+
+UNREACHABLE, LIMITS, HIT, BLOCKED, RETREAT_UNDECIDED, FEASIBLE = 0, 1, 2, 3, 4, 5
+"""Status of a cell: no branch reaches it, none inside the limits, all collide, all are blocked on the
+retreat, or one is feasible. RETREAT_UNDECIDED is that of a single candidate which PyBullet must decide."""
+
+
+class SearchInput(NamedTuple):
+    """What to search: m cells in r runs of equal length, each run being all cells of one row and roll.
+
+    Attributes:
+        sample_order: (K,) indices of the redundancy samples, in the order to try them.
+        T_world_base: (4, 4) pose of the robot's base.
+        T_base_tool: (m, 4, 4) tool poses of the cells, run by run.
+        row: (r,) row of each run.
+        retreat: (s,) signed distances (m) along the approach that must be free as well, in order.
+        margin: distance (m) to keep from static pieces.
+        clearance: the clearance (m) of pieces that the arm does not move; that of a candidate is not
+            larger.
+        always_collides: whether pieces that the arm does not move collide, so that no candidate is free.
+        chunks: number of parts that the cells are split into for the threads.
+    """
+
+    sample_order: np.ndarray
+    T_world_base: Array
+    T_base_tool: Array
+    row: np.ndarray
+    retreat: Array
+    margin: float
+    clearance: float
+    always_collides: bool
+    chunks: int
+
+
+class SearchResult(NamedTuple):
+    """What was found for each of m cells.
+
+    Attributes:
+        status: (m,) one of the constants above, never RETREAT_UNDECIDED. Where it is not FEASIBLE and
+            candidates are undecided, it is that of the others.
+        pair: (m, 2) indices of the pieces of which the first hits the second, -1 where none is known.
+        depth: (m,) by how much (m) the pair is closer than allowed at least.
+        q: (m, n) joint values of the best candidate.
+        solution: (m, 2) redundancy sample and branch of the best candidate.
+        clearance: (m,) lower bound of its clearance (m).
+        undecided_count: (m,) number of undecided candidates.
+        undecided_q: (m, UNDECIDED_KEPT, n) joint values of the first of them.
+        undecided_solution: (m, UNDECIDED_KEPT, 2) their redundancy samples and branches.
+    """
+
+    status: np.ndarray
+    pair: np.ndarray
+    depth: Array
+    q: Array
+    solution: np.ndarray
+    clearance: Array
+    undecided_count: np.ndarray
+    undecided_q: Array
+    undecided_solution: np.ndarray
+
+
+class RowChecks(NamedTuple):
+    """Results of `check_row` for each of r runs, at the grasp and at each of the s steps of the retreat.
+
+    Attributes:
+        gap: (r, 1 + s) clearance (m), UNDECIDED, or -inf for a collision.
+        hit: (r, 1 + s, 2) the pair of pieces that collides.
+        depth: (r, 1 + s) by how much (m) the pair is closer than allowed at least.
+    """
+
+    gap: Array
+    hit: np.ndarray
+    depth: Array
+
+
+class BranchScratch(NamedTuple):
+    """Arrays that one thread writes inverse kinematics to: index 0 at the grasp, index 1 on the retreat.
+
+    Attributes:
+        q: (2, BRANCHES, n) joint values.
+        exists: (2, BRANCHES) which branches reach the pose.
+        inside: (2, BRANCHES) which branches reach it inside the limits.
+        at: (n,) present joint values on the retreat.
+        T: (4, 4) present tool pose on the retreat.
+    """
+
+    q: Array
+    exists: np.ndarray
+    inside: np.ndarray
+    at: Array
+    T: Array

@@ -1,0 +1,168 @@
+"""Loading the bodies of a scene into a PyBullet client: robots, obstacles and the object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+
+from symgrasp.errors import MeshError, SymgraspError
+from symgrasp.meshes import read_mesh
+from symgrasp.poses import Array
+from symgrasp.robot.model import RobotModel
+from symgrasp.scene.parts import Obstacle
+from symgrasp.scene.scene import Scene
+from symgrasp.world.client import link_names, load_urdf, pybullet, xyzw
+from symgrasp.world.collision import BodyName
+
+__all__ = ["MovableJoint", "SceneBodies"]
+
+MOST_TRIANGLES = 60_000
+"""PyBullet does not accept more triangles than this in one mesh."""
+
+
+class MovableJoint(NamedTuple):
+    """A joint of a robot in PyBullet; its value is ``ratio · values[source] + offset``.
+
+    Attributes:
+        joint: PyBullet's index of the joint.
+        source: index into the joint values of the robot's model.
+        ratio: 1 unless the joint mimics another.
+        offset: 0 unless the joint mimics another.
+    """
+
+    joint: int
+    source: int
+    ratio: float
+    offset: float
+
+
+class SceneBodies:
+    """The bodies of a scene in a PyBullet client, with their collision margins set to zero.
+
+    Args:
+        client: PyBullet's id of the physics client to load them into.
+        scene: the scene.
+
+    Raises:
+        UrdfError: PyBullet could not use all shapes of a URDF.
+        MeshError: an obstacle's mesh is unusable.
+        SymgraspError: PyBullet cannot make a shape.
+
+    Attributes:
+        client: PyBullet's id of the physics client.
+        links: body id → names of its links -1, 0, 1, … in PyBullet's order.
+        names: body id → name in the scene.
+        robots: name → body id.
+        joints: name of a robot → its movable joints.
+        obstacles: body ids of the obstacles.
+        object: body ids of the object's convex pieces.
+        closed_meshes: (name, mesh in world coordinates) of every obstacle that is a closed mesh.
+    """
+
+    def __init__(self, client: int, scene: Scene) -> None:
+        self.client = client
+        self.links: dict[int, tuple[str, ...]] = {}
+        self.names: dict[int, str] = {}
+        self.robots = {
+            r.name: self._load_urdf(r.model, r.name, r.T_world_base) for r in scene.robots.values()
+        }
+        self.joints = {name: self._movable_joints(name, robot.model) for name, robot in scene.robots.items()}
+        self.closed_meshes: list[tuple[str, trimesh.Trimesh]] = []
+        self.obstacles = [self._load_obstacle(o) for o in scene.obstacles]
+        self.object = self._load_object(scene)
+
+    def body_name(self, body: int, link: int) -> BodyName:
+        """Return the name of a link, given PyBullet's body id and link index (-1 for the base)."""
+        return BodyName(self.names[body], self.links[body][link + 1])
+
+    def link_indices(self, robot: str) -> dict[str, int]:
+        """Return link name → PyBullet's link index (-1 for the base) of a robot."""
+        return {link: i - 1 for i, link in enumerate(self.links[self.robots[robot]])}
+
+    def _register(self, body: int, name: str, links: Sequence[str]) -> int:
+        self.names[body] = name
+        self.links[body] = tuple(links)
+        for link in range(-1, len(links) - 1):
+            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=self.client)
+        return body
+
+    def _load_urdf(self, model: RobotModel, name: str, pose: Array) -> int:
+        body = load_urdf(self.client, model, pose)
+        return self._register(body, name, link_names(self.client, body))
+
+    def _movable_joints(self, name: str, model: RobotModel) -> list[MovableJoint]:
+        index = self.link_indices(name)  # PyBullet gives a joint the index of its child link
+        return [
+            MovableJoint(index[model.link_names[j.child]], j.source, j.ratio, j.offset)
+            for j in model.joints
+            if j.source >= 0
+        ]
+
+    def _load_obstacle(self, o: Obstacle) -> int:
+        if o.kind == "urdf":
+            assert o.model is not None
+            return self._load_urdf(o.model, o.name, o.T_world_obstacle)
+        client = self.client
+        if o.kind == "box":
+            half = [0.5 * s for s in o.size]
+            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+        elif o.kind == "cylinder":
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_CYLINDER, radius=o.size[0], height=o.size[1], physicsClientId=client
+            )
+        elif o.kind == "sphere":
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_SPHERE, radius=o.size[0], physicsClientId=client
+            )
+        else:
+            shape = self._mesh_shape(o)
+        return self._create_body(shape, o.name, o.T_world_obstacle)
+
+    def _mesh_shape(self, o: Obstacle) -> int:
+        """Create the collision shape of a mesh from its surface, not its convex hull: hollows stay hollow.
+
+        Distances to a surface do not tell that something lies inside it. For an arm this does not
+        matter, because its links form a chain from its base outwards, and one of them crosses the surface.
+        For the object it does, so closed meshes are kept in `closed_meshes`.
+        """
+        assert o.path is not None
+        mesh = read_mesh(o.path, f"obstacle {o.name}")
+        if len(mesh.faces) > MOST_TRIANGLES:
+            expected = f"at most {MOST_TRIANGLES} triangles; simplify the mesh"
+            raise MeshError(o.path, f"obstacle {o.name}", f"{len(mesh.faces)} triangles", expected)
+        merged = mesh.copy()
+        merged.merge_vertices()  # STL repeats every corner
+        if merged.is_watertight:
+            merged.apply_transform(o.T_world_obstacle)
+            self.closed_meshes.append((o.name, merged))
+        return pybullet.createCollisionShape(
+            pybullet.GEOM_MESH,
+            vertices=mesh.vertices.tolist(),
+            indices=mesh.faces.ravel().tolist(),
+            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+            physicsClientId=self.client,
+        )
+
+    def _create_body(self, shape: int, name: str, pose: Array) -> int:
+        if shape < 0:
+            raise SymgraspError(f"PyBullet cannot make the shape of {name!r}")
+        body = pybullet.createMultiBody(
+            0.0,
+            shape,
+            basePosition=pose[:3, 3].tolist(),
+            baseOrientation=xyzw(pose),
+            physicsClientId=self.client,
+        )
+        return self._register(body, name, [""])
+
+    def _load_object(self, scene: Scene) -> list[int]:
+        bodies = []
+        for vertices in scene.profile.convex_pieces():
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_MESH, vertices=vertices.tolist(), physicsClientId=self.client
+            )
+            bodies.append(self._create_body(shape, scene.file.object.name, np.eye(4)))
+        return bodies

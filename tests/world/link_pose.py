@@ -1,0 +1,24 @@
+"""Where PyBullet has a link, asked of PyBullet itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pybullet
+
+from symgrasp.poses import Array
+from symgrasp.world import BulletWorld
+
+
+def link_pose(world: BulletWorld, robot: str, link: str) -> Array:
+    """Return the pose (4, 4) of a robot's link in the world, by PyBullet's forward kinematics."""
+    bodies = world.bodies
+    index = bodies.link_indices(robot)[link]
+    if index < 0:
+        return world.scene.robots[robot].T_world_base
+    state = pybullet.getLinkState(
+        bodies.robots[robot], index, computeForwardKinematics=True, physicsClientId=bodies.client
+    )
+    pose = np.eye(4)
+    pose[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+    pose[:3, 3] = state[4]
+    return pose
