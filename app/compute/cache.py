@@ -6,15 +6,16 @@ import threading
 from collections import OrderedDict
 from pathlib import Path
 
-from app.files.links import Link
-from app.scene3d.visual_meshes import check_visuals
-from app.state.object_choice import OWN, ObjectChoice, from_library
-from app.state.requests import MapKey, MapRequest, MapResult
 from symgrasp.errors import SceneError, one_of
 from symgrasp.files import SCENES_DIR
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
 from symgrasp.world import check_tasks
+
+from ..files.links import Link
+from ..scene3d.visual_meshes import check_visuals
+from ..state.object_choice import OWN, ObjectChoice, from_library
+from ..state.requests import MapKey, MapRequest, MapResult
 
 __all__ = ["SharedCache"]
 

@@ -7,11 +7,13 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-from app.compute.channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
-from app.compute.plan_service import OpenedPlan, PlanOutcome, PlanRequest
-from app.compute.process_pool import ProcessPool, WorkerProcess
-from app.state.plan_results import PlanResult
-from app.state.requests import (
+from symgrasp.errors import Cancelled, NoPlanError
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.progress import Progress
+from symgrasp.scene.scene import Scene
+
+from ..state.plan_results import PlanResult
+from ..state.requests import (
     CompareRequest,
     Comparison,
     ExplainRequest,
@@ -20,10 +22,9 @@ from app.state.requests import (
     MapResult,
     Maps,
 )
-from symgrasp.errors import Cancelled, NoPlanError
-from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.progress import Progress
-from symgrasp.scene.scene import Scene
+from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
+from .plan_service import OpenedPlan, PlanOutcome, PlanRequest
+from .process_pool import ProcessPool, WorkerProcess
 
 __all__ = ["ComputeProcess", "ProcessDied"]
 

@@ -8,10 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from app.compute.compute_process import ProcessDied
 from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
+
+from .compute_process import ProcessDied
 
 __all__ = ["Job", "JobQueue"]
 

@@ -7,7 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.state.requests import (
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.poses import rotation_z
+from symgrasp.progress import Progress
+from symgrasp.scene.scene import Scene
+from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks, open_world
+
+from ..state.requests import (
     CompareRequest,
     Comparison,
     ExplainRequest,
@@ -16,12 +23,6 @@ from app.state.requests import (
     MapResult,
     Maps,
 )
-from symgrasp.feasibility.create import MapMaker
-from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.poses import rotation_z
-from symgrasp.progress import Progress
-from symgrasp.scene.scene import Scene
-from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks, open_world
 
 __all__ = ["MapService"]
 

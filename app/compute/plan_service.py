@@ -9,13 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from app.compute.map_service import MapService
-from app.files.scene_files import refuse_foreign_files
-from app.scene3d.visual_meshes import check_visuals
-from app.state.object_pose import ObjectPose, moved
-from app.state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
-from app.state.requests import MapRequest, Maps
-from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import NoPlanError, PlanError
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import ROLLS, Manifold
@@ -35,6 +28,14 @@ from symgrasp.planners.planning import (
 from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+
+from ..files.scene_files import refuse_foreign_files
+from ..scene3d.visual_meshes import check_visuals
+from ..state.object_pose import ObjectPose, moved
+from ..state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
+from ..state.requests import MapRequest, Maps
+from ..state.uploaded_scene import UploadedScene
+from .map_service import MapService
 
 __all__ = ["PLAN_LIMIT", "OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService", "plan_result"]
 

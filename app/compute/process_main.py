@@ -14,13 +14,14 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from app.compute.channel import Call, Cancel, Channel, Compiling, ComputedMap, Failure, ProgressReport, Result
-from app.compute.map_service import MapService
-from app.compute.plan_service import PlanService
-from app.state.requests import MapRequest
 from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
+
+from ..state.requests import MapRequest
+from .channel import Call, Cancel, Channel, Compiling, ComputedMap, Failure, ProgressReport, Result
+from .map_service import MapService
+from .plan_service import PlanService
 
 __all__ = ["serve"]
 

@@ -8,8 +8,8 @@ import threading
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
-from app.compute.channel import Channel
-from app.compute.process_main import serve
+from .channel import Channel
+from .process_main import serve
 
 __all__ = ["ProcessPool", "WorkerProcess"]
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import time
 
-from app.compute.cache import SharedCache
-from app.compute.map_service import MapService
-from app.state.requests import MapRequest
 from symgrasp.errors import Cancelled, SymgraspError
+
+from ..state.requests import MapRequest
+from .cache import SharedCache
+from .map_service import MapService
 
 __all__ = ["compute_first_map"]
 

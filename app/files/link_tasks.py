@@ -14,12 +14,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.files.link_values import names_text, one, pose, pose_text, read_names
-from app.state.object_pose import ObjectPose
-from app.state.state import State
 from symgrasp.errors import InputError, one_of
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+
+from ..state.object_pose import ObjectPose
+from ..state.state import State
+from .link_values import names_text, one, pose, pose_text, read_names
 
 __all__ = ["is_about_tasks", "read_tasks", "tasks_text"]
 

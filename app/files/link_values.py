@@ -8,8 +8,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from app.state.object_pose import ObjectPose
 from symgrasp.errors import InputError, one_of
+
+from ..state.object_pose import ObjectPose
 
 __all__ = ["names_text", "number", "number_text", "numbers", "one", "pose", "pose_text", "read_names"]
 

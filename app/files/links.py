@@ -16,16 +16,17 @@ from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
 
-from app.files.link_tasks import is_about_tasks, read_tasks, tasks_text
-from app.files.link_values import number, number_text, numbers, one
-from app.state import changes
-from app.state.map_view_state import RollChoice
-from app.state.page_link import Camera
-from app.state.state import Pick, State
 from symgrasp.errors import InputError, one_of
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.object.manifold import ROLLS
 from symgrasp.scene.scene import Scene
+
+from ..state import changes
+from ..state.map_view_state import RollChoice
+from ..state.page_link import Camera
+from ..state.state import Pick, State
+from .link_tasks import is_about_tasks, read_tasks, tasks_text
+from .link_values import number, number_text, numbers, one
 
 __all__ = ["Link", "link_of", "parse_link"]
 

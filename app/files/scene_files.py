@@ -15,11 +15,12 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import SceneError
 from symgrasp.files import SCENES_DIR, package_dir, parse_yaml, resolve
 from symgrasp.scene.format import SceneFile, describe_error
 from symgrasp.scene.scene import Scene
+
+from ..state.uploaded_scene import UploadedScene
 
 __all__ = ["SCENE_LIMIT", "read_scene", "refuse_foreign_files", "scene_yaml"]
 

@@ -6,11 +6,12 @@ from html import escape
 
 import numpy as np
 
-from app.html.map import picture_html, to_png
-from app.render.palette import REASONS
-from app.state.state import State
 from symgrasp.feasibility.explain import CandidateResult, Explanation
 from symgrasp.reason import Reason
+
+from ..render.palette import REASONS
+from ..state.state import State
+from .map import picture_html, to_png
 
 __all__ = ["candidate_html", "candidate_line", "candidates_html", "fates"]
 

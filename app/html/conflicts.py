@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from html import escape
 
-from app.html.map import h_axis
-from app.state.plan_results import PlanFileReport, Refusal
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.planners.conflicts import Conflict, Exclusion
 from symgrasp.reason import Reason
+
+from ..state.plan_results import PlanFileReport, Refusal
+from .map import h_axis
 
 __all__ = ["opened_html", "regrasps", "why_html"]
 

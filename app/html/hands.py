@@ -7,19 +7,20 @@ from html import escape
 
 import numpy as np
 
-from app.html.map import map_html
-from app.html.readout import counted
-from app.html.solutions import worst_measures
-from app.html.stack import measures
-from app.render.marks import Mark
-from app.render.palette import PRINTS
-from app.render.prints import hand_color, shown_prints
-from app.state.map_view_state import RollChoice
-from app.state.plan_results import ClimbReplay, PlanResult, PlanResults
-from app.state.state import State
 from symgrasp.object.manifold import ROLLS
 from symgrasp.plan.plan import PlanTask
 from symgrasp.planners.bimanual import ClimbStep
+
+from ..render.marks import Mark
+from ..render.palette import PRINTS
+from ..render.prints import hand_color, shown_prints
+from ..state.map_view_state import RollChoice
+from ..state.plan_results import ClimbReplay, PlanResult, PlanResults
+from ..state.state import State
+from .map import map_html
+from .readout import counted
+from .solutions import worst_measures
+from .stack import measures
 
 __all__ = ["climb_html", "comparison_html", "gap_in_words", "hands_html"]
 

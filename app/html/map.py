@@ -14,14 +14,15 @@ from html import escape
 import numpy as np
 from PIL import Image
 
-from app.render.cell_colors import coloured
-from app.render.marks import Mark
-from app.render.palette import OVERLAP, PRINTS, faded
-from app.render.prints import hand_color, print_index
-from app.state.map_view_state import RollChoice
 from symgrasp.feasibility.color_by import ColorBy, Scale
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import Manifold, wrap
+
+from ..render.cell_colors import coloured
+from ..render.marks import Mark
+from ..render.palette import OVERLAP, PRINTS, faded
+from ..render.prints import hand_color, print_index
+from ..state.map_view_state import RollChoice
 
 __all__ = [
     "COLUMNS",

@@ -7,14 +7,15 @@ from html import escape
 
 import numpy as np
 
-from app.render.palette import DIVERGING, PRINTS
-from app.render.prints import hand_color
-from app.state.state import State
 from symgrasp.feasibility.object_report import holding_heights
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.measure.measurement import Measurement
 from symgrasp.object.profile import Profile
 from symgrasp.robot.hand import Hand
+
+from ..render.palette import DIVERGING, PRINTS
+from ..render.prints import hand_color
+from ..state.state import State
 
 __all__ = ["deviation_cells", "deviation_colors", "holds_html", "profile_html", "symmetry_html"]
 

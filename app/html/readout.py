@@ -6,11 +6,12 @@ from html import escape
 
 import numpy as np
 
-from app.render.playback import plan_joint_values, playback_frame
-from app.state.state import State
 from symgrasp.object.manifold import ROLLS
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
+
+from ..render.playback import plan_joint_values, playback_frame
+from ..state.state import State
 
 __all__ = [
     "check_html",

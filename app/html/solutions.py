@@ -6,9 +6,9 @@ from html import escape
 
 import numpy as np
 
-from app.html.stack import measures
-from app.state.plan_results import PlanResult
-from app.state.state import State
+from ..state.plan_results import PlanResult
+from ..state.state import State
+from .stack import measures
 
 __all__ = ["solutions_html", "worst_measures"]
 

@@ -9,16 +9,17 @@ from itertools import groupby
 
 import numpy as np
 
-from app.html.map import THETA_AXIS, circle, h_axis, sample_columns, to_png
-from app.render.marks import Mark
-from app.render.palette import INK, REASONS, rgb
-from app.render.weak_cache import cached_with_first
-from app.state.requests import MapResult
-from app.state.state import State
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold, PlanTask
 from symgrasp.reason import Reason
+
+from ..render.marks import Mark
+from ..render.palette import INK, REASONS, rgb
+from ..render.weak_cache import cached_with_first
+from ..state.requests import MapResult
+from ..state.state import State
+from .map import THETA_AXIS, circle, h_axis, sample_columns, to_png
 
 __all__ = ["measures", "shared_columns", "stack_html"]
 

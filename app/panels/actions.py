@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from app.state.plan_results import PlanKind
-from app.state.state import State
+from ..state.plan_results import PlanKind
+from ..state.state import State
 
 __all__ = ["Actions", "Change", "PlanActions"]
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import viser
 
-from app.html.candidates import candidate_html, candidates_html
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state import changes
-from app.state.requests import ExplainRequest
-from app.state.state import State
 from symgrasp.feasibility.explain import Explanation
+
+from ..html.candidates import candidate_html, candidates_html
+from ..state import changes
+from ..state.requests import ExplainRequest
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["CandidatesPanel"]
 

@@ -6,11 +6,11 @@ from html import escape
 
 import viser
 
-from app.files.scene_files import SCENE_LIMIT
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state import changes
-from app.state.state import State
+from ..files.scene_files import SCENE_LIMIT
+from ..state import changes
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["FilesPanel", "link_html"]
 

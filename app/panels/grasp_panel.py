@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.html.readout import grasp_html
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state import changes
-from app.state.map_view_state import RollChoice
-from app.state.state import Pick, State
+from ..html.readout import grasp_html
+from ..state import changes
+from ..state.map_view_state import RollChoice
+from ..state.state import Pick, State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["GraspPanel"]
 

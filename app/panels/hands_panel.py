@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import viser
 
-from app.html.conflicts import why_html
-from app.html.hands import comparison_html, hands_html
-from app.html.readout import hands_line
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state import plan_changes
-from app.state.plan_results import FIRST_SEED
-from app.state.state import State
+from ..html.conflicts import why_html
+from ..html.hands import comparison_html, hands_html
+from ..html.readout import hands_line
+from ..state import plan_changes
+from ..state.plan_results import FIRST_SEED
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["HANDS_METHODS", "HandsPanel"]
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import viser
 
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state import changes, plan_changes
-from app.state.map_view_state import RollChoice
-from app.state.state import State
-from app.state.undo import redo, undo
+from ..state import changes, plan_changes
+from ..state.map_view_state import RollChoice
+from ..state.state import State
+from ..state.undo import redo, undo
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["Keyboard", "next_arm"]
 

@@ -6,21 +6,21 @@ from pathlib import Path
 
 import viser
 
-from app.panels.actions import Actions
-from app.panels.candidates_panel import CandidatesPanel
-from app.panels.files_panel import FilesPanel
-from app.panels.grasp_panel import GraspPanel
-from app.panels.hands_panel import HandsPanel
-from app.panels.keyboard import Keyboard
-from app.panels.map_panel import MapPanel
-from app.panels.object_panel import ObjectPanel
-from app.panels.panel import Panel
-from app.panels.plan_panel import PlanFilePanel, PlanPanel
-from app.panels.scene_panel import ScenePanel
-from app.panels.sequence_panel import SequencePanel, TasksPanel
-from app.panels.status_panel import NotesPanel, StatusPanel
-from app.panels.view_panel import ViewPanel
-from app.state.state import State
+from ..state.state import State
+from .actions import Actions
+from .candidates_panel import CandidatesPanel
+from .files_panel import FilesPanel
+from .grasp_panel import GraspPanel
+from .hands_panel import HandsPanel
+from .keyboard import Keyboard
+from .map_panel import MapPanel
+from .object_panel import ObjectPanel
+from .panel import Panel
+from .plan_panel import PlanFilePanel, PlanPanel
+from .scene_panel import ScenePanel
+from .sequence_panel import SequencePanel, TasksPanel
+from .status_panel import NotesPanel, StatusPanel
+from .view_panel import ViewPanel
 
 __all__ = ["Layout", "panel_widths"]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import viser
 
-from app.html.map import legend_html, map_html, prints_html
-from app.html.profile import holds_html, profile_html, symmetry_html
-from app.html.readout import check_html, map_title, solution_html
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.render.marks import marks_of
-from app.render.prints import print_names, shown_prints
-from app.state.state import State
+from ..html.map import legend_html, map_html, prints_html
+from ..html.profile import holds_html, profile_html, symmetry_html
+from ..html.readout import check_html, map_title, solution_html
+from ..render.marks import marks_of
+from ..render.prints import print_names, shown_prints
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["MapPanel"]
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.panels.actions import Actions
-from app.panels.panel import Panel, within
-from app.state import changes
-from app.state.object_choice import UNITS, UPLOAD_LIMIT, choices
-from app.state.state import State
 from symgrasp.object.measure.mesh_io import MESH_ENDINGS
 from symgrasp.scene.scene import Scene
+
+from ..state import changes
+from ..state.object_choice import UNITS, UPLOAD_LIMIT, choices
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel, within
 
 __all__ = ["ObjectPanel", "span"]
 

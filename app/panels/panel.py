@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 import viser
 
-from app.panels.actions import Actions
-from app.state.state import State
+from ..state.state import State
+from .actions import Actions
 
 __all__ = ["Html", "Panel", "within"]
 

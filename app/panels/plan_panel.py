@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import viser
 
-from app.compute.plan_service import PLAN_LIMIT
-from app.html.conflicts import opened_html
-from app.html.readout import solution_html
-from app.html.solutions import solutions_html
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.server.plan_actions import FORMATS
-from app.state import plan_changes
-from app.state.state import State
+from ..compute.plan_service import PLAN_LIMIT
+from ..files.plan_formats import FORMATS
+from ..html.conflicts import opened_html
+from ..html.readout import solution_html
+from ..html.solutions import solutions_html
+from ..state import plan_changes
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["PlanFilePanel", "PlanPanel"]
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import viser
 
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state import changes
-from app.state.state import State
 from symgrasp.robot.hand import HANDS
+
+from ..state import changes
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["ScenePanel"]
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import viser
 
-from app.html.conflicts import regrasps, why_html
-from app.html.readout import sequence_html, tasks_html
-from app.html.stack import stack_html
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state import changes, plan_changes
-from app.state.state import State
-from app.state.task_list import TaskList
+from ..html.conflicts import regrasps, why_html
+from ..html.readout import sequence_html, tasks_html
+from ..html.stack import stack_html
+from ..state import changes, plan_changes
+from ..state.state import State
+from ..state.task_list import TaskList
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["SEQUENCE_METHODS", "SequencePanel", "TasksPanel"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import viser
 
-from app.html.readout import notes_html, status_html
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.state.state import State
-from app.state.undo import redo, undo
+from ..html.readout import notes_html, status_html
+from ..state.state import State
+from ..state.undo import redo, undo
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["NotesPanel", "StatusPanel"]
 

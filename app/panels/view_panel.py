@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import viser
 
-from app.panels.actions import Actions
-from app.panels.panel import Panel
-from app.render.map_picture import FORMATS
-from app.state.state import State
 from symgrasp.feasibility.color_by import ColorBy
+
+from ..render.map_picture import FORMATS
+from ..state.state import State
+from .actions import Actions
+from .panel import Panel
 
 __all__ = ["ViewPanel"]
 

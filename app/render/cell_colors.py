@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.render.palette import PRINTS, faded
-from app.render.prints import print_index, shown_prints
-from app.render.weak_cache import cached_with_first
-from app.state.map_view_state import RollChoice
-from app.state.state import State
 from symgrasp.feasibility.color_by import ColorBy, ColoredMap, color_map
 from symgrasp.feasibility.map import FeasibilityMap
+
+from ..state.map_view_state import RollChoice
+from ..state.state import State
+from .palette import PRINTS, faded
+from .prints import print_index, shown_prints
+from .weak_cache import cached_with_first
 
 __all__ = ["cell_colors", "coloured"]
 

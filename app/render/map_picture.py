@@ -8,15 +8,16 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.render.cell_colors import coloured
-from app.render.marks import marks_of
-from app.render.palette import PRINTS
-from app.render.prints import hand_color, print_index, print_names, shown_prints
-from app.state.map_view_state import RollChoice
-from app.state.state import State
 from symgrasp.errors import InputError
 from symgrasp.feasibility import pictures
 from symgrasp.feasibility.color_by import ColoredMap, Swatch
+
+from ..state.map_view_state import RollChoice
+from ..state.state import State
+from .cell_colors import coloured
+from .marks import marks_of
+from .palette import PRINTS
+from .prints import hand_color, print_index, print_names, shown_prints
 
 __all__ = ["FORMATS", "map_picture", "picture_name"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.state.state import State
+from ..state.state import State
 
 __all__ = ["Mark", "marks_of"]
 

@@ -10,11 +10,12 @@ from functools import cached_property
 
 import numpy as np
 
-from app.render.weak_cache import cached_with_first
-from app.state.state import State
 from symgrasp.plan.plan import Hold, PlanTask
 from symgrasp.poses import Array, inverse
 from symgrasp.scene.scene import Scene
+
+from ..state.state import State
+from .weak_cache import cached_with_first
 
 __all__ = ["PlaybackFrame", "drawn_object_pose", "plan_joint_values", "playback_frame"]
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.render.palette import OVERLAP, PRINTS
-from app.render.weak_cache import cached_with_first
-from app.state.state import State
 from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.scene import Scene
+
+from ..state.state import State
+from .palette import OVERLAP, PRINTS
+from .weak_cache import cached_with_first
 
 __all__ = ["hand_color", "hand_print", "on_surface", "print_index", "print_names", "shown_prints"]
 

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.scene3d.nodes import add_links, set_pose
-from app.scene3d.viewpoint import (
-    Viewpoint,
-)
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import quat_wxyz
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
+
+from .nodes import add_links, set_pose
+from .viewpoint import (
+    Viewpoint,
+)
 
 __all__ = ["add_floor", "add_lights", "add_obstacle"]
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from app.render.palette import to_linear
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, from_rotation, quat_wxyz
+
+from ..render.palette import to_linear
 
 __all__ = ["CellMesh", "around", "flat"]
 

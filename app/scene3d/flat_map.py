@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from app.render.cell_colors import cell_colors
-from app.scene3d.cell_mesh import CellMesh, OnCell, flat
-from app.scene3d.nodes import set_pose
-from app.scene3d.viewpoint import Viewpoint, stand_around
-from app.state.state import State
 from symgrasp.poses import Array, from_rotation
+
+from ..render.cell_colors import cell_colors
+from ..state.state import State
+from .cell_mesh import CellMesh, OnCell, flat
+from .nodes import set_pose
+from .viewpoint import Viewpoint, stand_around
 
 __all__ = ["FLAT_SIZE", "FlatMap", "flat_map_position"]
 

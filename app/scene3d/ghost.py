@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from app.render.playback import playback_frame
-from app.state.state import State
 from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
@@ -16,6 +14,9 @@ from symgrasp.robot.model import RobotModel
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName
+
+from ..render.playback import playback_frame
+from ..state.state import State
 
 __all__ = ["Ghost", "body_mesh", "ghost", "link_mesh"]
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import trimesh
 import viser
 
-from app.render.palette import rgb
-from app.scene3d.ghost import Ghost, body_mesh, ghost, link_mesh
-from app.scene3d.nodes import set_pose
-from app.state.state import State
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName
+
+from ..render.palette import rgb
+from ..state.state import State
+from .ghost import Ghost, body_mesh, ghost, link_mesh
+from .nodes import set_pose
 
 __all__ = ["GhostView"]
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import viser
 
-from app.scene3d.visual_meshes import link_visuals
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.robot.model import RobotModel
+
+from .visual_meshes import link_visuals
 
 __all__ = ["add_links", "set_pose"]
 

@@ -7,17 +7,18 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from app.html.profile import deviation_colors
-from app.render.cell_colors import cell_colors
-from app.render.palette import INK, PICK, rgb
-from app.render.playback import drawn_object_pose
-from app.render.prints import on_surface
-from app.scene3d.cell_mesh import CellMesh, OnCell, around
-from app.scene3d.nodes import set_pose
-from app.state.state import State
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, from_position_quat, rotation_z
 from symgrasp.scene.scene import Scene
+
+from ..html.profile import deviation_colors
+from ..render.cell_colors import cell_colors
+from ..render.palette import INK, PICK, rgb
+from ..render.playback import drawn_object_pose
+from ..render.prints import on_surface
+from ..state.state import State
+from .cell_mesh import CellMesh, OnCell, around
+from .nodes import set_pose
 
 __all__ = ["ObjectView"]
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.scene3d.nodes import add_links, set_pose
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Robot
+
+from .nodes import add_links, set_pose
 
 __all__ = ["RobotView"]
 

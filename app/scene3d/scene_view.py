@@ -7,17 +7,18 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from app.html.readout import joint_values
-from app.scene3d.backdrop import add_floor, add_lights, add_obstacle
-from app.scene3d.flat_map import FlatMap
-from app.scene3d.ghost_view import GhostView
-from app.scene3d.object_view import ObjectView
-from app.scene3d.robot_view import RobotView
-from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
-from app.state.page_link import Camera
-from app.state.state import State
 from symgrasp.poses import Array
 from symgrasp.scene.scene import Scene
+
+from ..html.readout import joint_values
+from ..state.page_link import Camera
+from ..state.state import State
+from .backdrop import add_floor, add_lights, add_obstacle
+from .flat_map import FlatMap
+from .ghost_view import GhostView
+from .object_view import ObjectView
+from .robot_view import RobotView
+from .viewpoint import FIELD_OF_VIEW, viewpoint
 
 __all__ = ["SceneView"]
 

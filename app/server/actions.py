@@ -8,23 +8,24 @@ from functools import partial
 
 import viser
 
-from app.compute.cache import SharedCache
-from app.compute.compute_process import ComputeProcess
-from app.files.links import link_of
-from app.files.scene_files import read_scene, scene_yaml
-from app.render.map_picture import map_picture, picture_name
-from app.scene3d.visual_meshes import check_visuals
-from app.server.plan_actions import PlanActions
-from app.server.session_api import SessionApi
-from app.server.snapshot import snapshot_html
-from app.state import changes, job_changes
-from app.state.object_choice import OWN, ObjectChoice, check_size, from_library, from_mesh
-from app.state.page_link import Camera
-from app.state.state import State
-from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import SymgraspError
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
+
+from ..compute.cache import SharedCache
+from ..compute.compute_process import ComputeProcess
+from ..files.links import link_of
+from ..files.scene_files import read_scene, scene_yaml
+from ..render.map_picture import map_picture, picture_name
+from ..scene3d.visual_meshes import check_visuals
+from ..state import changes, job_changes
+from ..state.object_choice import OWN, ObjectChoice, check_size, from_library, from_mesh
+from ..state.page_link import Camera
+from ..state.state import State
+from ..state.uploaded_scene import UploadedScene
+from .plan_actions import PlanActions
+from .session_api import SessionApi
+from .snapshot import snapshot_html
 
 __all__ = ["Actions", "camera_of"]
 

@@ -11,11 +11,11 @@ from html import escape
 
 import viser
 
-from app.compute.cache import SharedCache
-from app.compute.process_pool import ProcessPool
-from app.server.proxy import HELLO, Proxy, Visit
-from app.server.session import Session
-from app.server.viser_server import quiet_server
+from ..compute.cache import SharedCache
+from ..compute.process_pool import ProcessPool
+from .proxy import HELLO, Proxy, Visit
+from .session import Session
+from .viser_server import quiet_server
 
 __all__ = ["Lobby", "open_lobby"]
 

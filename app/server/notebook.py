@@ -6,18 +6,19 @@ from collections.abc import Mapping
 from dataclasses import replace
 from html import escape
 
-from app.compute.plan_service import plan_result
-from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
-from app.server.snapshot import snapshot_html
-from app.state import changes
-from app.state.plan_changes import show_results, show_step
-from app.state.plan_results import PlanResults
-from app.state.requests import MapRequest, MapResult
-from app.state.state import State
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+
+from ..compute.plan_service import plan_result
+from ..scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
+from ..state import changes
+from ..state.plan_changes import show_results, show_step
+from ..state.plan_results import PlanResults
+from ..state.requests import MapRequest, MapResult
+from ..state.state import State
+from .snapshot import snapshot_html
 
 __all__ = ["map_html", "plan_html"]
 

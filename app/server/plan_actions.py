@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from app.compute.cache import SharedCache
-from app.compute.compute_process import ComputeProcess
-from app.compute.plan_service import OpenedPlan, PlanRequest
-from app.server.session_api import SessionApi
-from app.state.changes import open_upload
-from app.state.plan_changes import more_listed, show_results
-from app.state.plan_results import PlanKind, PlanResults
-from app.state.requests import Maps
-from app.state.state import State
-from symgrasp.plan.exports import EXPORTS
-from symgrasp.plan.plan import Plan
+from ..compute.cache import SharedCache
+from ..compute.compute_process import ComputeProcess
+from ..compute.plan_service import OpenedPlan, PlanRequest
+from ..files.plan_formats import FORMATS
+from ..state.changes import open_upload
+from ..state.plan_changes import more_listed, show_results
+from ..state.plan_results import PlanKind, PlanResults
+from ..state.requests import Maps
+from ..state.state import State
+from .session_api import SessionApi
 
-__all__ = ["FORMATS", "PlanActions"]
-
-FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
-    "JSON": (".json", Plan.to_json),
-    "CSV": (".csv", EXPORTS["csv"]),
-    "Trajectory": (".trajectory.json", EXPORTS["trajectory"]),
-    "TSR": (".tsr.yaml", EXPORTS["tsr"]),
-}
-"""What the page calls a format → ending of its files, and what writes them."""
+__all__ = ["PlanActions"]
 
 
 class PlanActions:

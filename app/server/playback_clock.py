@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.state.plan_changes import played
-from app.state.state import State
+from ..state.plan_changes import played
+from ..state.state import State
 
 __all__ = ["PlaybackClock"]
 

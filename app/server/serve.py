@@ -8,11 +8,12 @@ import sys
 import threading
 import warnings
 
-from app.compute.cache import SharedCache
-from app.compute.warm_up import compute_first_map
-from app.server.lobby import open_lobby
 from symgrasp.compiling import COMPILING_MESSAGE, notify_on_compile
 from symgrasp.errors import InputError
+
+from ..compute.cache import SharedCache
+from ..compute.warm_up import compute_first_map
+from .lobby import open_lobby
 
 __all__ = ["serve"]
 

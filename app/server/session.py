@@ -12,23 +12,24 @@ from typing import Any
 
 import viser
 
-from app.compute.cache import SharedCache
-from app.compute.compute_process import ComputeProcess
-from app.compute.job_queue import Job, JobQueue
-from app.compute.process_pool import ProcessPool
-from app.files.links import parse_link
-from app.panels.layout import Layout
-from app.scene3d.scene_view import SceneView
-from app.server.actions import Actions, camera_of
-from app.server.playback_clock import PlaybackClock
-from app.server.proxy import Visit
-from app.state import changes, job_changes
-from app.state.page_link import Camera
-from app.state.requests import CompareRequest, ExplainRequest, MapRequest, Request
-from app.state.state import State
-from app.state.undo import remember
 from symgrasp.errors import SymgraspError
 from symgrasp.progress import Progress
+
+from ..compute.cache import SharedCache
+from ..compute.compute_process import ComputeProcess
+from ..compute.job_queue import Job, JobQueue
+from ..compute.process_pool import ProcessPool
+from ..files.links import parse_link
+from ..panels.layout import Layout
+from ..scene3d.scene_view import SceneView
+from ..state import changes, job_changes
+from ..state.page_link import Camera
+from ..state.requests import CompareRequest, ExplainRequest, MapRequest, Request
+from ..state.state import State
+from ..state.undo import remember
+from .actions import Actions, camera_of
+from .playback_clock import PlaybackClock
+from .proxy import Visit
 
 __all__ = ["Session"]
 

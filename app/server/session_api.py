@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from app.state.state import State
 from symgrasp.progress import Progress
+
+from ..state.state import State
 
 __all__ = ["SessionApi"]
 

@@ -8,10 +8,10 @@ from typing import cast
 import numpy as np
 import viser
 
-from app.scene3d.scene_view import SceneView
-from app.server.viser_server import quiet_server
-from app.state.page_link import Camera
-from app.state.state import State
+from ..scene3d.scene_view import SceneView
+from ..state.page_link import Camera
+from ..state.state import State
+from .viser_server import quiet_server
 
 __all__ = ["snapshot_html"]
 

@@ -7,18 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.state.map_view_state import RollChoice
-from app.state.object_choice import ObjectChoice
-from app.state.object_pose import ObjectPose
-from app.state.page_link import Camera, PageLink
-from app.state.plan_changes import show_step
-from app.state.state import Pick, State
-from app.state.task_list import TaskList
-from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import InputError, one_of
 from symgrasp.object.manifold import wrap
 from symgrasp.poses import Array
 from symgrasp.scene.scene import Scene
+
+from .map_view_state import RollChoice
+from .object_choice import ObjectChoice
+from .object_pose import ObjectPose
+from .page_link import Camera, PageLink
+from .plan_changes import show_step
+from .state import Pick, State
+from .task_list import TaskList
+from .uploaded_scene import UploadedScene
 
 __all__ = [
     "add_task",

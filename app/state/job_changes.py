@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.state.requests import Busy, Comparison, ExplainResult, MapResult, Request
-from app.state.state import State
+from .requests import Busy, Comparison, ExplainResult, MapResult, Request
+from .state import State
 
 __all__ = [
     "compiling",

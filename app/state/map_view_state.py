@@ -7,10 +7,11 @@ from enum import Enum
 
 import numpy as np
 
-from app.state.requests import CompareRequest, Comparison, ExplainRequest, ExplainResult, MapRequest, Request
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.feasibility.map import FeasibilityMap
+
+from .requests import CompareRequest, Comparison, ExplainRequest, ExplainResult, MapRequest, Request
 
 __all__ = ["MapViewState", "RollChoice"]
 

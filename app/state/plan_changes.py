@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.state.plan_results import PlanResult, PlanResults
-from app.state.state import Pick, State
+from .plan_results import PlanResult, PlanResults
+from .state import Pick, State
 
 __all__ = [
     "change_plan_results",

@@ -8,10 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-from app.state.requests import Maps
 from symgrasp.plan.plan import Plan
 from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.planners.conflicts import Conflict
+
+from .requests import Maps
 
 __all__ = [
     "FIRST_SEED",

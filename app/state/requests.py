@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from app.state.object_pose import ObjectPose, moved
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.explain import Explanation
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import Array
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+
+from .object_pose import ObjectPose, moved
 
 __all__ = [
     "Busy",

@@ -12,15 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from app.state.display import Display
-from app.state.history import History
-from app.state.map_view_state import MapViewState
-from app.state.object_choice import OWN, ObjectChoice
-from app.state.object_pose import ObjectPose, moved
-from app.state.page_link import PageLink
-from app.state.plan_results import PlanKind, PlanResult, PlanResults
-from app.state.requests import Busy, ExplainRequest, MapRequest, MapResult, Request
-from app.state.uploaded_scene import UploadedScene
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.explain import CandidateResult, Explanation
 from symgrasp.feasibility.map import FeasibilityMap
@@ -28,6 +19,16 @@ from symgrasp.plan.plan import PlanTask
 from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.poses import Array, rotation_z
 from symgrasp.scene.scene import Scene
+
+from .display import Display
+from .history import History
+from .map_view_state import MapViewState
+from .object_choice import OWN, ObjectChoice
+from .object_pose import ObjectPose, moved
+from .page_link import PageLink
+from .plan_results import PlanKind, PlanResult, PlanResults
+from .requests import Busy, ExplainRequest, MapRequest, MapResult, Request
+from .uploaded_scene import UploadedScene
 
 __all__ = ["Pick", "State"]
 

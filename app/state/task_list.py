@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from app.state.object_pose import ObjectPose
 from symgrasp.errors import InputError, SceneError
 from symgrasp.poses import Array
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+
+from .object_pose import ObjectPose
 
 __all__ = ["TaskList"]
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.state.history import History
-from app.state.state import State
 from symgrasp.feasibility.map import FeasibilityMap
+
+from .history import History
+from .state import State
 
 __all__ = ["PLANS_KEPT", "redo", "remember", "undo"]
 
