@@ -22,7 +22,7 @@ from pathlib import Path
 
 import pytest
 
-from app.compute import compute_process as process
+from app.compute import compute_process, process_pool
 from app.compute.cache import SharedCache
 from app.compute.job_queue import JobQueue
 from app.compute.warm_up import compute_first_map
@@ -231,7 +231,7 @@ def test_cancelling_takes_effect_though_the_process_hears_nothing(house, monkeyp
         visitor.set("Rotation (°)", 10.0)  # the page lives meanwhile
         visitor.set("Cancel", True)
         visitor.wait_for("Stopped: no map for this pose yet.")
-        monkeypatch.setattr(process, "PATIENCE", 0.0)
+        monkeypatch.setattr(compute_process, "CANCEL_TIMEOUT", 0.0)
         os.kill(workshops()[-1], signal.SIGCONT)  # the one that is kept; the other one never answers
         visitor.set("Compute the map", True)
         visitor.wait_for(ready)
@@ -352,7 +352,7 @@ def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(h
 
 
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
-    monkeypatch.setattr(process, "serve", failures.serve_compiling)
+    monkeypatch.setattr(process_pool, "serve", failures.serve_compiling)
     port = any_port()
     with open_lobby(house.cache, "127.0.0.1", port), Wire(port) as visitor:
         visitor.wait_for(ready)
