@@ -8,11 +8,11 @@ BIN := $(VENV)/bin
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
 
-test: $(VENV)/dev.stamp  ## install, then run every check and test
+test: $(VENV)/dev.stamp  ## install, then run every check and test, the tests on all cores
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest --numprocesses auto $(ARGS)
 
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 
-import symgrasp
-
-REPOSITORY = Path(symgrasp.__file__).parent.parent
+from docs.imports import MODULES, imported, room_of
 
 ROOMS = [
     "symgrasp.errors", "symgrasp.progress", "symgrasp.files", "symgrasp.page", "symgrasp.compiling",
@@ -22,34 +18,6 @@ ROOMS = [
     "app.server", "app.__main__",
 ]  # fmt: skip
 """Folders, and modules that stand beside them, from the ground up."""
-
-
-def name_of(path: Path) -> str:
-    parts = path.relative_to(REPOSITORY).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def room_of(module: str) -> str:
-    return ".".join(module.split(".")[:2])
-
-
-MODULES = {name_of(p): p for package in ("symgrasp", "app") for p in (REPOSITORY / package).rglob("*.py")}
-
-
-def imported(module: str) -> set[str]:
-    """Return the modules that a module imports anywhere in it, also only for types or inside functions."""
-    path = MODULES[module]
-    package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            base = ".".join(package[: len(package) - node.level + 1]) if node.level else ""
-            source = ".".join(part for part in (base, node.module) if part)
-            inner = {f"{source}.{alias.name}" for alias in node.names}
-            names |= {name if name in MODULES else source for name in inner}
-    return names
 
 
 @pytest.mark.parametrize("module", sorted(MODULES))

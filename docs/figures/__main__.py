@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Callable, Sequence
 
 from docs.figures import climbing, holding, page, unwrapping
+from docs.figures.architecture import architecture
 from docs.figures.style import IMAGES
 
 __all__ = ["FIGURES", "main"]
@@ -15,6 +16,7 @@ __all__ = ["FIGURES", "main"]
 FIGURES: dict[str, Callable[[], None]] = {
     figure.__name__: figure
     for figure in (
+        architecture,
         holding.log_four_robots,
         unwrapping.soda_can,
         holding.wine_bottle,
@@ -27,7 +29,7 @@ FIGURES: dict[str, Callable[[], None]] = {
         page.page_two_robots,
     )
 }
-"""Name → what makes the picture of that name, in the paper's order; the page comes last."""
+"""Name → what makes the picture of that name: the rooms, then in the paper's order; the page comes last."""
 
 
 def main(names: Sequence[str]) -> int:
