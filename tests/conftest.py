@@ -15,11 +15,11 @@ from symgrasp.files import SCENES_DIR
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
 
-# CI asks the same questions every time; on a desk every run asks new ones.
+# CI asks the same questions every time; elsewhere every run asks new ones.
 # No deadlines: the first example may have to wait for code to be compiled.
 settings.register_profile("ci", derandomize=True, deadline=None)
-settings.register_profile("desk", deadline=None)
-settings.load_profile("ci" if os.environ.get("CI") else "desk")
+settings.register_profile("local", deadline=None)
+settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 SHIPPED = list(shipped_scenes())
 

@@ -57,7 +57,7 @@ class Lobby:
     def __init__(self, cache: SharedCache, is_here: Callable[[int], bool]) -> None:
         self._cache, self._is_here = cache, is_here
         self._pool = ProcessPool(cache.folders)
-        self._lock = threading.Lock()
+        self._lock = threading.Condition()
         self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
         self._sessions: dict[int, Session] = {}
 
@@ -65,6 +65,11 @@ class Lobby:
     def open(self) -> int:
         """How many sessions there are."""
         return len(self._sessions)
+
+    def wait_until_empty(self, timeout: float | None = None) -> bool:
+        """Wait, for so long (s) at most, until there is no session; return whether there is none."""
+        with self._lock:
+            return self._lock.wait_for(lambda: not self._sessions, timeout)
 
     def arrived(self, client: viser.ClientHandle) -> None:
         """A browser connected to viser: ask it to come in through the door, and show something meanwhile."""
@@ -89,6 +94,7 @@ class Lobby:
         """A browser disconnected."""
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
+            self._lock.notify_all()
             self._waiting = {t: known for t, known in self._waiting.items() if known[0] is not client}
         if session:
             session.close()
@@ -98,6 +104,7 @@ class Lobby:
         with self._lock:
             sessions, self._sessions = list(self._sessions.values()), {}
             self._waiting.clear()
+            self._lock.notify_all()
         for session in sessions:
             session.close()
         self._pool.close()

@@ -11,7 +11,7 @@ import viser
 from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-__all__ = ["WakingBuffer", "any_port", "quiet_server"]
+__all__ = ["AsyncMessageBuffer", "WakingBuffer", "any_port", "quiet_server"]
 
 
 class _LoopEvent(asyncio.Event):

@@ -58,15 +58,16 @@ class ConfigurationFinder:
             cells: a feasible cell for every arm.
             every: try all combinations of feasible configurations, not the witnesses alone.
         """
-        if self._together(self.witnesses(cells)):
+        if self.are_free_together(self.witnesses(cells)):
             return self.witnesses(cells)
         if every:
             for configurations in product(*(self._free(k, cell) for k, cell in enumerate(cells))):
-                if self._together(configurations):
+                if self.are_free_together(configurations):
                     return list(configurations)
         return None
 
-    def _together(self, configurations: Sequence[ArmConfiguration]) -> bool:
+    def are_free_together(self, configurations: Sequence[ArmConfiguration]) -> bool:
+        """Return whether nothing collides when every arm takes its configuration."""
         self.body_checks += 1
         self.world.set_object(self.maps[0].T_world_object)
         self.world.set_arms(configurations)

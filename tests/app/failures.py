@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numba
 
-from app.compute.process_main import serve
+from app.compute.process_main import REPORT_INTERVAL, serve
 from symgrasp.feasibility.create import MapMaker
 
 
@@ -32,7 +31,7 @@ def serve_endless(pipe: Connection, folders: tuple[Path, ...]) -> None:
     def endless(*_: Any, progress: Any, **__: Any) -> None:
         while True:
             progress(0.5)
-            time.sleep(0.001)
+            pipe.poll(REPORT_INTERVAL)  # until a cancel is there to be read
 
     setattr(MapMaker, "map", endless)  # noqa: B010
     serve(pipe, folders)
@@ -45,7 +44,7 @@ def serve_compiling(pipe: Connection, folders: tuple[Path, ...]) -> None:
         assert numba.njit(lambda x: x + 1)(1) == 2
         while True:
             progress(0.5)
-            time.sleep(0.001)
+            pipe.poll(REPORT_INTERVAL)  # until a cancel is there to be read
 
     setattr(MapMaker, "map", compiles_first)  # noqa: B010
     serve(pipe, folders)

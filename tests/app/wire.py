@@ -27,7 +27,7 @@ CAMERA = {
 
 
 class Wire:
-    """One visitor; comes in through the door and keeps what it is shown.
+    """One visitor; comes in through the proxy and keeps what it is shown.
 
     Attributes:
         widgets: uuid → the properties of everything in the panels.
@@ -113,9 +113,9 @@ class Wire:
         elif kind.startswith("Gui") and "props" in message and "uuid" in message:
             self.widgets[message["uuid"]] = {"value": message.get("value"), **message["props"]}
             if found := re.search(rf'src="({HELLO}[^"]+)"', str(message["props"].get("content"))):
-                self._greet(found[1])
+                self.greet(found[1])
 
-    def _greet(self, path: str) -> None:
+    def greet(self, path: str) -> None:
         page = f"http://127.0.0.1:{self.port}/" + (f"?{self.query}" if self.query else "")
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT)
         connection.request("GET", path, headers={"Referer": page})

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from docs.figures.__main__ import FIGURES
-from docs.pages import NOT_RUN, PAGES, blocks, commands, run, shown
+from docs.pages import NOT_RUN, PAGES, Step, blocks, commands, run, shown
 from symgrasp.scene.scene import Scene
 
 ROOT = Path(__file__).parent.parent.parent
@@ -18,6 +21,13 @@ README = ROOT / "README.md"
 IMAGES = ROOT / "docs/images"
 TUTORIAL = "tutorial_"
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+class Done(NamedTuple):
+    """A page that was run: where, and what happened at each of its blocks."""
+
+    folder: Path
+    steps: list[Step]
 
 
 def same(printed: str, expected: str) -> bool:
@@ -40,23 +50,36 @@ def test_texts_are_compared():
     assert not same("a 1", "a 1 b")
 
 
+@pytest.fixture(scope="module")
+def done(tmp_path_factory) -> Callable[[Path], Done]:
+    """Run a page, once for all tests."""
+
+    @cache
+    def run_once(page: Path) -> Done:
+        folder = tmp_path_factory.mktemp(page.stem)
+        return Done(folder, list(run(page, folder)))
+
+    return run_once
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_a_page_runs_from_top_to_bottom(page, tmp_path):
+def test_a_page_runs_from_top_to_bottom(page, done):
     """In one folder: a later block may use the file of an earlier one."""
-    for step in run(page, tmp_path):
+    folder, steps = done(page)
+    for step in steps:
         assert step.status == 0, step.printed
         if step.expected is not None:
             assert same(shown(step.printed, step.expected), step.expected), step.printed
         if step.block.language == "sh":
             wanted = [c for c in commands(step.block) if not c.startswith(NOT_RUN)]
             out = [name for c in wanted for name in re.findall(r"--(?:out|fit) (\S+)", c)]
-            assert all((tmp_path / name).is_file() for name in out)
+            assert all((folder / name).is_file() for name in out)
 
 
-def test_the_tutorial_shows_the_pictures_that_it_makes(tmp_path):
-    page = ROOT / "docs/tutorial.md"
-    assert all(step.status == 0 for step in run(page, tmp_path))
-    made = sorted(tmp_path.glob("*.png"))
+def test_the_tutorial_shows_the_pictures_that_it_makes(done):
+    folder, steps = done(ROOT / "docs/tutorial.md")
+    assert all(step.status == 0 for step in steps)
+    made = sorted(folder.glob("*.png"))
     assert len(made) >= 2
     for picture in made:
         kept = IMAGES / f"{TUTORIAL}{picture.name}"

@@ -1,4 +1,4 @@
-"""The page without a mouse, undo and redo, light and dark, on a desk and on a tablet."""
+"""The page without a mouse, undo and redo, light and dark, on a monitor and on a tablet."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def brightness(page: GraspPage) -> float:
 def test_everything_has_a_key(open_page):
     page = open_page(scene="pick_pour_place")
     press, label = page.page.keyboard.press, lambda name: page.page.get_by_label(name, exact=True)
-    page.page.locator(".sg-title").click()  # out of the dropdown, where keys mean other things
+    page.page.locator(".sg-title").click()  # out of the dropdown, where keys mean something else
     press("2")
     page.expect_title("· pour ·")
     press("g")

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from playwright.sync_api import Browser, Error, Locator, expect
 
 from tests.e2e.page import GraspPage
@@ -46,7 +47,7 @@ class Newcomer:
     """Somebody who tries everything, in an order that a seed gives.
 
     Attributes:
-        done: how often which kind of thing was done.
+        done: how often which kind of action was done.
     """
 
     def __init__(self, page: GraspPage, seed: int) -> None:
@@ -133,6 +134,7 @@ class Newcomer:
         return self.box["x"] + x, self.box["y"] + y
 
 
+@pytest.mark.random_walk
 def test_random_actions_end_in_the_picture_of_a_fresh_page(open_page, browser: Browser):
     page = open_page(scene="pick_pour_place")
     newcomer = Newcomer(page, seed=1)

@@ -60,10 +60,10 @@ def test_the_colour_blind_can_tell_the_colours_apart(bottle_map, eyes):
     assert np.linalg.norm(seen[1:] - seen[0], axis=1).min() > 15  # from "not feasible"
 
 
-@pytest.mark.parametrize("view", ColorBy)
-def test_every_cell_is_counted_and_coloured_as_the_legend_says(bottle_map, view):
-    values = bottle_map.values(view)
-    found = color_map(view, bottle_map.reason, values)
+@pytest.mark.parametrize("color_by", ColorBy)
+def test_every_cell_is_counted_and_coloured_as_the_legend_says(bottle_map, color_by):
+    values = bottle_map.values(color_by)
+    found = color_map(color_by, bottle_map.reason, values)
     assert found.index.shape == bottle_map.reason.shape
     assert found.index.max() < len(found.colors)
     seen = found.colors[found.index]
@@ -71,10 +71,10 @@ def test_every_cell_is_counted_and_coloured_as_the_legend_says(bottle_map, view)
         channels = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
         assert (seen == channels).all(axis=-1).sum() == count, label
     assert found.scale is not None or sum(s.cells for s in found.swatches) == bottle_map.reason.size
-    assert (found.scale is None) == (view.unit == "")
+    assert (found.scale is None) == (color_by.unit == "")
     if found.scale:
         assert (found.index > 0).sum() == bottle_map.feasible.sum()
-        assert view.unit in found.scale.label
+        assert color_by.unit in found.scale.label
 
 
 def test_values_are_those_of_the_cells(bottle_map):
@@ -87,8 +87,8 @@ def test_values_are_those_of_the_cells(bottle_map):
             ColorBy.AROUND: np.rad2deg(margin.around),
             ColorBy.OPENING: 1e3 * witness.opening,
         }
-        for view, value in expected.items():
-            assert bottle_map.values(view)[cell] == pytest.approx(value)
+        for color_by, value in expected.items():
+            assert bottle_map.values(color_by)[cell] == pytest.approx(value)
     assert np.isnan(bottle_map.values(ColorBy.CLEARANCE)[~bottle_map.feasible]).all()
     assert np.isnan(bottle_map.values(ColorBy.REASON)).all()
 
@@ -107,20 +107,20 @@ def test_a_colour_can_be_read_back_off_its_scale(values):
 
 def test_no_feasible_cell_is_no_error(bottle_map):
     none = bottle_map.masked(np.zeros(bottle_map.reason.shape, dtype=bool))
-    for view in ColorBy:
-        found = color_map(view, none.reason, none.values(view))
-        assert (found.scale is None) == (view.unit == "")
+    for color_by in ColorBy:
+        found = color_map(color_by, none.reason, none.values(color_by))
+        assert (found.scale is None) == (color_by.unit == "")
 
 
-@pytest.mark.parametrize("view", [ColorBy.REASON, ColorBy.CLEARANCE])
+@pytest.mark.parametrize("color_by", [ColorBy.REASON, ColorBy.CLEARANCE])
 @pytest.mark.parametrize(("delta", "pieces"), [(0.0, 2), (0.05, 4)])  # a shifted grid comes round again
-def test_an_svg_holds_the_cells_themselves(bottle_map, view, delta, pieces):
+def test_an_svg_holds_the_cells_themselves(bottle_map, color_by, delta, pieces):
     m = bottle_map.shift(delta)
-    svg = pictures.to_svg(m.plot(view))
-    assert svg == pictures.to_svg(m.plot(view))
+    svg = pictures.to_svg(m.plot(color_by))
+    assert svg == pictures.to_svg(m.plot(color_by))
     images = ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}image")
     assert sum("pixelated" in (image.get("style") or "") for image in images) == pieces
-    found = color_map(view, m.reason, m.values(view))
+    found = color_map(color_by, m.reason, m.values(color_by))
     hrefs = re.findall(rb"base64,([^\"]+)", svg)
     drawn = [np.asarray(Image.open(io.BytesIO(base64.b64decode(h))).convert("RGB")) for h in hrefs]
     for cells in found.colors[found.index]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from IPython.core.formatters import DisplayFormatter
 
 from symgrasp.errors import Cancelled, MapError
 from symgrasp.feasibility import exact
@@ -293,8 +294,8 @@ def test_files_that_are_no_maps(bottle_map, tmp_path):
 
 
 def test_the_picture_is_a_png(bottle_map):
-    png = bottle_map._repr_png_()
-    assert png.startswith(b"\x89PNG")
+    png, _ = DisplayFormatter().format(bottle_map, include={"image/png"})
+    assert png["image/png"].startswith(b"\x89PNG")
     figure = bottle_map.plot()
     assert len(figure.axes) == len(ROLLS)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]

@@ -20,4 +20,4 @@ def solve_at(ik: ClosedFormIK, T_base_tool: Array, phi: float) -> Solutions:
         arm.lower[ik.locked] = arm.upper[ik.locked] = phi
     found = type(ik)(arm, 1).solve(T_base_tool)
     q, inside = ik.arm.within_limits(found.q)
-    return found._replace(q=q, inside=inside)
+    return Solutions(q, found.sample, found.branch, inside)

@@ -44,10 +44,10 @@ def pool(cache):
 
 
 @pytest.fixture
-def shop(cache, pool):
-    shop = ComputeProcess(pool, cache.keep)
-    yield shop
-    shop.close()
+def process(cache, pool):
+    process = ComputeProcess(pool, cache.keep)
+    yield process
+    process.close()
 
 
 def quiet(share: float) -> None:
@@ -59,17 +59,17 @@ def feasible_cell(m: FeasibilityMap) -> Cell:
     return Cell(roll, row, column)
 
 
-def process_of(shop: ComputeProcess) -> int:
-    assert shop.pid
-    return shop.pid
+def pid_of(process: ComputeProcess) -> int:
+    assert process.pid
+    return process.pid
 
 
-def test_what_comes_back_is_what_the_service_computes_of_the_same_scene(shop, cache):
+def test_what_comes_back_is_what_the_service_computes_of_the_same_scene(process, cache):
     scene = load_small("bottle_on_table")
     request = changes.moved(State.of(scene, ""), x=0.5).request
-    result = shop.map(request, quiet)
-    bench = MapService()
-    right = bench.map(request, quiet)
+    result = process.map(request, quiet)
+    service = MapService()
+    right = service.map(request, quiet)
     assert np.array_equal(result.map.reason, right.map.reason)
     assert np.array_equal(result.map.q, right.map.q, equal_nan=True)
     assert result.request.scene is scene
@@ -78,54 +78,54 @@ def test_what_comes_back_is_what_the_service_computes_of_the_same_scene(shop, ca
     assert found.map is result.map
     with pytest.raises(ValueError, match="read-only"):
         result.map.reason[0, 0, 0] = 0
-    check = shop.compare(CompareRequest(request, 0.4), result.map, quiet)
+    check = process.compare(CompareRequest(request, 0.4), result.map, quiet)
     assert check.differing == 0
     asked = ExplainRequest(request, feasible_cell(result.map))
-    candidates = shop.explain(asked, quiet).explanation.candidates
+    candidates = process.explain(asked, quiet).explanation.candidates
     assert candidates
-    assert [v.reason for v in candidates] == [
-        v.reason for v in bench.explain(asked, quiet).explanation.candidates
+    assert [c.reason for c in candidates] == [
+        c.reason for c in service.explain(asked, quiet).explanation.candidates
     ]
-    bench.close()
+    service.close()
 
 
-def test_plans_are_listed_on_in_the_same_process_and_not_in_another(shop, cache):
+def test_plans_are_listed_on_in_the_same_process_and_not_in_another(process, cache):
     scene = load_small("pick_pour_place", heights=12, angles=24)
     request = PlanRequest(scene, "sequential", "best", "panda")
-    outcome, maps = shop.plan(request, {}, quiet)
+    outcome, maps = process.plan(request, {}, quiet)
     assert outcome.plans
     assert set(maps) == {(task, "panda") for task in scene.tasks}
     assert all(result.request.scene is scene for result in maps.values())
     assert all(cache.map(result.request).map is result.map for result in maps.values())
-    again, known = shop.plan(request, maps, quiet)
+    again, known = process.plan(request, maps, quiet)
     assert known == maps  # nothing was computed again
     assert [p.plan for p in again.plans] == [p.plan for p in outcome.plans]
-    assert shop.more(quiet) == ((), False)
-    shop.close()
+    assert process.more(quiet) == ((), False)
+    process.close()
     with pytest.raises(NoPlanError, match="plan again"):
-        shop.more(quiet)
+        process.more(quiet)
 
 
-def test_an_error_arrives_as_it_was_raised(shop):
+def test_an_error_arrives_as_it_was_raised(process):
     with pytest.raises(PlanError, match=r"bad\.json: ") as caught:
-        shop.open(b"{", "bad.json", quiet)
+        process.open(b"{", "bad.json", quiet)
     assert caught.value.source == "bad.json"
 
 
 def test_whatever_a_library_raises_arrives(cache, monkeypatch):
     monkeypatch.setattr(process_pool, "serve", failures.serve_broken)
     pool = ProcessPool(cache.folders)
-    shop = ComputeProcess(pool, cache.keep)
+    process = ComputeProcess(pool, cache.keep)
     with pytest.raises(RuntimeError, match="Strange: of this process only"):
-        shop.map(State.of(load_small("bottle_on_table"), "").request, quiet)
-    shop.close()
+        process.map(State.of(load_small("bottle_on_table"), "").request, quiet)
+    process.close()
     pool.close()
 
 
 def test_a_cancel_is_heard_by_the_process_which_goes_on(cache, monkeypatch):
     monkeypatch.setattr(process_pool, "serve", failures.serve_endless)
     pool = ProcessPool(cache.folders)
-    shop = ComputeProcess(pool, cache.keep)
+    process = ComputeProcess(pool, cache.keep)
     state = State.of(load_small("bottle_on_table"), "")
 
     def impatient(share: float) -> None:
@@ -133,36 +133,36 @@ def test_a_cancel_is_heard_by_the_process_which_goes_on(cache, monkeypatch):
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        shop.map(state.request, impatient)
-    process = process_of(shop)
+        process.map(state.request, impatient)
+    pid = pid_of(process)
     cell = feasible_cell(small_map("bottle_on_table", "pick", "panda").map)
-    assert shop.explain(ExplainRequest(state.request, cell), quiet).explanation.candidates
-    assert process_of(shop) == process
-    shop.close()
+    assert process.explain(ExplainRequest(state.request, cell), quiet).explanation.candidates
+    assert pid_of(process) == pid
+    process.close()
     pool.close()
 
 
-def test_a_process_that_dies_is_told_and_followed_by_another(cache, monkeypatch):
+def test_a_process_that_dies_is_reported_and_followed_by_another(cache, monkeypatch):
     with monkeypatch.context() as trouble:
         trouble.setattr(process_pool, "serve", failures.serve_endless)
         pool = ProcessPool(cache.folders)
-        shop = ComputeProcess(pool, cache.keep)
+        process = ComputeProcess(pool, cache.keep)
 
         def kill(share: float) -> None:
             if share == 0.5:
-                os.kill(process_of(shop), signal.SIGSEGV)
+                os.kill(pid_of(process), signal.SIGSEGV)
                 pool.close()  # the next one is not of that kind
                 trouble.undo()
 
         state = State.of(load_small("soda_can"), "")
         with pytest.raises(ProcessDied, match=r"ended unexpectedly \(SIGSEGV\)"):
-            shop.map(state.request, kill)
-    shop.map(state.request, quiet)
-    idle = next(p for p in multiprocessing.active_children() if p.pid == shop.pid)
+            process.map(state.request, kill)
+    process.map(state.request, quiet)
+    idle = next(p for p in multiprocessing.active_children() if p.pid == process.pid)
     idle.kill()  # nobody needs to know
     idle.join()
-    shop.map(changes.moved(state, x=0.43).request, quiet)
-    shop.close()
+    process.map(changes.moved(state, x=0.43).request, quiet)
+    process.close()
 
 
 SERVER = """

@@ -1,4 +1,4 @@
-"""The worker: one job at a time, the newest wins, nothing kills it."""
+"""The queue of jobs: one job at a time, the newest wins, nothing kills it."""
 
 from __future__ import annotations
 
@@ -39,47 +39,48 @@ def finished() -> threading.Event:
 
 
 @pytest.fixture
-def worker(finished) -> Iterator[JobQueue]:
-    worker = JobQueue("test", finished.set)
-    yield worker
-    worker.close()
-    worker.join(WAIT)
+def jobs(finished) -> Iterator[JobQueue]:
+    jobs = JobQueue("test", finished.set)
+    yield jobs
+    jobs.close()
+    jobs.join(WAIT)
 
 
 class Held:
-    """A job that goes on until it is let go or stopped."""
+    """A job that reports progress once it is let go."""
 
     def __init__(self) -> None:
         self.begun, self.go, self.stopped = threading.Event(), threading.Event(), threading.Event()
 
     def __call__(self, progress: Callable[[float], None]) -> str:
         self.begun.set()
+        assert self.go.wait(WAIT)
         try:
-            while not self.go.wait(0.001):
-                progress(0.5)
+            progress(0.5)
         except BaseException:
             self.stopped.set()
             raise
         return "held"
 
 
-def test_a_job_reports_progress_and_its_result(worker):
+def test_a_job_reports_progress_and_its_result(jobs):
     log = Log()
 
     def run(progress):
         progress(0.25)
         return 42
 
-    worker.submit(log.job(run))
+    jobs.submit(log.job(run))
     assert log.next() == ("progress", 0.25)
     assert log.next() == ("done", 42)
 
 
-def test_a_new_job_stops_the_old_one(worker):
+def test_a_new_job_stops_the_old_one(jobs):
     log, held = Log(), Held()
-    worker.submit(log.job(held, "old "))
+    jobs.submit(log.job(held, "old "))
     assert held.begun.wait(WAIT)
-    worker.submit(log.job(lambda _: 1, "new "))
+    jobs.submit(log.job(lambda _: 1, "new "))
+    held.go.set()
     assert held.stopped.wait(WAIT)
     kinds = []
     while not kinds or kinds[-1] != "new done":
@@ -87,25 +88,26 @@ def test_a_new_job_stops_the_old_one(worker):
     assert set(kinds) <= {"old progress", "new done"}
 
 
-def test_of_those_that_wait_only_the_newest_is_done(worker):
+def test_of_those_that_wait_only_the_newest_is_done(jobs):
     log, begun, go = Log(), threading.Event(), threading.Event()
     ran = []
-    worker.submit(log.job(lambda _: (begun.set(), go.wait(WAIT)), "deaf "))  # hears of no cancelling
+    jobs.submit(log.job(lambda _: (begun.set(), go.wait(WAIT)), "deaf "))  # hears of no cancelling
     assert begun.wait(WAIT)
     for k in range(5):
-        worker.submit(log.job(lambda _, k=k: ran.append(k), f"{k} "))
+        jobs.submit(log.job(lambda _, k=k: ran.append(k), f"{k} "))
     go.set()
     assert log.next()[0] == "4 done"
     assert ran == [4]
 
 
-def test_cancel_stops_and_says_nothing(worker):
+def test_cancel_stops_and_says_nothing(jobs):
     log, held = Log(), Held()
-    worker.submit(log.job(held))
+    jobs.submit(log.job(held))
     assert held.begun.wait(WAIT)
-    worker.cancel()
+    jobs.cancel()
+    held.go.set()
     assert held.stopped.wait(WAIT)
-    worker.submit(log.job(lambda _: "next", "next "))
+    jobs.submit(log.job(lambda _: "next", "next "))
     kinds = []
     while not kinds or kinds[-1] != "next done":
         kinds.append(log.next()[0])
@@ -123,21 +125,21 @@ def test_cancel_stops_and_says_nothing(worker):
         (ProcessDied("it ended"), "it ended; what you set is kept, and the physics begins anew"),
     ],
 )
-def test_an_error_is_one_line_and_the_worker_goes_on(worker, error, text):
+def test_an_error_is_one_line_and_the_queue_goes_on(jobs, error, text):
     log = Log()
 
     def run(progress):
         raise error
 
-    worker.submit(log.job(run))
+    jobs.submit(log.job(run))
     assert log.next() == ("failed", text)
-    worker.submit(log.job(lambda _: 1))
+    jobs.submit(log.job(lambda _: 1))
     assert log.next() == ("done", 1)
 
 
 def test_only_what_nobody_expected_frees_what_jobs_use():
     restarts: list[str] = []
-    worker, log = JobQueue("test", lambda: restarts.append("anew")), Log()
+    jobs, log = JobQueue("test", lambda: restarts.append("anew")), Log()
 
     def breaks(error: Exception) -> Callable[[Callable[[float], None]], Any]:
         def run(progress: Callable[[float], None]) -> None:
@@ -146,26 +148,27 @@ def test_only_what_nobody_expected_frees_what_jobs_use():
         return run
 
     try:
-        worker.submit(log.job(breaks(NoPlanError("no grasp"))))
+        jobs.submit(log.job(breaks(NoPlanError("no grasp"))))
         assert log.next()[0] == "failed"
         assert restarts == []
-        worker.submit(log.job(breaks(RuntimeError("physics"))))
+        jobs.submit(log.job(breaks(RuntimeError("physics"))))
         assert log.next()[0] == "failed"
         assert restarts == ["anew"]
     finally:
-        worker.close()
-        worker.join(WAIT)
+        jobs.close()
+        jobs.join(WAIT)
 
 
-def test_close_stops_the_job_and_frees_what_it_used(worker, finished):
+def test_close_stops_the_job_and_frees_what_it_used(jobs, finished):
     log, held = Log(), Held()
-    worker.submit(log.job(held))
+    jobs.submit(log.job(held))
     assert held.begun.wait(WAIT)
-    worker.close()
-    worker.join(WAIT)
+    jobs.close()
+    held.go.set()
+    jobs.join(WAIT)
     assert held.stopped.is_set()
     assert finished.is_set()
-    worker.submit(log.job(lambda _: 1, "late "))
+    jobs.submit(log.job(lambda _: 1, "late "))
     with pytest.raises(Empty):
         while log.heard.get_nowait()[0] == "progress":
             pass

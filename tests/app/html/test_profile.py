@@ -1,6 +1,6 @@
 """The profile beside the map, what fits where, and the symmetry error."""
 
-# A thing may have no measurement in general, but not where these tests look.
+# An object may have no measurement in general, but not where these tests look.
 # pyright: reportOptionalMemberAccess=false, reportArgumentType=false
 
 from __future__ import annotations

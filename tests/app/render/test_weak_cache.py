@@ -21,7 +21,7 @@ from symgrasp.object.manifold import ROLLS
 from tests.app.state.test_state import opened, planned
 
 
-class ObjectChoice:
+class Kept:
     """May go."""
 
 
@@ -29,11 +29,11 @@ def test_a_result_is_made_once_and_goes_with_what_it_was_made_from():
     made: list[str] = []
 
     @cached_with_first
-    def make(_: ObjectChoice, name: str) -> ObjectChoice:
+    def make(_: Kept, name: str) -> Kept:
         made.append(name)
-        return ObjectChoice()
+        return Kept()
 
-    one, other = ObjectChoice(), ObjectChoice()
+    one, other = Kept(), Kept()
     first = make(one, "a")
     assert make(one, "a") is first
     assert make(one, "b") is not first
@@ -68,13 +68,13 @@ def drawn() -> list[weakref.ref[object]]:
     cell_colors(state, state.map)
     assert len(shown_prints(state)) == 1
     maps = [result.map for result in state.plan_results.maps.values()]
-    return [weakref.ref(object_choice) for object_choice in (state.scene, state.map, *maps)]
+    return [weakref.ref(kept) for kept in (state.scene, state.map, *maps)]
 
 
 def test_no_picture_keeps_the_maps_and_the_scene_of_a_closed_page():
-    things = drawn()
+    drawn_from = drawn()
     gc.collect()
-    assert [object_choice() for object_choice in things] == [None] * 5
+    assert [reference() for reference in drawn_from] == [None] * 5
 
 
 def test_cells_that_serve_all_tasks_are_those_of_the_turned_maps():

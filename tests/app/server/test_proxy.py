@@ -48,13 +48,13 @@ def visits() -> Visits:
 
 @pytest.fixture
 def port(visits) -> Iterator[int]:
-    """A door in front of the echo."""
+    """A proxy in front of the echo."""
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Echo) as echo:
         threading.Thread(target=echo.serve_forever, daemon=True).start()
         port = a_free_port()
-        door = Proxy("127.0.0.1", port, echo.server_address[1], visits)
+        proxy = Proxy("127.0.0.1", port, echo.server_address[1], visits)
         yield port
-        door.close()
+        proxy.close()
         echo.shutdown()
 
 
@@ -107,7 +107,7 @@ def test_strangers_are_turned_away_before_anything_passes(port):
     assert ask(port, "/").startswith(b"HTTP/1.1 403 ")
 
 
-def test_a_page_of_the_doors_own_is_greeted_with_the_address_it_opened(port, visits):
+def test_a_page_of_the_proxys_own_is_greeted_with_the_address_it_opened(port, visits):
     host = f"127.0.0.1:{port}"
     page = f"http://{host}/?scene=soda_can&turn=30"
     assert b"200 OK" in ask(port, f"{HELLO}known", Host=host, Referer=page, Sec_Fetch_Site="same-origin")
@@ -152,7 +152,7 @@ def test_a_taken_port_is_an_error(port, visits):
 def test_viser_is_reached_from_the_own_origin_only(visits):
     server = viser.ViserServer(host="127.0.0.1", port=a_free_port(), verbose=False)
     port = a_free_port()
-    door = Proxy("127.0.0.1", port, server.get_port(), visits)
+    proxy = Proxy("127.0.0.1", port, server.get_port(), visits)
     try:
         own = Origin(f"http://127.0.0.1:{port}")
         with connect(f"ws://127.0.0.1:{port}", origin=own, subprotocols=[PROTOCOL]) as socket_:
@@ -161,5 +161,5 @@ def test_viser_is_reached_from_the_own_origin_only(visits):
             connect(f"ws://127.0.0.1:{port}", origin=Origin("http://evil.example"), subprotocols=[PROTOCOL])
         assert refused.value.response.status_code == 403
     finally:
-        door.close()
+        proxy.close()
         server.stop()

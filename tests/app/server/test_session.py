@@ -12,7 +12,6 @@ import re
 import signal
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -24,7 +23,7 @@ import pytest
 
 from app.compute import compute_process, process_pool
 from app.compute.cache import SharedCache
-from app.compute.job_queue import JobQueue
+from app.compute.job_queue import Job, JobQueue
 from app.compute.warm_up import compute_first_map
 from app.panels.status_panel import StatusPanel
 from app.scene3d.scene_view import SceneView
@@ -41,11 +40,11 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 
 @dataclass
-class House:
-    """A server, the port of its door, and what it keeps."""
+class Server:
+    """The page being served: its maps, its lobby and the port of its proxy."""
 
     cache: SharedCache
-    reception: Lobby
+    lobby: Lobby
     port: int
 
     def visit(self, query: str = "") -> Wire:
@@ -56,25 +55,22 @@ class House:
         for thread in threading.enumerate():
             if thread.name.startswith(("jobs", "painter")):
                 thread.join(30)
-        deadline = time.monotonic() + 30
-        while self.reception.open and time.monotonic() < deadline:
-            threading.Event().wait(0.01)
-        assert self.reception.open == 0
+        assert self.lobby.wait_until_empty(30)
 
 
 @contextmanager
-def open_house_on_a_table() -> Iterator[House]:
+def start_server() -> Iterator[Server]:
     cache = SharedCache("bottle_on_table")
     compute_first_map(cache)
     port = any_port()
-    with open_lobby(cache, "127.0.0.1", port) as reception:
-        yield House(cache, reception, port)
+    with open_lobby(cache, "127.0.0.1", port) as lobby:
+        yield Server(cache, lobby, port)
 
 
 @pytest.fixture(scope="module")
-def house() -> Iterator[House]:
-    with open_house_on_a_table() as house:
-        yield house
+def server() -> Iterator[Server]:
+    with start_server() as server:
+        yield server
 
 
 def picture(html: str) -> str:
@@ -90,7 +86,7 @@ def ready(html: str) -> bool:
 
 def alive(*kinds: type) -> list[int]:
     gc.collect()
-    return [sum(isinstance(object_choice, kind) for object_choice in gc.get_objects()) for kind in kinds]
+    return [sum(isinstance(found, kind) for found in gc.get_objects()) for kind in kinds]
 
 
 def megabytes() -> float:
@@ -107,29 +103,29 @@ class Left:
     """What there is in a process of a server that nobody visits.
 
     Attributes:
-        things: how many sessions, views and physics worlds.
+        objects: how many sessions, views and physics worlds.
         threads: how many threads.
         processes: how many processes that compute.
         memory: of it (MB).
     """
 
-    things: list[int]
+    objects: list[int]
     threads: int
     processes: int
     memory: float
 
     @classmethod
     def now(cls) -> Left:
-        things = alive(Session, SceneView, BulletWorld)
-        return cls(things, threading.active_count(), len(workshops()), megabytes())
+        objects = alive(Session, SceneView, BulletWorld)
+        return cls(objects, threading.active_count(), len(processes()), megabytes())
 
 
 def before_and_after_a_hundred_sessions() -> tuple[Left, Left]:
     """Run in a process of its own: what other tests leave would blur the memory."""
-    with open_house_on_a_table() as house, ThreadPoolExecutor(10) as people:
+    with start_server() as server, ThreadPoolExecutor(10) as people:
 
         def come_and_go(k: int) -> None:
-            with house.visit() as visitor:
+            with server.visit() as visitor:
                 first = picture(visitor.wait_for(ready))
                 if k % 5 == 0:  # needs a physics world
                     visitor.set("x (cm)", 40 + 0.1 * k)
@@ -137,7 +133,7 @@ def before_and_after_a_hundred_sessions() -> tuple[Left, Left]:
 
         def ten_at_once(round_: int) -> None:
             list(people.map(come_and_go, range(10 * round_, 10 * round_ + 10)))
-            house.wait_until_empty()
+            server.wait_until_empty()
 
         ten_at_once(0)
         before = Left.now()
@@ -146,17 +142,18 @@ def before_and_after_a_hundred_sessions() -> tuple[Left, Left]:
         return before, Left.now()
 
 
+@pytest.mark.soak
 def test_a_hundred_sessions_come_and_go_and_leave_nothing():
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as alone:
         before, after = alone.submit(before_and_after_a_hundred_sessions).result()
-    assert after.things == before.things == [0, 0, 0]
+    assert after.objects == before.objects == [0, 0, 0]
     assert after.threads <= before.threads + 32  # viser's pool grows up to this many
     assert after.processes == 1  # the one that is kept for the next
-    assert after.memory - before.memory < 60  # maps that the store keeps; a world alone takes some 10
+    assert after.memory - before.memory < 60  # maps that the cache keeps; a world alone takes some 10
 
 
-def test_nobody_sees_the_drags_of_others(house):
-    with house.visit() as one, house.visit("scene=soda_can") as other:
+def test_nobody_sees_the_drags_of_others(server):
+    with server.visit() as one, server.visit("scene=soda_can") as other:
         first = picture(one.wait_for(ready))
         can = other.wait_for(lambda html: ready(html) and "soda_can" in html)
         for degrees in range(0, 90, 3):
@@ -171,40 +168,66 @@ def test_nobody_sees_the_drags_of_others(house):
         assert rotations == [0.0]
 
 
-def test_whoever_has_not_come_through_the_door_gets_no_session(house):
+def test_a_change_looks_a_map_up_once_and_computes_it_only_if_it_is_not_known(server, monkeypatch):
+    look_up, submit = SharedCache.map, JobQueue.submit
+    looked_up: list[bool] = []
+    submitted: list[Job] = []
+
+    def counted(cache, request):
+        known = look_up(cache, request)
+        looked_up.append(known is not None)
+        return known
+
+    def noted(queue, job):
+        submitted.append(job)
+        submit(queue, job)
+
+    with server.visit() as visitor:
+        first = picture(visitor.wait_for(ready))
+        monkeypatch.setattr(SharedCache, "map", counted)
+        monkeypatch.setattr(JobQueue, "submit", noted)
+        visitor.set("x (cm)", 56.5)
+        moved = picture(visitor.wait_for(lambda html: picture(html) != first and ready(html)))
+        assert (looked_up, len(submitted)) == ([False], 1)
+        visitor.set("x (cm)", 55.0)
+        visitor.wait_for(lambda html: picture(html) != moved and ready(html))
+        assert (looked_up, len(submitted)) == ([False, True], 1)
+
+
+def test_whoever_has_not_come_through_the_proxy_gets_no_session(server):
     class Stranger(Wire):
-        def _greet(self, path: str) -> None:
+        def greet(self, path: str) -> None:
             self.met = path
 
-    house.wait_until_empty()
-    with Stranger(house.port) as stranger:
+    server.wait_until_empty()
+    with Stranger(server.port) as stranger:
         assert "Loading" in stranger.wait_for("Loading")
-        assert house.reception.open == 0
+        assert server.lobby.open == 0
         assert [w for w in stranger.widgets.values() if w.get("label")] == []
 
 
-def workshops() -> list[int]:
+def processes() -> list[int]:
     """The processes that compute for somebody, or are kept for it, oldest first."""
     return sorted(process.pid or 0 for process in multiprocessing.active_children())
 
 
-def signal_workshops(number: int) -> None:
-    for pid in workshops():
+def signal_processes(number: int) -> None:
+    for pid in processes():
         os.kill(pid, number)
 
 
 @pytest.mark.parametrize("restart", ["Restart", "the next change"])
-def test_a_killed_process_is_told_loses_nothing_and_can_be_restarted(house, restart):
-    with house.visit() as visitor:
+def test_a_killed_process_is_reported_loses_nothing_and_can_be_restarted(server, restart):
+    with server.visit() as visitor:
         visitor.wait_for(ready)
         visitor.set("y (cm)", 1.0 if restart == "Restart" else 2.0)
         visitor.wait_for("Computing the map of pick")
         visitor.wait_for(ready)
         visitor.set("Rotation (°)", 20.0)
-        signal_workshops(signal.SIGSTOP)  # so that it cannot be done before it is killed
+        signal_processes(signal.SIGSTOP)  # so that it cannot be done before it is killed
         visitor.set("x (cm)", 51.5 if restart == "Restart" else 51.0)
         visitor.wait_for("Computing the map of pick")
-        signal_workshops(signal.SIGKILL)
+        signal_processes(signal.SIGKILL)
         visitor.wait_for("the process that computes ended unexpectedly (SIGKILL); what you set is kept")
         visitor.wait_for(lambda _: any(w.get("label") == "Restart" for w in visitor.widgets.values()))
         if restart == "Restart":
@@ -213,43 +236,48 @@ def test_a_killed_process_is_told_loses_nothing_and_can_be_restarted(house, rest
         else:
             visitor.set("x (cm)", 53.0)
             query = "at.pick=53,2,0,0,0,0&turn=20"
-        with house.visit(query) as fresh:
+        with server.visit(query) as fresh:
             right = picture(fresh.wait_for(ready))
         html = visitor.wait_for(lambda html: picture(html) == right)
         assert "SIGKILL" not in html
 
 
-def test_cancelling_takes_effect_though_the_process_hears_nothing(house, monkeypatch):
-    with house.visit() as visitor:
+def test_cancelling_takes_effect_though_the_process_hears_nothing(server, monkeypatch):
+    with server.visit() as visitor:
         visitor.wait_for(ready)
         visitor.set("y (cm)", 3.0)
         visitor.wait_for("Computing the map of pick")
         visitor.wait_for(ready)
-        signal_workshops(signal.SIGSTOP)
+        signal_processes(signal.SIGSTOP)
         visitor.set("x (cm)", 52.5)
         visitor.wait_for("Computing the map of pick … 0 %")
         visitor.set("Rotation (°)", 10.0)  # the page lives meanwhile
         visitor.set("Cancel", True)
         visitor.wait_for("Stopped: no map for this pose yet.")
         monkeypatch.setattr(compute_process, "CANCEL_TIMEOUT", 0.0)
-        os.kill(workshops()[-1], signal.SIGCONT)  # the one that is kept; the other one never answers
+        os.kill(processes()[-1], signal.SIGCONT)  # the one that is kept; the other one never answers
         visitor.set("Compute the map", True)
         visitor.wait_for(ready)
 
 
-def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(house, monkeypatch):
-    begun, pause = threading.Event(), threading.Event()
-    show = StatusPanel.show
+def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(server, monkeypatch):
+    begun, moved = threading.Event(), threading.Event()
+    show, change = StatusPanel.show, Session.change
+
+    def noted(session, *arguments):
+        change(session, *arguments)
+        if session.state and session.state.base.x == 0.53:
+            moved.set()
 
     def slow(panel, state):
         """Draw the object that was put back only when it has been moved once more."""
         if state.base.x == 0.55:
             begun.set()
-            while panel.actions.state.base.x == 0.55:
-                pause.wait(0.001)
+            assert moved.wait(30)
         show(panel, state)
 
-    with house.visit() as visitor:
+    monkeypatch.setattr(Session, "change", noted)
+    with server.visit() as visitor:
         visitor.wait_for(ready)
         visitor.set("x (cm)", 51.0)
         visitor.wait_for_quiet()
@@ -262,30 +290,30 @@ def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(house, m
         assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [53.0]
 
 
-def test_what_a_person_asks_for_in_two_ways_at_once_leaves_nothing_half_begun(house, monkeypatch):
+def test_what_a_person_asks_for_in_two_ways_at_once_leaves_nothing_half_begun(server, monkeypatch):
     """A button is heard in a thread of viser's pool, a slider on its loop."""
-    submit, told, overtaken = JobQueue.submit, threading.Event(), threading.Event()
+    submit, asked, overtaken = JobQueue.submit, threading.Event(), threading.Event()
 
-    def slow(worker, job):
-        """Give the plan to the worker only when the map has overtaken it, if it can."""
+    def slow(queue, job):
+        """Give the plan to the queue only when the map has overtaken it, if it can."""
         in_pool = threading.current_thread().name.startswith("ThreadPool")
-        if in_pool and not told.is_set():
-            told.set()
+        if in_pool and not asked.is_set():
+            asked.set()
             overtaken.wait(1)
-        submit(worker, job)
+        submit(queue, job)
         if not in_pool:
             overtaken.set()
 
-    with house.visit() as visitor:
+    with server.visit() as visitor:
         first = picture(visitor.wait_for(ready))
         monkeypatch.setattr(JobQueue, "submit", slow)
         visitor.trigger("Plan one grasp for all tasks")
-        assert told.wait(30)
+        assert asked.wait(30)
         visitor.set("x (cm)", 47.5)
         visitor.wait_for(lambda html: picture(html) != first and ready(html))
 
 
-def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(house, monkeypatch):
+def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(server, monkeypatch):
     linked, open_scene, asked = SharedCache.linked, Actions.open_scene, threading.Event()
 
     def slow(cache, link):
@@ -293,45 +321,45 @@ def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(house, mo
         assert asked.wait(30)
         return linked(cache, link)
 
-    def told(actions, name):
+    def opened(actions, name):
         open_scene(actions, name)
         asked.set()
 
     monkeypatch.setattr(SharedCache, "linked", slow)
-    monkeypatch.setattr(Actions, "open_scene", told)
-    with house.visit("scene=soda_can") as visitor:
+    monkeypatch.setattr(Actions, "open_scene", opened)
+    with server.visit("scene=soda_can") as visitor:
         visitor.trigger("Next scene")
         assert "soda_can" in title(visitor.wait_for(ready))
 
 
-def test_a_first_scene_that_breaks_in_an_unexpected_way_leaves_no_empty_page(house, monkeypatch):
+def test_a_first_scene_that_breaks_in_an_unexpected_way_leaves_no_empty_page(server, monkeypatch):
     def broken(cache, link):
         raise RuntimeError("of this test")
 
     monkeypatch.setattr(SharedCache, "linked", broken)
-    with house.visit("scene=soda_can") as visitor:
+    with server.visit("scene=soda_can") as visitor:
         visitor.wait_for("unexpected RuntimeError: of this test")
         assert "bottle_on_table" in title(visitor.wait_for(ready))
 
 
-def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(house, monkeypatch):
+def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(server, monkeypatch):
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("of <this> test")
 
-    house.wait_until_empty()
+    server.wait_until_empty()
     before = set(threading.enumerate())
     monkeypatch.setattr(SceneView, "__init__", broken)
-    with house.visit() as visitor:
+    with server.visit() as visitor:
         html = visitor.wait_for("This page could not be opened (RuntimeError: of &lt;this&gt; test)")
         assert "Loading" not in html
         for thread in set(threading.enumerate()) - before:
             if thread.name.startswith(("jobs", "painter")):
                 thread.join(30)
                 assert not thread.is_alive()
-        assert house.reception.open == 0
+        assert server.lobby.open == 0
 
 
-def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(house, monkeypatch):
+def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(server, monkeypatch):
     show, broke = StatusPanel.show, threading.Event()
 
     def breaks_once(panel, state):
@@ -340,7 +368,7 @@ def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(h
             raise RuntimeError("of this test")
         show(panel, state)
 
-    with house.visit() as visitor:
+    with server.visit() as visitor:
         visitor.wait_for(ready)
         visitor.set("x (cm)", 51.0)
         visitor.wait_for_quiet()
@@ -351,10 +379,10 @@ def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(h
         assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [55.0]
 
 
-def test_the_page_says_that_it_waits_for_code_to_be_compiled(house, monkeypatch):
+def test_the_page_says_that_it_waits_for_code_to_be_compiled(server, monkeypatch):
     monkeypatch.setattr(process_pool, "serve", failures.serve_compiling)
     port = any_port()
-    with open_lobby(house.cache, "127.0.0.1", port), Wire(port) as visitor:
+    with open_lobby(server.cache, "127.0.0.1", port), Wire(port) as visitor:
         visitor.wait_for(ready)
         visitor.set("x (cm)", 54.5)
         visitor.wait_for(lambda _: any(w.get("value") == 50.0 for w in visitor.widgets.values()))
@@ -387,11 +415,12 @@ CHOICES = {
 }
 
 
+@pytest.mark.random_walk
 @pytest.mark.parametrize("seed", range(3))
-def test_hundreds_of_random_actions_end_in_the_picture_that_a_fresh_page_shows(house, caplog, seed):
+def test_hundreds_of_random_actions_end_in_the_picture_that_a_fresh_page_shows(server, caplog, seed):
     caplog.set_level(logging.ERROR)
     chance = random.Random(seed)
-    with house.visit() as visitor:
+    with server.visit() as visitor:
         visitor.wait_for(ready)
         for _ in range(150):
             label = chance.choice(list(CHOICES))
@@ -408,7 +437,7 @@ def test_hundreds_of_random_actions_end_in_the_picture_that_a_fresh_page_shows(h
         visitor.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
         visitor.trigger("Make a link")
         made = visitor.wait_for('class="sg-link"')
-        with house.visit(link_in(made)) as fresh:
+        with server.visit(link_in(made)) as fresh:
             again = fresh.wait_for(lambda html: ready(html) and "h = 10 cm" in html)
         # The page may show the last map for a moment yet; it must end up with the fresh page's.
         html = visitor.wait_for(lambda html: picture(html) == picture(again))
@@ -417,9 +446,9 @@ def test_hundreds_of_random_actions_end_in_the_picture_that_a_fresh_page_shows(h
     assert caplog.records == []
 
 
-def test_a_link_opens_the_tasks_that_a_person_made(house):
+def test_a_link_opens_the_tasks_that_a_person_made(server):
     name = "<b>tilt</b>, pour & ✓"
-    with house.visit() as visitor:
+    with server.visit() as visitor:
         visitor.wait_for(ready)
         visitor.set("Rotation (°)", 20.0)
         visitor.trigger("Add a task with the object here")
@@ -435,7 +464,7 @@ def test_a_link_opens_the_tasks_that_a_person_made(house):
         visitor.trigger("Make a link")
         made = visitor.wait_for('class="sg-link"')
         assert "has changed since" not in made
-        with house.visit(link_in(made)) as fresh:
+        with server.visit(link_in(made)) as fresh:
             again = fresh.wait_for(ready)
             for part in (tasks, title, picture):
                 assert part(again) == part(made)
@@ -461,7 +490,7 @@ def legend(html: str) -> str:
     return re.findall(r'<div class="sg-legend">(.*?)</div></div>', html)[0]
 
 
-def test_a_scene_from_a_file_may_be_hostile_in_every_name(house, content, tmp_path):
+def test_a_scene_from_a_file_may_be_hostile_in_every_name(server, content, tmp_path):
     content["name"] = "<script>"
     port = any_port()
     with (

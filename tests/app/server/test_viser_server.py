@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import sys
 import threading
 from typing import Any
 
 import viser
-from viser._messages import GuiUpdateMessage
 from viser.infra import Message
-from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from app.server.viser_server import WakingBuffer, quiet_server
+from app.server import viser_server
+from app.server.viser_server import AsyncMessageBuffer, WakingBuffer, quiet_server
 from tests.app.wire import Wire
+
+
+@dataclasses.dataclass
+class Numbered(Message):
+    """A message unlike any other."""
+
+    number: int
+
+    def redundancy_key(self) -> str:
+        """Return a key of its own, as a message replaces earlier ones of its key."""
+        return str(self.number)
 
 
 class SlyLoop(asyncio.SelectorEventLoop):
@@ -26,8 +37,7 @@ class SlyLoop(asyncio.SelectorEventLoop):
         future = super().create_future()
         if hasattr(self, "buffer") and self.sent < 20:
             self.sent += 1
-            message = GuiUpdateMessage(f"{self.sent}", {"value": self.sent})
-            thread = threading.Thread(target=self.buffer.push, args=(message,))
+            thread = threading.Thread(target=self.buffer.push, args=(Numbered(self.sent),))
             thread.start()
             thread.join()
         return future
@@ -65,13 +75,20 @@ def test_visers_own_buffer_still_needs_the_remedy():
     assert len(received(AsyncMessageBuffer, 1.0)) < 20
 
 
-def test_every_browser_is_served_from_such_a_buffer():
+def test_every_browser_is_served_from_such_a_buffer(monkeypatch):
+    pushed: list[tuple[WakingBuffer, Message]] = []
+
+    class Watched(WakingBuffer):
+        def push(self, message: Message) -> None:
+            pushed.append((self, message))
+            super().push(message)
+
+    monkeypatch.setattr(viser_server, "WakingBuffer", Watched)
     server = quiet_server()
-    buffers: list[object] = [server._websock_server._broadcast_buffer]
+    server.scene.add_frame("/everybody")
 
     @server.on_client_connect
     def _(client: viser.ClientHandle) -> None:
-        buffers.append(client._websock_connection._state.message_buffer)
         client.gui.add_html("hello")
 
     try:
@@ -79,7 +96,12 @@ def test_every_browser_is_served_from_such_a_buffer():
             visitor.wait_for("hello")
     finally:
         server.stop()
-    assert [type(b) for b in buffers] == [WakingBuffer, WakingBuffer]
+    monkeypatch.undo()
+    quiet_server().stop()  # the next one has viser make the buffers of the application again
+    to_all = {id(buffer) for buffer, message in pushed if "/everybody" in str(message)}
+    to_one = {id(buffer) for buffer, message in pushed if "hello" in str(message)}
+    assert len(to_all) == len(to_one) == 1
+    assert to_all != to_one
 
 
 def test_servers_start_and_stop_without_a_word_and_leave_standard_output_to_others(monkeypatch, capsys):

@@ -1,4 +1,4 @@
-"""How the map is looked at: views, prints, the recomputed map, and the candidates of a cell."""
+"""How the map is looked at: colours, prints, the recomputed map, and the candidates of a cell."""
 
 # A map, a pick or a plan may be None in general, but not where these tests look.
 # pyright: reportOptionalMemberAccess=false, reportArgumentType=false
@@ -33,17 +33,17 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.poses import rotation_z
 from symgrasp.reason import Reason
-from symgrasp.world import BodyName, BulletWorld
+from symgrasp.world import BodyName, BulletWorld, Collision
 from tests.app.state.test_state import opened
 from tests.conftest import load_small
 from tests.world.link_pose import link_pose
 
 
 @pytest.fixture(scope="module")
-def bench():
-    bench = MapService()
-    yield bench
-    bench.close()
+def service():
+    service = MapService()
+    yield service
+    service.close()
 
 
 def quiet(share: float) -> None:
@@ -58,31 +58,31 @@ def cell_with(state: State, reason: Reason) -> tuple[int, int]:
     return tuple(np.argwhere(RollChoice.EITHER.reason(state.map) == reason)[0].tolist())
 
 
-# -- views ----------------------------------------------------------------------------------
+# -- colours --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("view", ColorBy)
-def test_all_that_is_shown_of_a_cell_belongs_to_one_roll(view):
+@pytest.mark.parametrize("color_by", ColorBy)
+def test_all_that_is_shown_of_a_cell_belongs_to_one_roll(color_by):
     m = opened().map
-    reason, values = RollChoice.EITHER.reason(m), RollChoice.EITHER.values(m, view)
+    reason, values = RollChoice.EITHER.reason(m), RollChoice.EITHER.values(m, color_by)
     for row, column in np.ndindex(*reason.shape):
         roll = RollChoice.EITHER.roll(m, row, column)
         assert m.reason[:, row, column].max() == reason[row, column] == m.reason[roll, row, column]
-        assert np.array_equal(m.values(view)[roll, row, column], values[row, column], equal_nan=True)
+        assert np.array_equal(m.values(color_by)[roll, row, column], values[row, column], equal_nan=True)
         if reason[row, column] == Reason.FEASIBLE:
             assert m.clearance[roll, row, column] == np.nanmax(m.clearance[:, row, column])
 
 
-@pytest.mark.parametrize("view", ColorBy)
-def test_turning_the_object_only_rolls_any_view(view):
-    state = with_view(opened(), color_by=view)
+@pytest.mark.parametrize("color_by", ColorBy)
+def test_turning_the_object_only_rolls_any_colours(color_by):
+    state = with_view(opened(), color_by=color_by)
     grid = state.scene.manifold
     before = cell_colors(state, state.map)
     turned = changes.turn(state, 3 * grid.dtheta)
     assert np.array_equal(cell_colors(turned, turned.map), np.roll(before, -3, axis=1))
     assert np.array_equal(cell_colors(turned, turned.result.map), before)  # the surface stays where it is
-    assert legend_html(turned.map, turned.map_view.roll, view) == legend_html(
-        state.map, state.map_view.roll, view
+    assert legend_html(turned.map, turned.map_view.roll, color_by) == legend_html(
+        state.map, state.map_view.roll, color_by
     )
 
 
@@ -109,14 +109,14 @@ def test_the_print_of_the_picked_grasp_lies_around_it():
     assert np.array_equal((painted != cell_colors(picked, picked.map)).any(axis=-1), cells)
 
 
-@pytest.mark.parametrize("view", [ColorBy.REASON, ColorBy.CLEARANCE])
-def test_the_picture_of_the_map_is_a_file(view):
-    state = with_view(changes.turn(opened(), 0.3), color_by=view)
+@pytest.mark.parametrize("color_by", [ColorBy.REASON, ColorBy.CLEARANCE])
+def test_the_picture_of_the_map_is_a_file(color_by):
+    state = with_view(changes.turn(opened(), 0.3), color_by=color_by)
     row, column = cell_with(state, Reason.FEASIBLE)
     state = with_view(changes.choose_cell(state, row, column), handprint=True)
     assert Image.open(io.BytesIO(map_picture(state, "PNG"))).width > 400
     assert ElementTree.fromstring(map_picture(state, "SVG")).tag.endswith("svg")
-    assert picture_name(state, "SVG") == f"bottle_on_table_pick_panda_{view}.svg"
+    assert picture_name(state, "SVG") == f"bottle_on_table_pick_panda_{color_by}.svg"
     with pytest.raises(SymgraspError, match="none for this pose yet"):
         map_picture(changes.moved(state, x=0.5), "PNG")
 
@@ -129,11 +129,11 @@ def test_the_picture_of_the_map_is_a_file(view):
 def test_the_recomputed_map_is_the_shifted_one(delta):
     state = changes.turn(with_view(opened(), compare=True), delta)
     assert state.next_request == CompareRequest(state.request, state.delta)
-    bench = MapService()
+    service = MapService()
     try:
-        check = bench.compare(state.next_request, state.result.map, quiet)
+        check = service.compare(state.next_request, state.result.map, quiet)
     finally:
-        bench.close()
+        service.close()
     assert check.differing == 0
     assert np.array_equal(check.map.reason, state.map.reason)
     assert np.array_equal(check.map.manifold.theta, state.map.manifold.theta)
@@ -143,12 +143,12 @@ def test_the_recomputed_map_is_the_shifted_one(delta):
     assert f"{np.rad2deg(delta):.2f}°: <b>0 of {check.map.reason.size} cells differ" in check_html(checked)
 
 
-def test_the_comparison_counts_what_differs(bench):
+def test_the_comparison_counts_what_differs(service):
     state = changes.turn(with_view(opened(), compare=True), 0.4)
     keep = np.ones(state.map.reason.shape, dtype=bool)
     keep[tuple(np.argwhere(state.result.map.feasible)[0])] = False
     wrong = state.result.map.masked(keep)
-    assert bench.compare(state.next_request, wrong, quiet).differing == 1
+    assert service.compare(state.next_request, wrong, quiet).differing == 1
 
 
 def test_the_comparison_follows_the_slider():
@@ -195,19 +195,19 @@ def test_a_stopped_comparison_stays_stopped_until_something_else_is_asked():
 # -- candidates -----------------------------------------------------------------------------
 
 
-def explained(bench: MapService, state: State) -> State:
+def explained(service: MapService, state: State) -> State:
     request = state.next_request
     assert isinstance(request, ExplainRequest)
     return job_changes.result_arrived(
-        job_changes.started(state, 1, "", request), 1, bench.explain(request, quiet)
+        job_changes.started(state, 1, "", request), 1, service.explain(request, quiet)
     )
 
 
 @pytest.mark.parametrize("delta", [0.0, 0.3, np.pi / 8])
 @pytest.mark.parametrize("reason", [Reason.FEASIBLE, Reason.SCENE_COLLISION, Reason.UNREACHABLE])
-def test_the_candidates_are_those_of_the_picked_cell(bench, reason, delta):
+def test_the_candidates_are_those_of_the_picked_cell(service, reason, delta):
     state = changes.turn(opened(), delta)
-    state = explained(bench, changes.choose_cell(state, *cell_with(state, reason)))
+    state = explained(service, changes.choose_cell(state, *cell_with(state, reason)))
     assert state.next_request is None
     assert state.explanation.reason == reason == state.map.reason[state.cell]
     tools = state.map.manifold.tool_poses(state.T_world_object, state.scene.arm().hand.finger_depth)
@@ -222,9 +222,9 @@ def test_the_candidates_are_those_of_the_picked_cell(bench, reason, delta):
         assert state.candidate == 0
 
 
-def test_candidates_are_stepped_through_and_forgotten_with_the_cell(bench):
+def test_candidates_are_stepped_through_and_forgotten_with_the_cell(service):
     state = opened()
-    state = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE)))
+    state = explained(service, changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE)))
     last = len(state.explanation.candidates) - 1
     assert changes.choose_candidate(state, last).shown_candidate is state.explanation.candidates[-1]
     assert changes.choose_candidate(state, last + 5).candidate == last
@@ -238,7 +238,7 @@ def test_candidates_are_stepped_through_and_forgotten_with_the_cell(bench):
     assert changes.choose_candidate(opened(), 3).candidate is None
 
 
-def test_an_answer_about_another_cell_does_not_count(bench):
+def test_an_answer_about_another_cell_does_not_count(service):
     state = opened()
     first = changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE))
     second = changes.choose_cell(
@@ -258,11 +258,11 @@ def test_an_answer_about_another_cell_does_not_count(bench):
 # -- the ghost arm --------------------------------------------------------------------------
 
 
-def test_a_failing_candidate_is_a_ghost_and_a_feasible_one_the_arm(bench):
+def test_a_failing_candidate_is_a_ghost_and_a_feasible_one_the_arm(service):
     state = opened()
     picked = changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE))
     assert ghost(picked) is None  # nothing is known yet
-    held = explained(bench, picked)
+    held = explained(service, picked)
     arm = state.scene.arm()
     for k, shown_candidate in enumerate(held.explanation.candidates):
         shown = changes.choose_candidate(held, k)
@@ -278,9 +278,9 @@ def test_a_failing_candidate_is_a_ghost_and_a_feasible_one_the_arm(bench):
     assert len(reasons) > 1
 
 
-def test_the_ghost_shows_what_collides(bench):
+def test_the_ghost_shows_what_collides(service):
     state = opened()
-    hit = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
+    hit = explained(service, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
     found = ghost(hit)
     pairs = {(c.a, c.b) for c in hit.explanation.best.collisions}
     assert pairs
@@ -288,7 +288,7 @@ def test_the_ghost_shows_what_collides(bench):
     assert found.links() == {body.link for body in found.hits if body.body == "panda"}
     assert {body.body for body in found.others()} <= {o.name for o in state.scene.obstacles}
     assert found.others()
-    far = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.UNREACHABLE)))
+    far = explained(service, changes.choose_cell(state, *cell_with(state, Reason.UNREACHABLE)))
     assert ghost(far) is None
     assert "Out of reach" in candidates_html(far)
 
@@ -320,9 +320,9 @@ def bounds(points: np.ndarray) -> np.ndarray:
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def test_the_candidates_are_drawn_by_redundancy_and_branch(bench):
+def test_the_candidates_are_drawn_by_redundancy_and_branch(service):
     state = opened()
-    hit = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
+    hit = explained(service, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
     cells = fates(hit.explanation)
     assert cells.shape[1] == len(hit.explanation.phi)
     best = {}
@@ -337,12 +337,12 @@ def test_the_candidates_are_drawn_by_redundancy_and_branch(bench):
     assert "One of" in grasp_html(changes.choose_candidate(hit, 1))
 
 
-def test_names_in_verdicts_are_escaped(bench):
+def test_names_in_candidates_are_escaped(service):
     state = opened()
-    hit = explained(bench, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
+    hit = explained(service, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
     evil = BodyName("<img src=x>", "<b>")
     shown_candidate = hit.shown_candidate
-    collisions = tuple(c._replace(a=evil) for c in shown_candidate.collisions)
+    collisions = tuple(Collision(c.reason, evil, c.b, c.depth) for c in shown_candidate.collisions)
     first = replace(shown_candidate, collisions=collisions)
     explanation = replace(hit.explanation, candidates=(first, *hit.explanation.candidates[1:]))
     hostile = with_view(hit, explained=replace(hit.map_view.explained, explanation=explanation))

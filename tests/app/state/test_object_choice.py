@@ -9,7 +9,7 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from app.state import object_choice as things
+from app.state import object_choice as module
 from app.state.object_choice import OWN, UNITS, choices, from_library, from_mesh
 from symgrasp.errors import SymgraspError
 from symgrasp.object.library import library_objects, load_object
@@ -34,12 +34,12 @@ def scratch(tmp_path, monkeypatch) -> Path:
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_a_mesh_is_measured_in_its_unit_and_leaves_no_file(unit, scratch):
-    object_choice = from_mesh("my bottle.STL", stl(1 / UNITS[unit]), UNITS[unit])
-    assert (object_choice.name, object_choice.option) == ("my bottle", "my bottle.STL (upload)")
+    choice = from_mesh("my bottle.STL", stl(1 / UNITS[unit]), UNITS[unit])
+    assert (choice.name, choice.option) == ("my bottle", "my bottle.STL (upload)")
     h = np.linspace(0.01, BOTTLE.h_max - 0.01, 50)
-    assert np.allclose(object_choice.profile.radius(h), BOTTLE.radius(h), atol=4e-4)
-    assert object_choice.measurement is not None
-    assert object_choice.measurement.source == "my bottle.STL"
+    assert np.allclose(choice.profile.radius(h), BOTTLE.radius(h), atol=4e-4)
+    assert choice.measurement is not None
+    assert choice.measurement.source == "my bottle.STL"
     assert list(scratch.iterdir()) == []
 
 
@@ -68,8 +68,8 @@ def test_a_mug_is_refused_at_its_handle():
 
 
 def test_a_file_over_the_limit_is_refused_before_it_is_looked_at(monkeypatch):
-    monkeypatch.setattr(things, "measure_mesh", None)
-    monkeypatch.setattr(things, "UPLOAD_LIMIT", 1_000_000)
+    monkeypatch.setattr(module, "measure_mesh", None)
+    monkeypatch.setattr(module, "UPLOAD_LIMIT", 1_000_000)
     with pytest.raises(SymgraspError, match=r"^a\.stl: .*'1\.0 MB': expected a mesh file of at most 1 MB"):
         from_mesh("a.stl", bytes(1_000_001), 1.0)
 
@@ -78,8 +78,8 @@ def test_the_library_is_offered_and_nothing_else_is_loaded():
     assert choices() == (OWN, *library_objects())
     uploaded = from_mesh("b.stl", stl(), 1.0)
     assert choices(uploaded)[-1] == "b.stl (upload)"
-    object_choice = from_library("tennis_ball")
-    assert np.array_equal(object_choice.profile.points, load_object("tennis_ball")[1].points)
+    choice = from_library("tennis_ball")
+    assert np.array_equal(choice.profile.points, load_object("tennis_ball")[1].points)
     for name in ("no_such", "static_scenes/objects/tennis_ball.yaml", "/etc/passwd"):
         with pytest.raises(SymgraspError, match="tennis_ball"):
             from_library(name)

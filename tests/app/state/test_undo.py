@@ -12,6 +12,7 @@ from dataclasses import replace
 from weakref import WeakSet
 
 import numpy as np
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -143,8 +144,8 @@ def test_an_upload_is_on_offer_where_it_is_shown():
         for name in ("a.yaml", "b.yaml", "b.yaml")
     ]
     shown = [start, *[person.does(lambda s, new=new: changes.open_upload(s, new)) for new in scenes]]
-    things = [replace(from_library("wine_bottle"), option=c, measurement=object()) for c in ("1", "2", "2")]
-    for object_choice in things:
+    objects = [replace(from_library("wine_bottle"), option=c, measurement=object()) for c in ("1", "2", "2")]
+    for object_choice in objects:
         scene = person.state.scene.with_object(object_choice.name, object_choice.profile)
         shown.append(
             person.does(
@@ -154,7 +155,7 @@ def test_an_upload_is_on_offer_where_it_is_shown():
             )
         )
     assert [s.shown_upload for s in shown[1:4]] == [loaded.scene for loaded in scenes]
-    assert [s.uploaded_object for s in shown[4:]] == things
+    assert [s.uploaded_object for s in shown[4:]] == objects
     for step, states in ((undo, shown[-2::-1]), (redo, shown[1:])):
         for state in states:
             now = person.does(step)
@@ -271,7 +272,7 @@ class UndoMachine(RuleBasedStateMachine):
 
 
 UndoMachine.TestCase.settings = settings(deadline=None, max_examples=60, stateful_step_count=40)
-TestUndo = UndoMachine.TestCase
+TestUndo = pytest.mark.random_walk(UndoMachine.TestCase)
 
 
 def test_a_history_starts_empty():

@@ -1,4 +1,4 @@
-"""Starting the page, and which of its modules need a browser."""
+"""What the page says about maps, picks and plans."""
 
 # A map, a pick or a plan may be None in general, but not where these tests look.
 # pyright: reportOptionalMemberAccess=false, reportArgumentType=false
@@ -6,63 +6,15 @@
 from __future__ import annotations
 
 import math
-import socket
-import subprocess
-import sys
-
-import pytest
 
 from app.html.readout import grasp_html, map_title, notes_html, solution_html, status_html
-from app.server.serve import serve
 from app.state import changes, job_changes
 from app.state.requests import MapResult
 from app.state.state import State
-from symgrasp.errors import InputError
 from symgrasp.feasibility.create import create_map
 from symgrasp.scene.scene import Scene
 from tests.app.state.test_state import opened, with_plan
 from tests.conftest import load_small, write_scene
-
-
-def test_state_and_computing_know_no_browser():
-    pure = "app.state.state, app.compute.process_main, app.html.map, app.render.map_picture"
-    code = f"import sys, {pure}; sys.exit('viser' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_a_busy_port_is_an_error_that_names_it():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        with pytest.raises(InputError, match=f"--port: {port}: expected a free port"):
-            serve("bottle_on_table", "127.0.0.1", port)
-
-
-@pytest.mark.parametrize("port", [0, -1, 65536])
-def test_a_port_that_is_none_is_an_error(port):
-    with pytest.raises(InputError, match="a port from 1 to 65535"):
-        serve("bottle_on_table", "127.0.0.1", port)
-
-
-def test_an_unknown_host_is_an_error():
-    with pytest.raises(InputError, match="--host"):
-        serve("bottle_on_table", "no.such.host.invalid", 8080)
-
-
-def test_an_unknown_scene_ends_the_command_with_one_line():
-    done = subprocess.run(
-        [sys.executable, "-m", "app", "no_scene", "--port", "8099"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert done.stdout == ""
-    (line,) = done.stderr.splitlines()
-    assert "no_scene" in line
-    assert "bottle_on_table" in line
-
 
 HOSTILE = "<script>alert(1)</script>"
 

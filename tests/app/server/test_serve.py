@@ -1,0 +1,47 @@
+"""Starting the page from the command line, and what keeps it from starting."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from app.server.serve import serve
+from app.server.viser_server import any_port
+from symgrasp.errors import InputError
+
+
+def test_a_busy_port_is_an_error_that_names_it():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"--port: {port}: expected a free port"):
+            serve("bottle_on_table", "127.0.0.1", port)
+
+
+@pytest.mark.parametrize("port", [0, -1, 65536])
+def test_a_port_that_is_none_is_an_error(port):
+    with pytest.raises(InputError, match="a port from 1 to 65535"):
+        serve("bottle_on_table", "127.0.0.1", port)
+
+
+def test_an_unknown_host_is_an_error():
+    with pytest.raises(InputError, match="--host"):
+        serve("bottle_on_table", "no.such.host.invalid", 8080)
+
+
+def test_an_unknown_scene_ends_the_command_with_one_line():
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "no_scene", "--port", str(any_port())],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert "no_scene" in line
+    assert "bottle_on_table" in line
