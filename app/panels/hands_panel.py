@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import viser
 
-from ..html.conflicts import why_html
-from ..html.hands import comparison_html, hands_html
-from ..html.readout import hands_line
+from ..html.conflicts import failure_html
+from ..html.hands import climb_comparison_html, hands_html
+from ..html.readout import bimanual_html
 from ..state import plan_changes
 from ..state.plan_results import FIRST_SEED
 from ..state.state import State
@@ -69,12 +69,12 @@ class HandsPanel(Panel):
         """Show the maps with the prints, or why there is no plan."""
         plan_results, climb = state.plan_results, state.plan_results.climb
         refusal = plan_results.refusal if plan_results.kind != "sequential" else None
-        self.title.show(hands_line(state))
+        self.title.show(bimanual_html(state))
         self.run.disabled = not state.can_plan("bimanual")
         self.seed.visible = plan_results.hands_method == "hill_climb"
         self.handover.visible = state.can_plan("handover")
-        self.why.show(why_html(refusal, state.scene.manifold) if refusal else "")
-        self.comparison.show(comparison_html(climb) if climb else "")
+        self.why.show(failure_html(refusal, state.scene.manifold) if refusal else "")
+        self.comparison.show(climb_comparison_html(climb) if climb else "")
         self.frame.visible = climb is not None and len(climb.steps) > 1
         self.replay.visible = self.frame.visible
         if climb and self.frame.visible:

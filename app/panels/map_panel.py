@@ -6,7 +6,7 @@ import viser
 
 from ..html.map import legend_html, map_html, prints_html
 from ..html.profile import holds_html, profile_html, symmetry_html
-from ..html.readout import check_html, map_title, solution_html
+from ..html.readout import comparison_html, solution_html, title_html
 from ..render.marks import marks_of
 from ..render.prints import print_names, shown_prints
 from ..state.state import State
@@ -36,7 +36,7 @@ class MapPanel(Panel):
 
     def show(self, state: State) -> None:
         """Draw the map, and under it the one it is compared with."""
-        self.title.show(map_title(state))
+        self.title.show(title_html(state))
         self.plan.show(solution_html(state) if state.shown_task else "")
         self.holds.show(holds_html(state) + symmetry_html(state))
         if state.map is None:
@@ -51,7 +51,7 @@ class MapPanel(Panel):
             legend += prints_html(print_names(state), prints)
         shown = map_html(
             state.map, state.map_view.roll, marks_of(state), prints,
-            view=look.color_by, stale=not state.is_fresh, height=height,
+            color_by=look.color_by, stale=not state.is_fresh, height=height,
         )  # fmt: skip
         self.map.show(f'<div class="sg-side">{shown}{profile_html(state, height)}</div>')
         self.legend.show(legend)
@@ -61,13 +61,13 @@ class MapPanel(Panel):
         """Draw the map that was computed from scratch, and say how many cells differ."""
         check = state.map_view.comparison
         if check is None:
-            return check_html(state)
+            return comparison_html(state)
         shown = map_html(
             check.map,
             state.map_view.roll,
-            view=state.map_view.color_by,
+            color_by=state.map_view.color_by,
             height=HEIGHT_OF_TWO,
             name="recomputed map",
         )
         room = profile_html(state, HEIGHT_OF_TWO)
-        return f'{check_html(state)}<div class="sg-side">{shown}{room}</div>'
+        return f'{comparison_html(state)}<div class="sg-side">{shown}{room}</div>'

@@ -6,7 +6,7 @@ import viser
 
 from ..compute.plan_service import PLAN_LIMIT
 from ..files.plan_formats import FORMATS
-from ..html.conflicts import opened_html
+from ..html.conflicts import plan_file_html
 from ..html.readout import solution_html
 from ..html.solutions import solutions_html
 from ..state import plan_changes
@@ -99,4 +99,4 @@ class PlanFilePanel(Panel):
     def show(self, state: State) -> None:
         """Offer the plan, and say what became of the file that was opened."""
         self.form.visible = self.download.visible = state.plan is not None
-        self.report.show(opened_html(state.plan_results.opened) if state.plan_results.opened else "")
+        self.report.show(plan_file_html(state.plan_results.opened) if state.plan_results.opened else "")

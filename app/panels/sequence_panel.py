@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import viser
 
-from ..html.conflicts import regrasps, why_html
+from ..html.conflicts import failure_html, regrasp_count
 from ..html.readout import sequence_html, tasks_html
 from ..html.stack import stack_html
 from ..state import changes, plan_changes
@@ -60,10 +60,10 @@ class SequencePanel(Panel):
         """Show the maps with the grasp, or why there is none."""
         plan_results = state.plan_results
         refusal = plan_results.refusal if plan_results.kind == "sequential" else None
-        count = regrasps(refusal)
+        count = regrasp_count(refusal)
         self.title.show(sequence_html(state))
         self.run.disabled = not state.can_plan("sequential")
-        self.why.show(why_html(refusal, state.scene.manifold) if refusal else "")
+        self.why.show(failure_html(refusal, state.scene.manifold) if refusal else "")
         self.regrasp.visible = count > 0
         self.regrasp.label = f"Plan with {count} regrasp{'s' * (count > 1)}"
         self.stack.show(stack_html(state))
