@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from app.panels.object_panel import span
+from app.panels.object_panel import position_range
 from app.scene3d.flat_map import MIN_FACING
 from app.scene3d.scene_view import SceneView
 from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
@@ -102,7 +102,7 @@ def test_the_object_can_be_moved_a_metre_beyond_everything(name):
     poses = [robot.T_world_base for robot in scene.robots.values()]
     poses += [task.T_world_object for task in scene.tasks.values()]
     for axis in range(3):
-        low, high = span(scene, axis)
+        low, high = position_range(scene, axis)
         places = [100 * pose[axis, 3] for pose in poses]
         assert low % 10 == high % 10 == 0
         assert 100 <= min(places) - low < 110

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from app.compute import plan_service
 from app.compute.cache import SharedCache
 from app.compute.map_service import MapService
-from app.compute.plan_service import PLAN_LIMIT, PlanRequest, PlanService
+from app.compute.plan_service import PlanRequest, PlanService
+from app.files.plan_formats import PLAN_LIMIT
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
 from app.render.playback import playback_frame
 from app.render.prints import shown_prints
