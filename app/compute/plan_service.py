@@ -29,6 +29,7 @@ from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
+from ..files.plan_formats import PLAN_LIMIT
 from ..files.scene_files import refuse_foreign_files
 from ..scene3d.visual_meshes import check_visuals
 from ..state.object_pose import ObjectPose, moved
@@ -37,10 +38,7 @@ from ..state.requests import MapRequest, Maps
 from ..state.uploaded_scene import UploadedScene
 from .map_service import MapService
 
-__all__ = ["PLAN_LIMIT", "OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService", "plan_result"]
-
-PLAN_LIMIT = 5_000_000
-"""Largest plan file (bytes) that is read."""
+__all__ = ["OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService", "plan_result"]
 
 LISTED = 10
 """How many plans are listed at a time."""

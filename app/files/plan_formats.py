@@ -1,4 +1,4 @@
-"""The formats in which the page saves plans."""
+"""Plans as files of the page: the formats to save them in, and the largest file that is read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan
 
-__all__ = ["FORMATS"]
+__all__ = ["FORMATS", "PLAN_LIMIT"]
 
 FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
     "JSON": (".json", Plan.to_json),
@@ -15,4 +15,7 @@ FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
     "Trajectory": (".trajectory.json", EXPORTS["trajectory"]),
     "TSR": (".tsr.yaml", EXPORTS["tsr"]),
 }
-"""What the page calls a format → ending of its files, and what writes them."""
+"""Label of a format on the page → ending of its files, and the function that writes them."""
+
+PLAN_LIMIT = 5_000_000
+"""Largest plan file (bytes) that is read."""

@@ -11,16 +11,22 @@ from symgrasp.reason import Reason
 from ..state.plan_results import PlanFileReport, Refusal
 from .map import h_axis
 
-__all__ = ["opened_html", "regrasps", "why_html"]
+__all__ = ["failure_html", "plan_file_html", "regrasp_count"]
 
 HEIGHT = 130
-"""Of the picture of the heights (px)."""
+"""Height (px) of the picture of the heights that each task allows."""
 
 FAILURES_SHOWN = 12
+"""How many failed statements of a plan file are listed."""
 
 
-def why_html(refusal: Refusal, grid: Manifold) -> str:
-    """Say why no plan was found."""
+def failure_html(refusal: Refusal, grid: Manifold) -> str:
+    """Say why there is no plan.
+
+    Args:
+        refusal: the reason.
+        grid: the grid of the tasks' maps.
+    """
     conflict = refusal.conflict
     if conflict is None:
         return f'<div class="sg sg-note sg-warning" role="alert">{escape(_sentence(refusal.text))}</div>'
@@ -32,22 +38,22 @@ def why_html(refusal: Refusal, grid: Manifold) -> str:
     )
 
 
-def regrasps(refusal: Refusal | None) -> int:
-    """Return how often the object has to be set down to be grasped anew, 0 if that is of no use."""
+def regrasp_count(refusal: Refusal | None) -> int:
+    """Return how many regrasps solve a conflict between tasks; 0 if none do or there is no conflict."""
     shared = refusal.conflict.regrasps if refusal and refusal.conflict else None
     return len(shared) - 1 if shared else 0
 
 
-def opened_html(opened: PlanFileReport) -> str:
-    """Report on a plan that came from a file."""
-    name = escape(opened.name)
-    if not opened.failures:
-        text = f"{name} holds: {opened.checks} statements verified."
+def plan_file_html(report: PlanFileReport) -> str:
+    """Report the verification of a plan file: how many statements hold, and which do not."""
+    name = escape(report.name)
+    if not report.failures:
+        text = f"{name} holds: {report.checks} statements verified."
         return f'<div class="sg sg-note sg-good" role="status">{text}</div>'
-    count = len(opened.failures)
-    rows = "".join(f"<li>{escape(text)}</li>" for text in opened.failures[:FAILURES_SHOWN])
+    count = len(report.failures)
+    rows = "".join(f"<li>{escape(text)}</li>" for text in report.failures[:FAILURES_SHOWN])
     more = f"<li>and {count - FAILURES_SHOWN} more</li>" if count > FAILURES_SHOWN else ""
-    wrong = f"{name} does not hold, so it is not shown: {count} of {opened.checks} statements are wrong."
+    wrong = f"{name} does not hold, so it is not shown: {count} of {report.checks} statements are wrong."
     return f'<div class="sg sg-note sg-error" role="alert">{wrong}<ul>{rows}{more}</ul></div>'
 
 
@@ -64,7 +70,7 @@ def _excluded(exclusion: Exclusion) -> str:
 
 
 def _heights(conflict: Conflict, grid: Manifold) -> str:
-    """Draw for every task the heights that it allows, a bar for each roll."""
+    """Draw the heights that every task allows, with a bar for each roll."""
     low, high = grid.profile.h_min, grid.profile.h_max
     guilty = {name for exclusion in conflict.exclusions for name in exclusion.tasks}
     width = 100 / len(conflict.heights)
@@ -75,8 +81,8 @@ def _heights(conflict: Conflict, grid: Manifold) -> str:
             for roll, runs in enumerate(spans[: len(ROLLS)])
             for a, b in runs
         )
-        look = ' class="sg-guilty"' if task in guilty else ""
-        columns.append(f'{bars}<b{look} style="left:{width * (k + 0.5):.2f}%">{escape(task)}</b>')
+        css_class = ' class="sg-guilty"' if task in guilty else ""
+        columns.append(f'{bars}<b{css_class} style="left:{width * (k + 0.5):.2f}%">{escape(task)}</b>')
     return (
         f'<div class="sg-heights" style="height:{HEIGHT}px" role="img" aria-label="heights of the tasks">'
         f"{h_axis(grid, HEIGHT)}<div>{''.join(columns)}</div></div>"
@@ -84,7 +90,13 @@ def _heights(conflict: Conflict, grid: Manifold) -> str:
 
 
 def _bar(left: float, width: float, span: tuple[float, float], size: tuple[float, float]) -> str:
-    """Draw a run of cells from its lowest to its highest centre."""
+    """Draw a run of cells as a bar.
+
+    Args:
+        left, width: of the bar (%).
+        span: heights (m) of the lowest and the highest cell's centre, from the bottom of the object.
+        size: heights (m) of the object and of a cell.
+    """
     whole, cell = size
     bottom = 100 * (span[0] - cell / 2) / whole
     height = 100 * (span[1] - span[0] + cell) / whole

@@ -1,4 +1,4 @@
-"""Several hands on one object: a map for each arm with all prints on it, the gap, the climb of figure 7."""
+"""Several hands on one object: each arm's map with all handprints, their gap, and the hill climbing."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from ..state.map_view_state import RollChoice
 from ..state.plan_results import ClimbReplay, PlanResult, PlanResults
 from ..state.state import State
 from .map import map_html
-from .readout import counted
-from .solutions import worst_measures
-from .stack import measures
+from .readout import count_text
+from .solutions import worst_margin_texts
+from .stack import margin_texts
 
-__all__ = ["climb_html", "comparison_html", "gap_in_words", "hands_html"]
+__all__ = ["climb_comparison_html", "climb_html", "gap_text", "hands_html"]
 
-ROOM = 330
-"""Height (px) that the pictures of a task share."""
+TOTAL_HEIGHT = 330
+"""Height (px) that all pictures share."""
 
 
 def hands_html(state: State) -> str:
-    """Draw the maps of the plan's tasks, each arm's with the prints of all hands that hold together."""
+    """Draw the maps of the plan's tasks, each arm's with the handprints of all hands of the task."""
     if state.climb_step:
         return climb_html(state)
     if state.plan is None or state.plan.plan.kind == "sequential":
         return ""
     plan = state.plan
     count = sum(len(task.holds) for task in plan.plan.tasks)
-    height = int(np.clip(ROOM / count - 48, 56, 120))
+    height = int(np.clip(TOTAL_HEIGHT / count - 48, 56, 120))
     blocks = []
     for k, task in enumerate(plan.plan.tasks):
         now = " sg-now" if k == state.step else ""
         gap = plan.gaps[k]
-        apart = f"<span>{gap_in_words(gap)}</span>" if gap is not None else ""
+        apart = f"<span>{gap_text(gap)}</span>" if gap is not None else ""
         turned = f"turned by {np.rad2deg(task.delta) + 0.0:.1f}°"
         name = f"{k + 1} · {escape(task.name)}" if len(plan.plan.tasks) > 1 else escape(task.name)
         blocks.append(f'<div class="sg-task{now}"><b>{name}</b><span>{turned}</span>{apart}</div>')
@@ -49,18 +49,18 @@ def hands_html(state: State) -> str:
     return "".join(blocks)
 
 
-def gap_in_words(gap: float) -> str:
-    """Say how far apart the prints of a task are."""
+def gap_text(gap: float) -> str:
+    """Return text for the smallest gap (m) between two handprints of a task, negative where they overlap."""
     return "prints overlap: the hands pass each other" if gap < 0 else f"gap {1e3 * gap:.0f} mm"
 
 
 def climb_html(state: State) -> str:
-    """Draw a step of the hill climbing: every arm's map with all prints, and how the count went down."""
+    """Draw a step of the hill climbing: every arm's map with all handprints, and the shared cells so far."""
     climb, step = state.plan_results.climb, state.climb_step
     if climb is None or step is None:
         return ""
     prints = shown_prints(state)
-    height = int(np.clip(ROOM / len(climb.arms) - 48, 56, 120))
+    height = int(np.clip(TOTAL_HEIGHT / len(climb.arms) - 48, 56, 120))
     grid = state.scene.manifold
     marks = [
         Mark(float(grid.h[cell.row]), float(grid.theta[cell.column]), name)
@@ -69,39 +69,39 @@ def climb_html(state: State) -> str:
     blocks = [_progress(climb, state.plan_results.frame or 0)]
     for k, (name, cell) in enumerate(zip(climb.arms, step.cells, strict=True)):
         m = state.plan_results.maps[climb.task, name].map
-        roll = _choice(cell.roll)
+        roll = _roll_choice(cell.roll)
         blocks.append(f'<div class="sg sg-small">{_swatch(k)}{escape(name)}, roll {roll.value}</div>')
         blocks.append(map_html(m, roll, marks, prints, height=height, name=f"climb map {name}"))
     return "".join(blocks)
 
 
-def comparison_html(climb: ClimbReplay) -> str:
-    """Set the hill climbing beside the complete search on the same maps."""
+def climb_comparison_html(climb: ClimbReplay) -> str:
+    """Compare the hill climbing with the complete search on the same maps, in a table."""
     restarts = climb.steps[-1].restart + 1
     climbed = [f"Hill climbing, seed {climb.seed}", *_result(climb.found)]
     exact = ["Complete search", *_result(climb.exact)]
     rows = "".join(
         f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in (climbed, exact)
     )
-    count = f"{counted(len(climb.steps), 'position')} in {counted(restarts, 'start')}"
+    count = f"{count_text(len(climb.steps), 'position')} in {count_text(restarts, 'start')}"
     if len(climb.steps) == 1:
         count += ": the hands started apart already, try another seed"
     elif climb.found:
         numbers = climb.found.plan.planner.statistics
-        count += f"; prints compared {counted(numbers['counted'], 'time')}"
-        count += f", whole robots {counted(numbers['body_checks'], 'time')}"
+        count += f"; prints compared {count_text(numbers['counted'], 'time')}"
+        count += f", whole robots {count_text(numbers['body_checks'], 'time')}"
     heads = "".join(f"<th>{name}</th>" for name in ("", "gap", "room along", "around", "clear"))
     table = f'<table class="sg sg-table"><tr>{heads}</tr>{rows}</table>'
     return f'{table}<div class="sg sg-small sg-faint">{count}.</div>'
 
 
 def _result(plan: PlanResult | None) -> list[str]:
-    """Return what a plan reaches, the worst of its hands."""
+    """Return the texts of a table row: the gap of a plan and the least margins of its hands."""
     if plan is None:
         return ["none found", "", "", ""]
     gap = plan.gaps[0]
     apart = "overlap" if gap is None or gap < 0 else f"{1e3 * gap:.0f} mm"
-    return [apart, *worst_measures(plan)]
+    return [apart, *worst_margin_texts(plan)]
 
 
 def _task_maps(results: PlanResults, plan: PlanResult, k: int, task: PlanTask, height: int) -> list[str]:
@@ -111,8 +111,8 @@ def _task_maps(results: PlanResults, plan: PlanResult, k: int, task: PlanTask, h
     blocks = []
     for i, hold in enumerate(task.holds):
         m = results.maps[task.name, hold.arm].map.shift(task.delta)
-        roll = _choice(ROLLS.index(hold.grasp.roll))
-        along, around, clear = measures(hold)
+        roll = _roll_choice(ROLLS.index(hold.grasp.roll))
+        along, around, clear = margin_texts(hold)
         title = f"{escape(hold.arm)}, roll {roll.value}: room {along}, {around}; {clear} clear"
         swatch = _swatch(i) if several else ""
         blocks.append(f'<div class="sg sg-small">{swatch}{title}</div>')
@@ -122,10 +122,10 @@ def _task_maps(results: PlanResults, plan: PlanResult, k: int, task: PlanTask, h
 
 
 def _progress(climb: ClimbReplay, frame: int) -> str:
-    """Say where the climb is, over a curve of what was counted."""
+    """Say which step of the climb is shown, over a curve of the shared cells."""
     step = climb.steps[frame]
-    counted = "prints are apart" if step.collisions == 0 else f"prints share {step.collisions} cells"
-    text = f"start {step.restart + 1}, position {frame + 1} of {len(climb.steps)}: {counted}"
+    overlap = "prints are apart" if step.collisions == 0 else f"prints share {step.collisions} cells"
+    text = f"start {step.restart + 1}, position {frame + 1} of {len(climb.steps)}: {overlap}"
     return f'<div class="sg-task"><b>{text}</b></div>{_curve(climb.steps, frame)}'
 
 
@@ -142,7 +142,7 @@ def _curve(steps: Sequence[ClimbStep], frame: int) -> str:
     )
 
 
-def _choice(roll: int) -> RollChoice:
+def _roll_choice(roll: int) -> RollChoice:
     return (RollChoice.ZERO, RollChoice.HALF_TURN)[roll]
 
 

@@ -1,4 +1,4 @@
-"""The unwrapped map as a picture with axes and a legend: small PNGs inside HTML, crisp at any size.
+"""The unwrapped map as a picture with axes and a legend: small palette PNGs inside HTML.
 
 The picture is drawn in the object's coordinates: h upwards, θ from -180° to 180°. It has four
 columns a degree, so a turn by a step of the page's slider rolls it by exactly one column.
@@ -18,7 +18,7 @@ from symgrasp.feasibility.color_by import ColorBy, Scale
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import Manifold, wrap
 
-from ..render.cell_colors import coloured
+from ..render.cell_colors import colored_map
 from ..render.marks import Mark
 from ..render.palette import OVERLAP, PRINTS, faded
 from ..render.prints import hand_color, print_index
@@ -46,14 +46,20 @@ SHADE = 205
 
 
 def sample_columns(manifold: Manifold) -> np.ndarray:
-    """Return the column (COLUMNS,) of the grid that each column of the picture shows."""
+    """Return for each column of the picture the column (COLUMNS,) of the grid that it shows."""
     theta = -np.pi + (np.arange(COLUMNS) + 0.5) * (2 * np.pi / COLUMNS)
     turned = np.mod(theta - manifold.theta_start, 2 * np.pi)
     return np.floor(turned / manifold.dtheta).astype(int) % manifold.angles
 
 
 def to_png(indices: np.ndarray, colors: np.ndarray, alpha: Sequence[int] | None = None) -> bytes:
-    """Return a palette PNG of indices (H, W), top row first, into sRGB colours (n, 3) and alphas (n,)."""
+    """Encode a palette PNG.
+
+    Args:
+        indices: (H, W) indices into the palette, top row first.
+        colors: (n, 3) sRGB palette.
+        alpha: (n,) opacity of each colour, 0 to 255; None for opaque.
+    """
     image = Image.fromarray(np.ascontiguousarray(indices, dtype=np.uint8), "P")
     image.putpalette(colors.ravel().tolist())
     buffer = io.BytesIO()
@@ -68,7 +74,7 @@ def map_html(
     marks: Sequence[Mark] = (),
     prints: Sequence[np.ndarray] = (),
     *,
-    view: ColorBy = ColorBy.REASON,
+    color_by: ColorBy = ColorBy.REASON,
     stale: bool = False,
     height: int = 230,
     name: str = "map",
@@ -79,19 +85,19 @@ def map_html(
         m: the map.
         roll: which rolls to show.
         marks: grasps to circle.
-        prints: cells (H, A) under each hand, over the grid that begins at -π.
-        view: what the colours stand for.
-        stale: wash the colours out.
+        prints: for each hand, whether a cell (H, A) lies under it; over the unshifted grid, from θ = -π.
+        color_by: what the colours stand for.
+        stale: fade the colours, for a map that is out of date.
         height: of the picture (px).
         name: alternative text of the picture.
     """
     grid = m.manifold
-    found = coloured(m, roll, view)
-    picture = found.index[::-1, sample_columns(grid)]
-    layers = [_img(to_png(picture, faded(found.colors) if stale else found.colors), name)]
-    still = Manifold(grid.profile, grid.heights, grid.angles)
+    colored = colored_map(m, roll, color_by)
+    picture = colored.index[::-1, sample_columns(grid)]
+    layers = [_img(to_png(picture, faded(colored.colors) if stale else colored.colors), name)]
+    unshifted = Manifold(grid.profile, grid.heights, grid.angles)
     if prints:
-        index = print_index(prints)[::-1, sample_columns(still)]
+        index = print_index(prints)[::-1, sample_columns(unshifted)]
         layers.append(_img(to_png(index, PRINTS, (0, *[SHADE] * OVERLAP)), "handprints"))
     layers += [circle(mark, grid) for mark in marks]
     return (
@@ -101,7 +107,7 @@ def map_html(
 
 
 Axis = tuple[Sequence[tuple[float, str]], str]
-"""Labels with how far along (0 to 1) they stand, and the name with its unit."""
+"""Labels of an axis, each with its position (0 to 1), and the name of the axis with its unit."""
 
 
 def picture_html(png: bytes, name: str, over: str, height: int, across: Axis, up: Axis) -> str:
@@ -124,24 +130,32 @@ def picture_html(png: bytes, name: str, over: str, height: int, across: Axis, up
     )
 
 
-def legend_html(m: FeasibilityMap, roll: RollChoice, view: ColorBy = ColorBy.REASON) -> str:
-    """List what occurs on a map, with its colours and how many cells have them, or show the scale."""
-    found = coloured(m, roll, view)
+def legend_html(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy = ColorBy.REASON) -> str:
+    """Draw the legend of a map: the colour scale, if any, and how many cells have each of the other colours.
+
+    Args:
+        m: the map.
+        roll: which rolls are shown.
+        color_by: what the colours stand for.
+    """
+    colored = colored_map(m, roll, color_by)
     rows = []
-    for color, label, count in found.swatches:
+    for color, label, count in colored.swatches:
         share = (
-            f"{100 * count / found.index.size:.0f}" if 200 * count >= found.index.size or not count else "<1"
+            f"{100 * count / colored.index.size:.0f}"
+            if 200 * count >= colored.index.size or not count
+            else "<1"
         )
         rows.append(
             f'<div><i style="background:{color}"></i><span>{escape(label)}</span>'
             f"<small>{count} · {escape(share)} %</small></div>"
         )
-    scale = scale_html(found.scale) if found.scale else ""
+    scale = scale_html(colored.scale) if colored.scale else ""
     return f'{scale}<div class="sg-legend">{"".join(rows)}</div>'
 
 
 def scale_html(scale: Scale) -> str:
-    """Draw a colour scale with its ends."""
+    """Draw a colour scale with its label and the values at its ends."""
     stops = ", ".join(f"rgb{tuple(color)}" for color in scale.colors[::36].tolist())
     return (
         f'<div class="sg sg-rows sg-scale" role="img" aria-label="scale"><span>{escape(scale.label)}</span>'
@@ -151,7 +165,7 @@ def scale_html(scale: Scale) -> str:
 
 
 def prints_html(names: Sequence[str], prints: Sequence[np.ndarray]) -> str:
-    """List the colours of the hands of some arms on a map, and that of their overlap if there is one."""
+    """Draw the legend of handprints: the colour of each arm's hand, and of their overlap if there is one."""
     rows = [(hand_color(k), f"hand of {name}") for k, name in enumerate(names)]
     if OVERLAP in print_index(prints):
         rows.append((OVERLAP, "both hands"))
@@ -168,7 +182,7 @@ def _img(png: bytes, name: str) -> str:
 
 
 def circle(mark: Mark, grid: Manifold) -> str:
-    """Draw a mark on a picture of a map."""
+    """Draw a mark, as HTML to lie over the picture of a map on this grid."""
     profile = grid.profile
     left = 100 * (float(wrap(mark.theta)) + np.pi) / (2 * np.pi)
     bottom = f"{100 * (mark.h - profile.h_min) / (profile.h_max - profile.h_min):.3f}%"
@@ -176,12 +190,12 @@ def circle(mark: Mark, grid: Manifold) -> str:
     if not mark.label:
         return circle
     side = f"right:{100 - left:.3f}%" if left > 75 else f"left:{left:.3f}%"
-    inside = f"bottom:clamp(7px,{bottom},calc(100% - 9px))"  # all of the name is read, also at an end
+    inside = f"bottom:clamp(7px,{bottom},calc(100% - 9px))"  # keeps a label at an end inside the picture
     return circle + f'<span class="sg-label" style="{side};{inside}">{escape(mark.label)}</span>'
 
 
 def h_axis(grid: Manifold, height: int) -> str:
-    """Draw the axis of heights beside a picture of that height (px)."""
+    """Draw the axis of heights (cm) beside a picture of a height in px, with labels at round numbers."""
     low, high = 100 * grid.profile.h_min, 100 * grid.profile.h_max
     most = max(3, height / 28)
     decade = 10 ** np.floor(np.log10((high - low) / most))

@@ -1,4 +1,4 @@
-"""The maps of a sequence in a stack, slid over each other by each task's δ: figure 6 of the paper."""
+"""The maps of a sequence below each other, each shifted by its task's δ: figure 6 of the paper."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from ..state.requests import MapResult
 from ..state.state import State
 from .map import THETA_AXIS, circle, h_axis, sample_columns, to_png
 
-__all__ = ["measures", "shared_columns", "stack_html"]
+__all__ = ["margin_texts", "shared_columns", "stack_html"]
 
-ROOM = 300
+TOTAL_HEIGHT = 300
 """Height (px) that all strips share."""
 
-TALLEST, LOWEST = 64, 26
-"""Of one strip (px)."""
+MAX_HEIGHT, MIN_HEIGHT = 64, 26
+"""Limits of the height (px) of a strip."""
 
 SHARED = np.array([rgb("#eceef1"), rgb(Reason.FEASIBLE.color)], dtype=np.uint8)
 """(2, 3) sRGB: cells that some task excludes, and those that serve all."""
@@ -36,7 +36,7 @@ HEADINGS = ("task", "turned by δ", "room along", "around", "clear")
 
 
 def stack_html(state: State) -> str:
-    """Draw the maps of the plan's tasks below each other, its grasp in all of them."""
+    """Draw the maps of the plan's tasks below each other, with the grasp marked in each."""
     if state.plan is None or state.plan.plan.kind != "sequential":
         return _unplanned(state)
     plan = state.plan
@@ -47,11 +47,11 @@ def stack_html(state: State) -> str:
     for number, group in enumerate(groups, start=1):
         grasp = group[0][2].grasp
         if len(groups) > 1:
-            rows.append(f'<div class="sg-part">grasp {number}: {_place(grasp)}</div>')
+            rows.append(f'<div class="sg-part">grasp {number}: {_grasp_text(grasp)}</div>')
         for k, task, hold in group:
             turn = f"{np.rad2deg(task.delta) + 0.0:.1f}°"
             now = "sg-now" if k == state.step else ""
-            rows.append(_row((f"{k + 1} · {task.name}", turn, *measures(hold)), now))
+            rows.append(_row((f"{k + 1} · {task.name}", turn, *margin_texts(hold)), now))
             result = state.plan_results.maps[task.name, hold.arm]
             rows.append(_strip(result, grasp, state.plan_results.slide * task.delta, task.delta, height))
         if len(group) > 1:
@@ -62,8 +62,8 @@ def stack_html(state: State) -> str:
     return f'<div class="sg-stack" role="img" aria-label="maps of the tasks">{"".join(rows)}{axis}</div>'
 
 
-def measures(hold: Hold) -> tuple[str, str, str]:
-    """Say how much room a grasp has along the axis and around it, and how clear the arm is."""
+def margin_texts(hold: Hold) -> tuple[str, str, str]:
+    """Return texts for a hold: its margins along the axis (mm) and around it (°), and its clearance (mm)."""
     more = "> " if hold.clearance >= CLEARANCE_LIMIT else ""
     return (
         f"{1e3 * hold.margin_along:.0f} mm",
@@ -73,46 +73,65 @@ def measures(hold: Hold) -> tuple[str, str, str]:
 
 
 def shared_columns(maps: Sequence[FeasibilityMap], turns: Sequence[float], roll: int) -> np.ndarray:
-    """Return where a roll is feasible in all maps (H, COLUMNS of a picture), each turned by its δ (rad)."""
+    """Return where one roll is feasible in all maps, each shifted by its own angle.
+
+    Args:
+        maps: the maps, over equal grids.
+        turns: the angle (rad) by which the object of each is turned.
+        roll: index of the roll.
+
+    Returns:
+        (H, COLUMNS) bool, over the columns of a picture.
+    """
     shared = []
     for m, turn in zip(maps, turns, strict=True):
-        grid, k = m.manifold.shift(turn)  # not the whole map is shifted: this is drawn while maps slide
+        grid, k = m.manifold.shift(turn)  # cheaper than m.shift(turn): this runs while a slider moves
         shared.append(np.roll(m.feasible[roll], -k, axis=1)[:, sample_columns(grid)])
     return np.logical_and.reduce(shared)
 
 
 def _unplanned(state: State) -> str:
-    """Draw the maps that are known without a plan, as they were computed."""
-    known = {
+    """Draw the maps that the planner used although it found no plan, at δ = 0."""
+    maps = {
         key: result
         for key, result in state.plan_results.maps.items()
         if state.plan_results.kind == "sequential"
     }
-    if not known:
+    if not maps:
         return ""
-    height = _height(len(known))
+    height = _height(len(maps))
     rows = [
-        _row((task, "", "", "", ""), "") + _strip(r, None, 0.0, 0.0, height) for (task, _), r in known.items()
+        _row((task, "", "", "", ""), "") + _strip(r, None, 0.0, 0.0, height) for (task, _), r in maps.items()
     ]
     axis = f'<div class="sg-map sg-axis">{THETA_AXIS}</div>'
     return f'<div class="sg-stack" role="img" aria-label="maps of the tasks">{"".join(rows)}{axis}</div>'
 
 
 def _height(strips: int) -> int:
-    return int(np.clip(ROOM / strips - 17, LOWEST, TALLEST))
+    return int(np.clip(TOTAL_HEIGHT / strips - 17, MIN_HEIGHT, MAX_HEIGHT))
 
 
-def _row(cells: Sequence[str], look: str) -> str:
-    return f'<div class="sg-head {look}">{"".join(f"<span>{escape(cell)}</span>" for cell in cells)}</div>'
+def _row(cells: Sequence[str], css_class: str) -> str:
+    return (
+        f'<div class="sg-head {css_class}">{"".join(f"<span>{escape(cell)}</span>" for cell in cells)}</div>'
+    )
 
 
-def _place(grasp: Grasp) -> str:
+def _grasp_text(grasp: Grasp) -> str:
     turn, roll = np.rad2deg(grasp.theta) + 0.0, np.rad2deg(grasp.roll)
     return f"h = {100 * grasp.h:.1f} cm, θ = {turn:.1f}°, roll {roll:.0f}°"
 
 
 def _strip(result: MapResult, grasp: Grasp | None, slid: float, delta: float, height: int) -> str:
-    """Draw one map, slid by an angle of the way to δ (rad), with the cell of it that the grasp uses."""
+    """Draw one map with the cell that the grasp uses.
+
+    Args:
+        result: the map.
+        grasp: the grasp; None to draw no mark, and either roll.
+        slid: the angle (rad) that the picture is shifted by so far.
+        delta: the task's δ (rad), the shift in the end.
+        height: of the strip (px).
+    """
     roll = None if grasp is None else ROLLS.index(grasp.roll)
     share = float(np.mod(slid / (2 * np.pi), 1.0))
     source = _picture(result.map, roll)
@@ -122,7 +141,7 @@ def _strip(result: MapResult, grasp: Grasp | None, slid: float, delta: float, he
     marks = ""
     if grasp:
         at = Mark(grasp.h, float(wrap(grasp.theta + delta - slid)))
-        marks = _line(grasp.theta) + circle(at, result.map.manifold)
+        marks = _theta_line(grasp.theta) + circle(at, result.map.manifold)
     return _framed(sliding + marks, result.map, height)
 
 
@@ -136,7 +155,7 @@ def _overlay(maps: Sequence[FeasibilityMap], turns: tuple[float, ...], grasp: Gr
     source = _uri(to_png(shared[::-1].astype(np.uint8), SHARED))
     grid = maps[0].manifold
     picture = f'<img class="sg-whole" alt="common grasps" src="{source}">'
-    marks = _line(grasp.theta) + circle(Mark(grasp.h, grasp.theta), grid)
+    marks = _theta_line(grasp.theta) + circle(Mark(grasp.h, grasp.theta), grid)
     return _framed(picture + marks, maps[0], height)
 
 
@@ -147,7 +166,7 @@ def _framed(picture: str, m: FeasibilityMap, height: int) -> str:
     )
 
 
-def _line(theta: float) -> str:
+def _theta_line(theta: float) -> str:
     """Draw the grasp's θ across a strip."""
     left = 100 * (float(wrap(theta)) + np.pi) / (2 * np.pi)
     return f'<i class="sg-line-theta" style="left:{left:.3f}%;border-color:{INK}"></i>'

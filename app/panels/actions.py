@@ -1,4 +1,4 @@
-"""What the widgets of a page ask its session for."""
+"""The interface through which widgets act on their session."""
 
 from __future__ import annotations
 
@@ -11,61 +11,68 @@ from ..state.state import State
 __all__ = ["Actions", "Change", "PlanActions"]
 
 Change = Callable[[State], State]
+"""Returns the new state, or raises a `SymgraspError`, which the page shows."""
 
 
 class PlanActions(Protocol):
-    """What widgets ask for about plans."""
+    """Actions about plans."""
 
     def run(self, kind: PlanKind, method: str = "") -> None:
-        """Run a planner, with the method chosen for it unless another is asked for."""
+        """Run a planner, with the method chosen on the page unless one is given."""
 
-    def more(self) -> None:
-        """List further plans."""
+    def list_more(self) -> None:
+        """Compute further plans and add them to the list."""
 
     def open_file(self, name: str, content: bytes) -> None:
-        """Verify a plan that was uploaded, and show it if it holds."""
+        """Verify an uploaded plan file, and show the plan if it holds."""
 
     def download(self, format_name: str) -> None:
-        """Send the plan to the browser in a format."""
+        """Send the plan to the browser in a format, a key of `app.files.plan_formats.FORMATS`."""
 
 
 class Actions(Protocol):
-    """What widgets ask for; answered at once, computing goes on elsewhere."""
+    """All actions; they return at once, computations run on the thread of the job queue."""
 
     @property
     def plans(self) -> PlanActions:
-        """What they ask for about plans."""
+        """The actions about plans."""
         ...
 
     def change(self, change: Change, origin: str = "") -> None:
-        """Apply a change to the state; widgets of that origin are not written back."""
+        """Apply a change to the state.
+
+        Args:
+            change: the change.
+            origin: what changed it: "inputs", "gizmo", "scrub" or "play"; widgets of that origin are not
+                written back.
+        """
 
     def open_scene(self, name: str) -> None:
-        """Load another scene."""
+        """Open a scene by its name in the menu."""
 
-    def load_scene(self, name: str, content: bytes) -> None:
-        """Open the scene in a file."""
+    def upload_scene(self, name: str, content: bytes) -> None:
+        """Open the scene in an uploaded file with this content."""
 
     def save_scene(self) -> None:
-        """Send the scene as a file."""
+        """Send the scene to the browser as a YAML file."""
 
     def choose_object(self, option: str) -> None:
-        """Put another object into the scene."""
+        """Replace the scene's object by an option of the menu."""
 
-    def upload(self, name: str, content: bytes, scale: float) -> None:
-        """Measure a mesh and put the object into the scene."""
+    def upload_object(self, name: str, content: bytes, scale: float) -> None:
+        """Measure an uploaded mesh and put the object into the scene; one unit of it is ``scale`` metres."""
 
     def choose_hand(self, hand: str) -> None:
         """Mount another hand on the chosen arm."""
 
     def stop_or_retry(self) -> None:
-        """Stop the computation, or begin the one that was stopped again."""
+        """Cancel the computation under way, or restart the one that was cancelled or failed."""
 
     def save_map(self, kind: str) -> None:
-        """Send the map as it is shown as a picture."""
+        """Send the map that is shown as a picture, in a format of `app.render.map_picture.FORMATS`."""
 
     def make_link(self) -> None:
-        """Put what is shown into an address."""
+        """Make a link that opens the page as it is."""
 
-    def save_view(self) -> None:
-        """Send the 3D view as a file."""
+    def save_3d_view(self) -> None:
+        """Send the 3D view as an HTML file."""

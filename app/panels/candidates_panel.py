@@ -1,4 +1,4 @@
-"""The candidates of the picked cell, to be stepped through."""
+"""The candidates of the picked cell, one of which is shown."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ __all__ = ["CandidatesPanel"]
 
 
 class CandidatesPanel(Panel):
-    """Shows what becomes of each candidate; the arm, or its ghost, takes the one that is chosen."""
+    """Shows the result of each candidate; the arm, or its ghost, is drawn at the one that is chosen."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
         self._shown: Explanation | None = None
-        self.step = gui.add_slider("Candidate", 1, 2, 1, 1, visible=False, hint="The best is the first.")
-        self.on(self.step, lambda s, v: changes.choose_candidate(s, int(v) - 1), "inputs")
-        self.one = self.html()
-        self.all = self.html()
+        self.candidate = gui.add_slider("Candidate", 1, 2, 1, 1, visible=False, hint="The best is the first.")
+        self.on(self.candidate, lambda s, v: changes.choose_candidate(s, int(v) - 1), "inputs")
+        self.result = self.html()
+        self.overview = self.html()
 
     def show(self, state: State) -> None:
-        """Draw them; while the next ones come in a moment, those before stay."""
+        """Draw the candidates; those of the last cell stay while the next are computed quickly."""
         if state.busy and not state.is_waiting and isinstance(state.missing_request, ExplainRequest):
             return
-        found = state.explanation
-        self.all.show(candidates_html(state))
-        self.one.show(candidate_html(state))
-        self.step.visible = found is not None and len(found.candidates) > 1
-        if found and self.step.visible and found is not self._shown:
-            self.step.max = len(found.candidates)
+        explanation = state.explanation
+        self.overview.show(candidates_html(state))
+        self.result.show(candidate_html(state))
+        self.candidate.visible = explanation is not None and len(explanation.candidates) > 1
+        if explanation and self.candidate.visible and explanation is not self._shown:
+            self.candidate.max = len(explanation.candidates)
             self.write_inputs(state)
-        self._shown = found
+        self._shown = explanation
 
     def write_inputs(self, state: State) -> None:
-        """Show which candidate it is."""
+        """Set the slider to the candidate that is shown."""
         if state.candidate is not None:
-            self.step.value = state.candidate + 1
+            self.candidate.value = state.candidate + 1

@@ -1,4 +1,4 @@
-"""What goes in and out: scene files, a link, the 3D view as a file; and light or dark."""
+"""Scene files, the link to the page, the 3D view as a file, and the dark theme."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["FilesPanel", "link_html"]
 
 
 class FilesPanel(Panel):
-    """Saves, opens and shares."""
+    """Saves and opens scenes, makes links, and saves the 3D view."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
@@ -30,7 +30,7 @@ class FilesPanel(Panel):
                 hint=f"At most {SCENE_LIMIT / 1e6:g} MB",
             )  # fmt: skip
             self.upload.on_upload(
-                lambda _: actions.load_scene(self.upload.value.name, self.upload.value.content)
+                lambda _: actions.upload_scene(self.upload.value.name, self.upload.value.content)
             )
         with gui.add_folder("Share"):
             self.button(
@@ -39,23 +39,23 @@ class FilesPanel(Panel):
             )  # fmt: skip
             self.link = self.html()
             self.button(
-                "Save the 3D view (HTML)", viser.Icon.FILE_EXPORT, actions.save_view, color="gray",
+                "Save the 3D view (HTML)", viser.Icon.FILE_EXPORT, actions.save_3d_view, color="gray",
                 hint="One file, to be opened anywhere without a network",
             )  # fmt: skip
         self.dark = gui.add_checkbox("Dark", False)
         self.on(self.dark, lambda s, v: changes.switched(s, dark=v))
 
     def show(self, state: State) -> None:
-        """Show the link that was made, and whether it still opens what is shown."""
+        """Show the link that was made last, and whether it is still up to date."""
         self.link.show(link_html(state))
 
     def write_inputs(self, state: State) -> None:
-        """Show whether it is dark."""
+        """Set the checkbox."""
         self.dark.value = state.display.dark
 
 
 def link_html(state: State) -> str:
-    """Show the link that was made last."""
+    """Return the link that was made last, with a note where the page has changed since."""
     if state.link is None:
         return ""
     address = escape(state.link.address, quote=True)

@@ -1,4 +1,4 @@
-"""The picked grasp: where it is, and how the arm holds it or why it cannot."""
+"""The picked grasp: its position on the map, and how the arm holds the object or why it cannot."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["GraspPanel"]
 
 
 class GraspPanel(Panel):
-    """Picks a grasp by numbers and says what becomes of it."""
+    """Picks a grasp by its height, angle and roll, and describes its result."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
@@ -24,19 +24,19 @@ class GraspPanel(Panel):
         self.theta = gui.add_number("θ (°)", 0.0, min=-180.0, max=180.0, step=0.1)
         self.on(self.h, lambda s, v: changes.choose(s, v / 100, _shown(s).theta), "inputs")
         self.on(self.theta, lambda s, v: changes.choose(s, _shown(s).h, np.deg2rad(v)), "inputs")
-        self.roll = self.choice("Roll", [roll.value for roll in RollChoice])
+        self.roll = self.dropdown("Roll", [roll.value for roll in RollChoice])
         self.on(self.roll, lambda s, v: changes.choose_roll(s, RollChoice(v)))
         self.button("Let go", viser.Icon.HAND_OFF, lambda: actions.change(changes.clear_pick), color="gray")
         self.grasp = self.html()
 
     def show(self, state: State) -> None:
-        """Say what becomes of the grasp."""
+        """Describe the result of the grasp."""
         profile = state.scene.profile
         self.h.min, self.h.max = 100 * profile.h_min, 100 * profile.h_max
         self.grasp.show(grasp_html(state))
 
     def write_inputs(self, state: State) -> None:
-        """Show where the grasp is."""
+        """Set height, angle and roll."""
         pick = _shown(state)
         self.h.value = round(100 * pick.h, 2)
         self.theta.value = round(float(np.rad2deg(pick.theta)), 2)
@@ -44,5 +44,5 @@ class GraspPanel(Panel):
 
 
 def _shown(state: State) -> Pick:
-    """Return what the numbers show, which may not be in the widgets yet."""
+    """Return the pick that the inputs show; read from the state, as the inputs may be out of date."""
     return state.pick or Pick(state.scene.profile.h_min, 0.0)

@@ -1,4 +1,4 @@
-"""Several hands on one object: place them together, hand the object over, replay the hill climbing."""
+"""Several hands on one object: bimanual plans, handovers, and the replay of the hill climbing."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import viser
 
-from ..html.conflicts import why_html
-from ..html.hands import comparison_html, hands_html
-from ..html.readout import hands_line
+from ..html.conflicts import failure_html
+from ..html.hands import climb_comparison_html, hands_html
+from ..html.readout import bimanual_html
 from ..state import plan_changes
 from ..state.plan_results import FIRST_SEED
 from ..state.state import State
@@ -22,17 +22,17 @@ HANDS_METHODS: Mapping[str, str] = {
     "widest gap (complete search)": "exact",
     "hill climbing (Algorithm 3)": "hill_climb",
 }
-"""What the page calls a method → the method."""
+"""Label of a method on the page → the method."""
 
 
 class HandsPanel(Panel):
-    """Plans for several arms, and shows their prints on their maps."""
+    """Plans for several arms, and shows their handprints on their maps."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
         plans = actions.plans
         self.title = self.html()
-        self.method = self.choice("Method", tuple(HANDS_METHODS))
+        self.method = self.dropdown("Method", tuple(HANDS_METHODS))
         self.on(
             self.method,
             lambda s, v: plan_changes.change_plan_results(
@@ -52,7 +52,7 @@ class HandsPanel(Panel):
             lambda: plans.run("handover"),
             visible=False,
         )
-        self.why = self.html()
+        self.failure = self.html()
         self.comparison = self.html()
         self.frame = gui.add_slider("Climb", 1, 2, 1, 1, visible=False)
         self.on(self.frame, lambda s, v: plan_changes.show_frame(s, int(v) - 1), "scrub")
@@ -66,15 +66,15 @@ class HandsPanel(Panel):
         self.maps = self.html()
 
     def show(self, state: State) -> None:
-        """Show the maps with the prints, or why there is no plan."""
+        """Show the maps with the handprints, or why there is no plan."""
         plan_results, climb = state.plan_results, state.plan_results.climb
         refusal = plan_results.refusal if plan_results.kind != "sequential" else None
-        self.title.show(hands_line(state))
+        self.title.show(bimanual_html(state))
         self.run.disabled = not state.can_plan("bimanual")
         self.seed.visible = plan_results.hands_method == "hill_climb"
         self.handover.visible = state.can_plan("handover")
-        self.why.show(why_html(refusal, state.scene.manifold) if refusal else "")
-        self.comparison.show(comparison_html(climb) if climb else "")
+        self.failure.show(failure_html(refusal, state.scene.manifold) if refusal else "")
+        self.comparison.show(climb_comparison_html(climb) if climb else "")
         self.frame.visible = climb is not None and len(climb.steps) > 1
         self.replay.visible = self.frame.visible
         if climb and self.frame.visible:
@@ -85,7 +85,7 @@ class HandsPanel(Panel):
         self.maps.show(hands_html(state))
 
     def write_inputs(self, state: State) -> None:
-        """Show what is chosen."""
+        """Set method, seed and the step of the climb."""
         plan_results = state.plan_results
         self.method.value = next(
             k for k, method in HANDS_METHODS.items() if method == plan_results.hands_method

@@ -1,4 +1,4 @@
-"""The command palette and its keys: everything that the widgets of the page do, without a mouse."""
+"""The command palette and its hotkeys: most actions of the page's widgets without a mouse."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from .panel import Panel
 
 __all__ = ["Keyboard", "next_arm"]
 
-TASKS = 9
-"""Tasks that have a digit."""
+TASK_KEYS = 9
+"""How many tasks have a digit as their hotkey."""
 
 
 class Keyboard(Panel):
-    """Has no widgets; every command is a change that some widget makes as well.
+    """Commands without widgets; each does what some widget does as well.
 
     Args:
         gui: where to add the commands.
         actions: what they do.
-        scenes: names to choose from.
+        scenes: names of the scenes that can be opened.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: Actions, scenes: Sequence[str]) -> None:
@@ -43,14 +43,14 @@ class Keyboard(Panel):
         self.command("Flat map", lambda: change(lambda s: changes.toggled(s, "flat_map")), "F")
         self.command(
             "Drag handles",
-            lambda: change(lambda s: changes.switched(s, drag_handles=not s.display.drag_handles)),
+            lambda: change(lambda s: changes.toggled(s, "drag_handles")),
             "G",
         )
         self.command("Light or dark", lambda: change(lambda s: changes.toggled(s, "dark")), "T")
         self.command("Plan one grasp for all tasks", lambda: plans.run("sequential"), "P")
         self.command("Plan all arms together", lambda: plans.run("bimanual"), "H")
         self.command("Hand over: plan all tasks in order", lambda: plans.run("handover"))
-        self.command("List more solutions", plans.more)
+        self.command("List more solutions", plans.list_more)
         self.command(
             "Next solution",
             lambda: change(lambda s: plan_changes.choose_plan(s, s.plan_results.index + 1)),
@@ -63,15 +63,15 @@ class Keyboard(Panel):
         self.command("Previous task of the plan", lambda: change(lambda s: _step(s, -1)), "pageup")
         self.command("Make a link", actions.make_link)
         self.command("Save the scene (YAML)", actions.save_scene, "S", "cmd/ctrl")
-        self.command("Save the 3D view (HTML)", actions.save_view)
+        self.command("Save the 3D view (HTML)", actions.save_3d_view)
         self.command("Next scene", self._next_scene, "N")
         for name in scenes:
             self.command(f"Open {name}", lambda name=name: actions.open_scene(name))
 
     def show(self, state: State) -> None:
-        """Offer the tasks of the scene."""
+        """Offer the commands for the tasks of the scene."""
         self._scene = state.scene_name
-        names = tuple(state.scene.tasks)[:TASKS]
+        names = tuple(state.scene.tasks)[:TASK_KEYS]
         if names != tuple(self._tasks):
             for command in self._tasks.values():
                 command.remove()
@@ -83,8 +83,8 @@ class Keyboard(Panel):
         )
 
     def _next_scene(self) -> None:
-        known = self._scenes.index(self._scene) if self._scene in self._scenes else -1
-        self.actions.open_scene(self._scenes[(known + 1) % len(self._scenes)])
+        index = self._scenes.index(self._scene) if self._scene in self._scenes else -1
+        self.actions.open_scene(self._scenes[(index + 1) % len(self._scenes)])
 
 
 def next_arm(state: State) -> State:

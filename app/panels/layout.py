@@ -1,4 +1,4 @@
-"""Where the panels of one browser stand, and how they are brought up to its state."""
+"""The layout of the panels of one browser, and their updates to its state."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from .files_panel import FilesPanel
 from .grasp_panel import GraspPanel
 from .hands_panel import HandsPanel
 from .keyboard import Keyboard
+from .map_options_panel import MapOptionsPanel
 from .map_panel import MapPanel
 from .object_panel import ObjectPanel
 from .panel import Panel
@@ -20,25 +21,25 @@ from .plan_panel import PlanFilePanel, PlanPanel
 from .scene_panel import ScenePanel
 from .sequence_panel import SequencePanel, TasksPanel
 from .status_panel import NotesPanel, StatusPanel
-from .view_panel import ViewPanel
 
 __all__ = ["Layout", "panel_widths"]
 
 WINDOW = 1280
-"""Width (px) of a window from which on the panels have all the room they want."""
+"""Width (px) of a window from which on the panels have their full width."""
 
-MAP_WIDTH = 480
-CONTROLS_WIDTH = 320
-NARROWEST = 240
+MAP_WIDTH, CONTROLS_WIDTH = 480, 320
+"""Full widths (px) of the panels on the left and on the right."""
+
+MIN_CONTROLS_WIDTH = 240
 
 
 class Layout:
-    """All panels of a browser: maps to read on the left, what to choose on the right.
+    """All panels of a browser: maps and plans on the left, scene and object on the right.
 
     Args:
         client: the browser.
         actions: what the widgets do.
-        scenes: names to choose from.
+        scenes: names of the scenes that can be opened.
 
     Attributes:
         view_width: width (px) that is left for the 3D view.
@@ -47,7 +48,7 @@ class Layout:
     def __init__(self, client: viser.ClientHandle, actions: Actions, scenes: tuple[str, ...]) -> None:
         gui = client.gui
         self.gui, self._dark = gui, False
-        window = client.camera.image_width  # read before the panels take their part of it
+        window = client.camera.image_width  # read before the panels narrow the canvas
         map_width, controls_width = panel_widths(window)
         self.view_width = window - map_width - controls_width
         self._theme(dark=False)
@@ -63,7 +64,7 @@ class Layout:
             with tabs.add_tab("Grasp", viser.Icon.HAND_GRAB):
                 map_tab += [GraspPanel(gui, actions), CandidatesPanel(gui, actions)]
             with tabs.add_tab("View", viser.Icon.PALETTE):
-                map_tab.append(ViewPanel(gui, actions))
+                map_tab.append(MapOptionsPanel(gui, actions))
         with left.add_tab("Sequence", viser.Icon.ROUTE):
             sequence_tab = [
                 NotesPanel(gui, actions),
@@ -94,7 +95,7 @@ class Layout:
         self.panels: tuple[Panel, ...] = (*map_tab, *sequence_tab, *hands_tab, *files_tab, *main)
 
     def show(self, state: State, *, write_inputs: bool) -> None:
-        """Bring the panels up to the state.
+        """Update the panels to a state.
 
         Args:
             state: the state.
@@ -115,9 +116,9 @@ class Layout:
 
 
 def panel_widths(window: int) -> tuple[int, int]:
-    """Return how wide (px) the maps and the controls are, so that a tablet shows the scene as well."""
+    """Return the widths (px) of the left and right panels; a narrow window keeps room for the 3D view."""
     share = min(1.0, window / WINDOW)
-    return round(MAP_WIDTH * share), max(round(CONTROLS_WIDTH * share), NARROWEST)
+    return round(MAP_WIDTH * share), max(round(CONTROLS_WIDTH * share), MIN_CONTROLS_WIDTH)
 
 
 def _style() -> str:

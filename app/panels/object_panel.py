@@ -1,4 +1,4 @@
-"""Which object, and where it stands."""
+"""The object and its pose."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from symgrasp.object.measure.mesh_io import MESH_ENDINGS
 from symgrasp.scene.scene import Scene
 
 from ..state import changes
-from ..state.object_choice import UNITS, UPLOAD_LIMIT, choices
+from ..state.object_choice import UNITS, UPLOAD_LIMIT, object_options
 from ..state.state import State
 from .actions import Actions
-from .panel import Panel, within
+from .panel import Panel, slider_value
 
-__all__ = ["ObjectPanel", "span"]
+__all__ = ["ObjectPanel", "position_range"]
 
 TURN_STEP = 0.25
 """Step of the rotation slider (degrees): one column of the map's picture."""
 
-BEYOND = 100.0
-"""How far (cm) beyond every robot and task the object may be moved."""
+POSITION_MARGIN = 100.0
+"""How far (cm) beyond every robot and task the sliders reach."""
 
-COLOURS = ("map", "symmetry error")
-"""What the object's surface may show."""
+SURFACE_COLORS = ("map", "symmetry error")
+"""Labels of what the object's surface can show."""
 
 
 class ObjectPanel(Panel):
-    """Chooses the object, turns it and moves it about."""
+    """Chooses the object, turns and moves it."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
@@ -37,12 +37,12 @@ class ObjectPanel(Panel):
 
     def _build_choice(self) -> None:
         gui = self.gui
-        self.object_choice = self.choice("Object", choices())
-        self.on_choice(self.object_choice, self.actions.choose_object)
+        self.object_choice = self.dropdown("Object", object_options())
+        self.on_select(self.object_choice, self.actions.choose_object)
         limit = (
             f"{', '.join(ending[1:].upper() for ending in MESH_ENDINGS)}; at most {UPLOAD_LIMIT / 1e6:g} MB"
         )
-        self.unit = self.choice("Mesh unit", tuple(UNITS), hint="What one unit of an uploaded mesh is.")
+        self.unit = self.dropdown("Mesh unit", tuple(UNITS), hint="What one unit of an uploaded mesh is.")
         self.upload = gui.add_upload_button(
             "Upload a mesh",
             icon=viser.Icon.UPLOAD,
@@ -51,12 +51,12 @@ class ObjectPanel(Panel):
             hint=limit,
         )
         self.upload.on_upload(
-            lambda _: self.actions.upload(
+            lambda _: self.actions.upload_object(
                 self.upload.value.name, self.upload.value.content, UNITS[self.unit.value]
             )
         )
-        self.colours = self.choice("Colours", COLOURS, visible=False)
-        self.on(self.colours, lambda s, v: changes.switched(s, symmetry_error=v == COLOURS[1]))
+        self.surface_colors = self.dropdown("Colours", SURFACE_COLORS, visible=False)
+        self.on(self.surface_colors, lambda s, v: changes.switched(s, symmetry_error=v == SURFACE_COLORS[1]))
 
     def _build_pose(self) -> None:
         gui = self.gui
@@ -66,7 +66,8 @@ class ObjectPanel(Panel):
         )  # fmt: skip
         self.on(self.turn, lambda s, v: changes.turn(s, np.deg2rad(v)), "inputs")
         self.position = {
-            axis: gui.add_slider(f"{axis} (cm)", -BEYOND, BEYOND, 0.5, 0.0) for axis in ("x", "y", "z")
+            axis: gui.add_slider(f"{axis} (cm)", -POSITION_MARGIN, POSITION_MARGIN, 0.5, 0.0)
+            for axis in ("x", "y", "z")
         }
         for axis, slider in self.position.items():
             self.on(slider, lambda s, v, axis=axis: changes.moved(s, **{axis: v / 100}), "inputs")
@@ -88,29 +89,29 @@ class ObjectPanel(Panel):
         )
 
     def show(self, state: State) -> None:
-        """Offer the object that was uploaded as well."""
-        if self.object_choice.options != (things := choices(state.uploaded_object)):
-            self.object_choice.options = things
+        """Offer the library's objects and the uploaded one."""
+        if self.object_choice.options != (options := object_options(state.uploaded_object)):
+            self.object_choice.options = options
 
     def write_inputs(self, state: State) -> None:
-        """Show the object and its pose."""
+        """Set the object and its pose."""
         base = state.base
-        self.turn.value = within(self.turn, np.rad2deg(state.delta))
+        self.turn.value = slider_value(self.turn, np.rad2deg(state.delta))
         for k, (axis, slider) in enumerate(self.position.items()):
-            slider.min, slider.max = span(state.scene, k)
-            slider.value = within(slider, 100 * getattr(base, axis))
-        self.lean.value = within(self.lean, np.rad2deg(base.lean))
-        self.towards.value = within(self.towards, np.rad2deg(base.towards))
+            slider.min, slider.max = position_range(state.scene, k)
+            slider.value = slider_value(slider, 100 * getattr(base, axis))
+        self.lean.value = slider_value(self.lean, np.rad2deg(base.lean))
+        self.towards.value = slider_value(self.towards, np.rad2deg(base.towards))
         self.object_choice.value = state.object_option
-        self.colours.visible = bool(state.object_choice and state.object_choice.measurement)
-        self.colours.value = COLOURS[state.display.symmetry_error]
+        self.surface_colors.visible = bool(state.object_choice and state.object_choice.measurement)
+        self.surface_colors.value = SURFACE_COLORS[state.display.symmetry_error]
         self.gizmo.value = state.display.drag_handles
 
 
-def span(scene: Scene, axis: int) -> tuple[float, float]:
-    """Return how far (cm) an object may be moved along a coordinate: it ends with round figures."""
+def position_range(scene: Scene, axis: int) -> tuple[float, float]:
+    """Return the range (cm), in whole tens, of a position slider: x (0), y (1) or z (2)."""
     poses = [robot.T_world_base for robot in scene.robots.values()]
     poses += [task.T_world_object for task in scene.tasks.values()]
-    places = [100 * pose[axis, 3] for pose in poses]
-    low, high = min(places) - BEYOND, max(places) + BEYOND
+    coordinates = [100 * pose[axis, 3] for pose in poses]
+    low, high = min(coordinates) - POSITION_MARGIN, max(coordinates) + POSITION_MARGIN
     return float(np.floor(low / 10) * 10), float(np.ceil(high / 10) * 10)

@@ -1,4 +1,4 @@
-"""What all panels have in common: how widgets change the state, and how they are brought up to it."""
+"""The base class of panels: adding widgets, changing the state from them, updating them to a state."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import viser
 from ..state.state import State
 from .actions import Actions
 
-__all__ = ["Html", "Panel", "within"]
+__all__ = ["Html", "Panel", "slider_value"]
 
 Hotkey = Any
 """A letter, a digit or the name of a key; None for none. viser does not export the type."""
@@ -25,13 +25,13 @@ class Html:
         self._handle, self._content = gui.add_html(content), content
 
     def show(self, content: str) -> None:
-        """Show this from now on."""
+        """Replace the content."""
         if content != self._content:
             self._content = self._handle.content = content
 
 
 class Panel:
-    """Some widgets of one browser; made where they are to appear.
+    """A group of widgets of one browser; constructed inside the container where they appear.
 
     Args:
         gui: where to add them.
@@ -42,64 +42,67 @@ class Panel:
         self.gui, self.actions = gui, actions
 
     def show(self, state: State) -> None:
-        """Bring what is only seen up to the state."""
+        """Update the outputs to a state: what a person cannot change."""
 
     def write_inputs(self, state: State) -> None:
-        """Bring what a person can change up to the state; not while a person is changing it."""
+        """Update the inputs to a state; not called while a person is changing one of them."""
 
     def html(self, content: str = "") -> Html:
-        """Add HTML."""
+        """Add a piece of HTML."""
         return Html(self.gui, content)
 
     def button(
-        self, label: str, icon: viser.IconName, do: Callable[[], None], **look: Any
+        self, label: str, icon: viser.IconName, action: Callable[[], None], **options: Any
     ) -> viser.GuiButtonHandle:
-        """Add a button and say what it does."""
-        button = self.gui.add_button(label, icon=icon, **look)
-        button.on_click(lambda _: do())
+        """Add a button that runs an action; further options are those of `viser.GuiApi.add_button`."""
+        button = self.gui.add_button(label, icon=icon, **options)
+        button.on_click(lambda _: action())
         return button
 
     def command(
-        self, label: str, do: Callable[[], None], hotkey: Hotkey = None, modifier: Modifier = None
+        self, label: str, action: Callable[[], None], hotkey: Hotkey = None, modifier: Modifier = None
     ) -> viser.CommandHandle:
-        """Add a command to the palette (Ctrl+K), and a key that does it.
+        """Add a command to the palette (Ctrl+K), with a hotkey if given.
 
-        The 3D view flies on W, A, S, D, Q, E and the arrows: those keys are taken.
+        viser's camera already uses W, A, S, D, Q, E and the arrow keys.
         """
         command = self.gui.add_command(label, hotkey=hotkey, modifier=modifier)
-        command.on_trigger(lambda _: do())
+        command.on_trigger(lambda _: action())
         return command
 
-    def choice(
-        self, label: str, options: Sequence[str] = ("…",), **look: Any
+    def dropdown(
+        self, label: str, options: Sequence[str] = ("…",), **more: Any
     ) -> viser.GuiDropdownHandle[str]:
-        """Add a dropdown; its options may be known later."""
-        return self.gui.add_dropdown(label, options, **look)
+        """Add a dropdown; its options may be set later. ``more`` goes to `viser.GuiApi.add_dropdown`."""
+        return self.gui.add_dropdown(label, options, **more)
 
     def on(self, widget: Any, change: Callable[[State, Any], State], origin: str = "") -> None:
-        """Let a widget change the state; what the page itself writes into it does not count.
+        """Change the state whenever a person changes a widget; values that the page writes are ignored.
 
-        Widgets that a person drags or types in have the origin "inputs": they are not written back
-        meanwhile.
+        Args:
+            widget: the widget.
+            change: returns the new state, from the state and the value of the widget.
+            origin: "inputs" for widgets that a person drags or types in: they are not written back
+                meanwhile.
         """
 
-        # On the event loop, at once: in a thread of a pool the value might have been written over
-        # meanwhile, and callbacks overtake each other. A change of the state takes no time.
+        # A coroutine runs on the event loop at once. viser would run a plain function in a thread pool,
+        # where callbacks can overtake each other and the value may have been overwritten.
         @widget.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 value = widget.value
                 self.actions.change(lambda state: change(state, value), origin)
 
-    def on_choice(self, widget: Any, do: Callable[[str], None]) -> None:
-        """Say what a choice of a person does."""
+    def on_select(self, widget: Any, action: Callable[[str], None]) -> None:
+        """Run an action with the option whenever a person selects one."""
 
         @widget.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
-                do(widget.value)
+                action(widget.value)
 
 
-def within(slider: viser.GuiSliderHandle[float], value: float) -> float:
-    """Return a value as a slider can show it."""
+def slider_value(slider: viser.GuiSliderHandle[float], value: float) -> float:
+    """Return a value rounded to a slider's step and clipped to its range."""
     return float(np.clip(round(value / slider.step) * slider.step, slider.min, slider.max))

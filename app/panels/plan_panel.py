@@ -1,12 +1,11 @@
-"""What all plans have in common: choose one of the list, play it, keep it in a file."""
+"""Plans of any kind: the list of solutions, the playback, and plan files."""
 
 from __future__ import annotations
 
 import viser
 
-from ..compute.plan_service import PLAN_LIMIT
-from ..files.plan_formats import FORMATS
-from ..html.conflicts import opened_html
+from ..files.plan_formats import FORMATS, PLAN_LIMIT
+from ..html.conflicts import plan_file_html
 from ..html.readout import solution_html
 from ..html.solutions import solutions_html
 from ..state import plan_changes
@@ -16,14 +15,14 @@ from .panel import Panel
 
 __all__ = ["PlanFilePanel", "PlanPanel"]
 
-NOT_A_MOTION = (
+PLAYBACK_NOTE = (
     '<div class="sg sg-faint">Between tasks the arms only move for show: '
     "this is no motion checked for collisions.</div>"
 )
 
 
 class PlanPanel(Panel):
-    """Leafs through the plans that were found and plays them."""
+    """Chooses one of the listed plans and plays it."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
@@ -33,7 +32,7 @@ class PlanPanel(Panel):
         self.list = self.html()
         self.text = self.html()
         self.more = self.button(
-            "List more solutions", viser.Icon.LIST, plans.more, color="gray", visible=False
+            "List more solutions", viser.Icon.LIST, plans.list_more, color="gray", visible=False
         )
         self.step = gui.add_slider("Plan step", 1.0, 2.0, 0.02, 1.0, visible=False)
         self.on(self.step, lambda s, v: plan_changes.show_position(s, v - 1), "scrub")
@@ -47,7 +46,7 @@ class PlanPanel(Panel):
         self.note = self.html()
 
     def show(self, state: State) -> None:
-        """Offer what there is to leaf through."""
+        """List the plans and describe the one that is shown."""
         plan_results = state.plan_results
         several = len(plan_results.plans) > 1
         if several:
@@ -62,10 +61,10 @@ class PlanPanel(Panel):
         playing = plan_results.playing == "arms"
         self.play.label = "Pause" if playing else "Play"
         self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
-        self.note.show(NOT_A_MOTION if plan_results.last else "")
+        self.note.show(PLAYBACK_NOTE if plan_results.last else "")
 
     def write_inputs(self, state: State) -> None:
-        """Show which plan and which task it is."""
+        """Set the sliders to the plan and task that are shown."""
         plan_results = state.plan_results
         if len(plan_results.plans) > 1:
             self.solution.value = plan_results.index + 1
@@ -74,15 +73,15 @@ class PlanPanel(Panel):
 
 
 class PlanFilePanel(Panel):
-    """Saves and opens plans."""
+    """Downloads the plan and opens plan files."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
         plans = actions.plans
         with gui.add_folder("Plan file"):
-            self.form = self.choice("Format", tuple(FORMATS), visible=False)
+            self.format = self.dropdown("Format", tuple(FORMATS), visible=False)
             self.download = self.button(
-                "Download plan", viser.Icon.DOWNLOAD, lambda: plans.download(self.form.value), visible=False
+                "Download plan", viser.Icon.DOWNLOAD, lambda: plans.download(self.format.value), visible=False
             )
             self.upload = gui.add_upload_button(
                 "Open a plan",
@@ -97,6 +96,6 @@ class PlanFilePanel(Panel):
             self.report = self.html()
 
     def show(self, state: State) -> None:
-        """Offer the plan, and say what became of the file that was opened."""
-        self.form.visible = self.download.visible = state.plan is not None
-        self.report.show(opened_html(state.plan_results.opened) if state.plan_results.opened else "")
+        """Offer the download, and report on the file that was opened last."""
+        self.format.visible = self.download.visible = state.plan is not None
+        self.report.show(plan_file_html(state.plan_results.opened) if state.plan_results.opened else "")

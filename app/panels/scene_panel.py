@@ -1,4 +1,4 @@
-"""Which scene, task, arm and hand."""
+"""The scene, task, arm and hand that are shown."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
 
 
 class ScenePanel(Panel):
-    """Chooses what is shown.
+    """Chooses scene, task, arm and hand.
 
     Args:
         gui: where to add the widgets.
         actions: what they do.
-        scenes: names to choose from.
+        scenes: names of the scenes that can be opened.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: Actions, scenes: tuple[str, ...]) -> None:
         super().__init__(gui, actions)
         with gui.add_folder("Scene"):
-            self._scenes, self.scene = scenes, self.choice("Scene", scenes)
-            self.task = self.choice("Task")
-            self.arm = self.choice("Arm")
-            self.hand = self.choice("Hand", MOUNTABLE, visible=False)
+            self._scenes, self.scene = scenes, self.dropdown("Scene", scenes)
+            self.task = self.dropdown("Task")
+            self.arm = self.dropdown("Arm")
+            self.hand = self.dropdown("Hand", MOUNTABLE, visible=False)
             self.flat_map = gui.add_checkbox("Flat map", True)
-        self.on_choice(self.scene, actions.open_scene)
-        self.on_choice(self.hand, actions.choose_hand)
+        self.on_select(self.scene, actions.open_scene)
+        self.on_select(self.hand, actions.choose_hand)
         self.on(self.task, lambda s, v: changes.choose_task(s, v))
         self.on(self.arm, lambda s, v: changes.choose_arm(s, v))
         self.on(self.flat_map, lambda s, v: changes.switched(s, flat_map=v))
 
     def show(self, state: State) -> None:
-        """Offer what the scene has, and the scene that was uploaded."""
+        """Offer the tasks and arms of the scene, and the uploaded scene."""
         scenes = (*self._scenes, *([state.uploaded_scene.option] if state.uploaded_scene else []))
         if self.scene.options != scenes:
             self.scene.options = scenes
@@ -51,7 +51,7 @@ class ScenePanel(Panel):
             self.arm.options = arms
 
     def write_inputs(self, state: State) -> None:
-        """Show what is chosen."""
+        """Set what is chosen."""
         self.scene.value = state.scene_name
         self.task.value, self.arm.value = state.task, state.arm
         hand = state.scene.replaceable_hands.get(state.arm)

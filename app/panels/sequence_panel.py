@@ -1,4 +1,4 @@
-"""One grasp for a sequence of tasks: plan it, see it in all maps, change the tasks."""
+"""One grasp for a sequence of tasks: its plan, the maps of all tasks, and the list of tasks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import viser
 
-from ..html.conflicts import regrasps, why_html
+from ..html.conflicts import failure_html, regrasp_count
 from ..html.readout import sequence_html, tasks_html
 from ..html.stack import stack_html
 from ..state import changes, plan_changes
@@ -23,7 +23,7 @@ SEQUENCE_METHODS: Mapping[str, str] = {
     "first found (Algorithm 2)": "first",
     "fewest regrasps": "regrasp",
 }
-"""What the page calls a method → the method."""
+"""Label of a method on the page → the method."""
 
 
 class SequencePanel(Panel):
@@ -33,7 +33,7 @@ class SequencePanel(Panel):
         super().__init__(gui, actions)
         plans = actions.plans
         self.title = self.html()
-        self.method = self.choice("Method", tuple(SEQUENCE_METHODS))
+        self.method = self.dropdown("Method", tuple(SEQUENCE_METHODS))
         self.on(
             self.method,
             lambda s, v: plan_changes.change_plan_results(
@@ -41,7 +41,7 @@ class SequencePanel(Panel):
             ),
         )
         self.run = self.button("One grasp for all tasks", viser.Icon.ROUTE, lambda: plans.run("sequential"))
-        self.why = self.html()
+        self.failure = self.html()
         self.regrasp = self.button(
             "Plan with regrasps", viser.Icon.ROUTE, lambda: plans.run("sequential", "regrasp"), visible=False
         )
@@ -60,23 +60,23 @@ class SequencePanel(Panel):
         """Show the maps with the grasp, or why there is none."""
         plan_results = state.plan_results
         refusal = plan_results.refusal if plan_results.kind == "sequential" else None
-        count = regrasps(refusal)
+        count = regrasp_count(refusal)
         self.title.show(sequence_html(state))
         self.run.disabled = not state.can_plan("sequential")
-        self.why.show(why_html(refusal, state.scene.manifold) if refusal else "")
+        self.failure.show(failure_html(refusal, state.scene.manifold) if refusal else "")
         self.regrasp.visible = count > 0
         self.regrasp.label = f"Plan with {count} regrasp{'s' * (count > 1)}"
         self.stack.show(stack_html(state))
         self.slide.visible = plan_results.kind == "sequential" and plan_results.last > 0
 
     def write_inputs(self, state: State) -> None:
-        """Show what is chosen."""
+        """Set method and slide."""
         self.method.value = _label(SEQUENCE_METHODS, state.plan_results.sequence_method)
         self.slide.value = round(100 * state.plan_results.slide)
 
 
 class TasksPanel(Panel):
-    """Changes the list of tasks."""
+    """Adds, renames, reorders and removes tasks."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
@@ -106,9 +106,9 @@ class TasksPanel(Panel):
         self.list.show(tasks_html(state))
 
     def write_inputs(self, state: State) -> None:
-        """Show the chosen task's name."""
+        """Set the text field to the chosen task's name."""
         self.name.value = state.task
 
 
 def _label(methods: Mapping[str, str], method: str) -> str:
-    return next(label for label, known in methods.items() if known == method)
+    return next(label for label, value in methods.items() if value == method)

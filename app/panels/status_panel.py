@@ -1,4 +1,4 @@
-"""What to try, what is going on, and the button that stops it."""
+"""The computation under way with its cancel button, undo and redo, and notes about problems."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UNDO, REDO = "Undo", "Redo"
 
 
 class StatusPanel(Panel):
-    """Always takes the same room: nothing below it may jump while it is being dragged."""
+    """Shows the computation under way; its height is constant, so that sliders below do not move."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
@@ -28,7 +28,7 @@ class StatusPanel(Panel):
         self.steps.on_click(lambda _: actions.change(undo if self.steps.value == UNDO else redo))
 
     def show(self, state: State) -> None:
-        """Say what is being done."""
+        """Show what is being computed, and whether it can be cancelled or restarted."""
         self.status.show(status_html(state))
         self.progress.value = 100 * state.busy.share if state.busy and state.is_waiting else 0.0
         again = "Restart" if state.problem else "Go on" if state.is_current else "Compute the map"
@@ -38,12 +38,12 @@ class StatusPanel(Panel):
 
 
 class NotesPanel(Panel):
-    """What went wrong, and what the object is inside of; in every tab, since only one is seen."""
+    """Shows the last problem and the obstacles the object is inside of; every tab has one."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
         self.notes = self.html()
 
     def show(self, state: State) -> None:
-        """Say it."""
+        """Show the notes."""
         self.notes.show(notes_html(state))

@@ -1,6 +1,6 @@
-"""How the arms get from one task of a plan to the next when it is played: for show, not to be run.
+"""The animation of a plan: joint values interpolated linearly from one task to the next.
 
-Joint values go straight from one task's to the next one's. Nothing is checked on the way.
+It is for display only: the way between two tasks is not checked for collisions.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from symgrasp.scene.scene import Scene
 from ..state.state import State
 from .weak_cache import cached_with_first
 
-__all__ = ["PlaybackFrame", "drawn_object_pose", "plan_joint_values", "playback_frame"]
+__all__ = ["PlaybackFrame", "plan_joint_values", "playback_frame"]
 
 
 def plan_joint_values(scene: Scene, task: PlanTask) -> dict[str, Array]:
-    """Return robot name → values (n,) of all its joints in a task; arms that do not hold are parked."""
+    """Return robot name → values (n,) of all its joints in a task; arms without a hold are at home."""
     values = {robot.name: robot.home.copy() for robot in scene.robots.values()}
     for hold in task.holds:
         names = scene.robots[hold.robot].model.joint_names
@@ -32,12 +32,12 @@ def plan_joint_values(scene: Scene, task: PlanTask) -> dict[str, Array]:
 
 @dataclass(frozen=True, eq=False)
 class PlaybackFrame:
-    """A moment between two tasks of a plan.
+    """One frame of the animation, between two tasks of a plan.
 
     Attributes:
         scene: the plan's scene.
         before, after: the tasks.
-        share: how far on the way, 0 to 1.
+        share: how much of the way is done, 0 to 1.
     """
 
     scene: Scene
@@ -53,7 +53,7 @@ class PlaybackFrame:
 
     @cached_property
     def T_world_object(self) -> Array:
-        """Where the object is (4, 4): in the hand that carries it, or where it was set down."""
+        """Pose (4, 4) of the object: in the hand that carries it, else at the nearer task."""
         hold = self._carrier
         if hold is None:
             return (self.before if self.share < 0.5 else self.after).object_pose_turned.array()
@@ -63,7 +63,7 @@ class PlaybackFrame:
 
     @property
     def _carrier(self) -> Hold | None:
-        """How the first arm holds that has the same grasp in both tasks."""
+        """The hold of the first arm that keeps its grasp in both tasks."""
         after = {(hold.arm, hold.grasp) for hold in self.after.holds}
         return next((hold for hold in self.before.holds if (hold.arm, hold.grasp) in after), None)
 
@@ -76,15 +76,9 @@ class PlaybackFrame:
 
 @cached_with_first
 def playback_frame(state: State) -> PlaybackFrame | None:
-    """Return the frame of the playback, None unless it is between two tasks."""
+    """Return the frame that a state shows, None unless its playback is between two tasks."""
     if state.plan is None or state.step is None or not state.plan_results.is_between:
         return None
     start, share = state.plan_results.transition
     before, after = state.plan.plan.tasks[start : start + 2]
     return PlaybackFrame(state.scene, before, after, share)
-
-
-def drawn_object_pose(state: State) -> Array:
-    """Return where the object is drawn (4, 4): in the hand, while the arms are played."""
-    frame = playback_frame(state)
-    return frame.T_world_object if frame else state.T_world_object

@@ -1,4 +1,4 @@
-"""Which cells lie under which hand, for the maps and for the object's surface."""
+"""The handprints that a state shows: which cells lie under which hand."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ __all__ = ["hand_color", "hand_print", "on_surface", "print_index", "print_names
 
 
 def print_index(prints: Sequence[np.ndarray]) -> np.ndarray:
-    """Return for every cell the index (H, A) into `PRINTS` of what lies on it.
+    """Return the index (H, A) into `PRINTS` of each cell's colour.
 
     Args:
-        prints: cells (H, A) under each hand.
+        prints: for each hand, whether a cell (H, A) lies under it.
 
     Returns:
-        0 for nothing, the hand's own index, or `OVERLAP` where there are several hands.
+        0 where there is no hand, the hand's `hand_color`, or `OVERLAP` where there are several.
     """
     index = sum(np.where(cells, hand_color(k), 0) for k, cells in enumerate(prints))
     return np.where(np.sum(prints, axis=0) > 1, OVERLAP, index)
@@ -35,9 +35,10 @@ def hand_color(k: int) -> int:
 
 
 def shown_prints(state: State) -> list[np.ndarray]:
-    """Return the prints (H, A), in the object's frame, of the hands that hold the object.
+    """Return the handprints (H, A) to show, in the object's frame.
 
-    Of those that hold it together in a plan or climb, or of the picked grasp where that is asked for.
+    They are those of all hands in the step of the climb or in the plan's task that is shown; else that
+    of the picked grasp, if `MapViewState.handprint` is set.
     """
     grid = state.scene.manifold
     if state.climb_step and state.plan_results.climb:
@@ -54,7 +55,7 @@ def shown_prints(state: State) -> list[np.ndarray]:
 
 
 def print_names(state: State) -> list[str]:
-    """Return the arms that the shown prints belong to."""
+    """Return the names of the arms of `shown_prints`, in the same order."""
     if state.climb_step and state.plan_results.climb:
         return list(state.plan_results.climb.arms)
     if state.shown_task and len(state.shown_task.holds) > 1:
@@ -64,11 +65,11 @@ def print_names(state: State) -> list[str]:
 
 @cached_with_first
 def hand_print(scene: Scene, arm: str, row: int, roll: int) -> Handprint:
-    """Return an arm's handprint at column 0; kept, as a replay asks for the same ones again and again."""
+    """Return an arm's handprint at column 0; cached, since a replay repeats the same ones many times."""
     return scene.arm(arm).handprint(scene.manifold, row, roll)
 
 
 def on_surface(state: State, cells: np.ndarray) -> np.ndarray:
-    """Bring cells (H, A, …) of the object's frame to the coloured surface, which does not turn with it."""
+    """Shift cells (H, A, …) from the object's frame to the coloured surface, which does not turn by δ."""
     _, turned = state.scene.manifold.shift(state.delta)
     return np.roll(cells, turned, axis=1)

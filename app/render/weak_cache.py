@@ -1,4 +1,4 @@
-"""What was made from a map or scene is kept as long as that lives, and keeps neither alive."""
+"""A cache for functions of a map, scene or state that does not keep its arguments alive."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ T = TypeVar("T")
 
 
 def cached_with_first(make: Callable[Concatenate[K, P], T]) -> Callable[Concatenate[K, P], T]:
-    """Let a function remember what it returned for as long as its first argument lives.
+    """Decorate a function to cache its results until its first argument is garbage-collected.
 
-    `functools.lru_cache` would keep the maps of closed pages. What is returned must not refer to the
-    first argument; the others are given by position. Threads at once may make the same twice.
+    `functools.lru_cache` would keep the maps of closed pages in memory. A result must not refer to the
+    first argument, which would then never be collected. Arguments are passed by position. Two threads
+    that call at the same time may both compute.
     """
-    kept: WeakKeyDictionary[K, dict[object, T]] = WeakKeyDictionary()
+    cache: WeakKeyDictionary[K, dict[object, T]] = WeakKeyDictionary()
 
     @wraps(make)
     def look_up(first: K, *args: P.args, **options: P.kwargs) -> T:
         assert not options
-        known = kept.setdefault(first, {})
-        if args not in known:
-            known[args] = make(first, *args, **options)
-        return known[args]
+        results = cache.setdefault(first, {})
+        if args not in results:
+            results[args] = make(first, *args, **options)
+        return results[args]
 
     return look_up

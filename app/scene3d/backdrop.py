@@ -1,4 +1,4 @@
-"""What stands in a scene and never moves by itself: obstacles, floor, lights and camera."""
+"""The static part of the 3D view: obstacles, floor and lights."""
 
 from __future__ import annotations
 
@@ -14,26 +14,32 @@ from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 
 from .nodes import add_links, set_pose
-from .viewpoint import (
-    Viewpoint,
-)
+from .viewpoint import Viewpoint
 
 __all__ = ["add_floor", "add_lights", "add_obstacle"]
 
 OBSTACLES = ((202, 199, 193), (164, 173, 184), (190, 172, 150), (170, 180, 160))
-"""Colours of the obstacles in turn, paler than those of the map."""
+"""Colours (sRGB) of the obstacles in turn, paler than those of the map."""
 
 FLOOR = ((247, 248, 249), (225, 225, 225), (205, 205, 205))
 DARK_FLOOR = ((38, 40, 44), (52, 55, 60), (70, 74, 80))
-"""Colours of the floor, its lines, and every fifth of them."""
+"""Colours (sRGB) of the floor, its lines, and every fifth line."""
 
 FLOOR_GAP = 0.002
+"""Distance (m) of the floor below the lowest base, so that neither hides the other."""
 
 
 def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int) -> None:
-    """Add an obstacle, the index-th of its scene."""
+    """Add an obstacle.
+
+    Args:
+        client: the browser.
+        name: path of its node.
+        o: the obstacle.
+        index: its index in the scene, which chooses its colour.
+    """
     scene = client.scene
-    look: dict[str, Any] = {
+    options: dict[str, Any] = {
         "color": OBSTACLES[index % len(OBSTACLES)],
         "cast_shadow": False,
         "receive_shadow": False,
@@ -41,15 +47,15 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
         "position": o.T_world_obstacle[:3, 3],
     }
     if o.kind == "box":
-        scene.add_box(name, dimensions=np.array(o.size), **look)
+        scene.add_box(name, dimensions=np.array(o.size), **options)
     elif o.kind == "cylinder":
-        scene.add_cylinder(name, radius=o.size[0], height=o.size[1], radial_segments=48, **look)
+        scene.add_cylinder(name, radius=o.size[0], height=o.size[1], radial_segments=48, **options)
     elif o.kind == "sphere":
-        scene.add_icosphere(name, radius=o.size[0], **look)
+        scene.add_icosphere(name, radius=o.size[0], **options)
     elif o.kind == "mesh":
         assert o.path is not None
         mesh = read_mesh(o.path, f"obstacle {o.name}")
-        scene.add_mesh_simple(name, mesh.vertices, mesh.faces, side="double", flat_shading=True, **look)
+        scene.add_mesh_simple(name, mesh.vertices, mesh.faces, side="double", flat_shading=True, **options)
     else:
         assert o.path is not None
         model = RobotModel(o.path)
@@ -60,7 +66,7 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
 
 
 def add_floor(client: viser.ClientHandle, name: str, scene: Scene, *, dark: bool) -> None:
-    """Add a faint grid under everything, or replace it."""
+    """Add a faint grid below robots and boxes, in place of an earlier one of that name."""
     plane, cell, section = DARK_FLOOR if dark else FLOOR
     low = [robot.T_world_base[2, 3] for robot in scene.robots.values()]
     low += [o.T_world_obstacle[2, 3] - o.size[2] / 2 for o in scene.obstacles if o.kind == "box"]
@@ -80,7 +86,7 @@ def add_floor(client: viser.ClientHandle, name: str, scene: Scene, *, dark: bool
 
 
 def add_lights(client: viser.ClientHandle, name: str, view: Viewpoint) -> None:
-    """Light the scene evenly, so that colours are those of the legend, with just enough shade for shape."""
+    """Add even lights: colours match the legend, with just enough shading to recognize shapes."""
     scene = client.scene
     scene.configure_default_lights(enabled=False)
     scene.configure_environment_map(None)

@@ -1,4 +1,4 @@
-"""The map in 3D: one coloured quad for every cell, round the object and laid out flat."""
+"""The map in 3D: one coloured quad for every cell, on the object's surface or in a plane."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ from symgrasp.poses import Array, from_rotation, quat_wxyz
 
 from ..render.palette import to_linear
 
-__all__ = ["CellMesh", "around", "flat"]
+__all__ = ["CellMesh", "OnCell", "flat_quads", "surface_quads"]
 
 LIFT = 0.0004
-"""How far (m) the quads float over the object, so that they hide its surface."""
+"""Distance (m) of the quads from the object's surface, so that they hide it."""
+
+OnCell = Callable[[int, int], None]
+"""Called with the row and column of a cell."""
 
 QUAD = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
 
 
-def around(grid: Manifold) -> tuple[Array, Array]:
-    """Return poses (H·A, 4, 4) in the object frame and sizes (H·A, 3) of quads round the object.
+def surface_quads(grid: Manifold) -> tuple[Array, Array]:
+    """Return poses (H·A, 4, 4) in the object frame and sizes (H·A, 3), in m, of quads on its surface.
 
     A quad's x runs along the tangent, its y up the surface, its z outwards.
     """
@@ -42,8 +45,13 @@ def around(grid: Manifold) -> tuple[Array, Array]:
     return from_rotation(np.stack([tangent, up, outwards], axis=-1), centres), sizes
 
 
-def flat(grid: Manifold, width: float, height: float) -> tuple[Array, Array]:
-    """Return poses and sizes of quads in the xy plane: θ from -π along x, h along y, centred."""
+def flat_quads(grid: Manifold, width: float, height: float) -> tuple[Array, Array]:
+    """Return poses (H·A, 4, 4) and sizes (H·A, 3), in m, of quads in the xy plane.
+
+    Args:
+        grid: the grid; θ from -π runs along x, h along y, with the middle at the origin.
+        width, height: of all quads together (m).
+    """
     i, j = np.indices((grid.heights, grid.angles)).reshape(2, -1)
     x = ((j + 0.5) / grid.angles - 0.5) * width
     y = ((i + 0.5) / grid.heights - 0.5) * height
@@ -58,7 +66,7 @@ class CellMesh:
     Args:
         client: the browser.
         name: path of the node.
-        poses, sizes: as `around` and `flat` return them.
+        poses, sizes: as `surface_quads` and `flat_quads` return them.
         angles: number of columns of the map.
         on_cell: called with (row, column) when a quad is clicked.
     """
@@ -70,7 +78,7 @@ class CellMesh:
         poses: Array,
         sizes: Array,
         angles: int,
-        on_cell: Callable[[int, int], None],
+        on_cell: OnCell,
     ) -> None:
         self.node = client.scene.add_batched_meshes_simple(
             name,
@@ -92,12 +100,9 @@ class CellMesh:
             if event.instance_index is not None:
                 on_cell(*divmod(event.instance_index, angles))
 
-    def paint(self, colors: np.ndarray) -> None:
-        """Colour the cells: sRGB (H, A, 3)."""
+    def set_colors(self, colors: np.ndarray) -> None:
+        """Set the colours (H, A, 3), sRGB, of the cells."""
         linear = to_linear(colors.reshape(-1, 3))
         if linear.tobytes() != self._shown:
             self._shown = linear.tobytes()
             self.node.batched_colors = linear
-
-
-OnCell = Callable[[int, int], None]

@@ -1,4 +1,4 @@
-"""The unwrapped map laid out flat in the 3D view, to be clicked."""
+"""The unwrapped map as a flat rectangle in the 3D view; a click on a cell picks it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from symgrasp.poses import Array, from_rotation
 
 from ..render.cell_colors import cell_colors
 from ..state.state import State
-from .cell_mesh import CellMesh, OnCell, flat
+from .cell_mesh import CellMesh, OnCell, flat_quads
 from .nodes import set_pose
 from .viewpoint import Viewpoint, stand_around
 
@@ -19,15 +19,23 @@ __all__ = ["FLAT_SIZE", "FlatMap", "flat_map_position"]
 
 
 FLAT_SIZE = (0.33, 0.22)
-"""Width and height (m) of the map laid out flat."""
+"""Width and height (m) of the flat map."""
 
 
-ASIDE = float(np.cos(np.deg2rad(65)))
-"""Cosine of the angle from which on it is turned to the camera."""
+MIN_FACING = float(np.cos(np.deg2rad(65)))
+"""Cosine of the angle between its front and the camera beyond which the flat map turns to the camera."""
 
 
 class FlatMap:
-    """The unwrapped map as a board in the scene, to be clicked."""
+    """The unwrapped map, upright beside or above the object.
+
+    Args:
+        client: the browser.
+        root: path of its node.
+        state: the state to place it for.
+        view: the viewpoint to face at first.
+        on_cell: called with the cell that was clicked.
+    """
 
     def __init__(
         self, client: viser.ClientHandle, root: str, state: State, view: Viewpoint, on_cell: OnCell
@@ -45,12 +53,16 @@ class FlatMap:
             f"{root}/title", "unrolled map: click a cell", position=(0, height / 2 + 0.02, 0),
             anchor="bottom-center", font_screen_scale=0.8,
         )  # fmt: skip
-        self.cells = CellMesh(client, f"{root}/cells", *flat(grid, width, height), grid.angles, on_cell)
+        self.cells = CellMesh(client, f"{root}/cells", *flat_quads(grid, width, height), grid.angles, on_cell)
 
     def face(self, camera: Sequence[float]) -> None:
-        """Turn its front to a camera that sees it from behind or far aside."""
+        """Turn to a camera that sees it from behind or at a flat angle.
+
+        Args:
+            camera: see `Camera`.
+        """
         seen = self._view.seen_from((*camera[:3], *self._position))
-        if seen.direction @ self._view.direction < ASIDE:
+        if seen.direction @ self._view.direction < MIN_FACING:
             self._turn(seen)
 
     def _turn(self, view: Viewpoint) -> None:
@@ -59,17 +71,17 @@ class FlatMap:
         set_pose(self.frame, from_rotation(axes, self._position))
 
     def show(self, state: State) -> None:
-        """Bring it up to the state."""
+        """Update it to a state."""
         self.frame.visible = state.display.flat_map
         if state.map:
-            self.cells.paint(cell_colors(state, state.map))
-            # What a turn leaves over beside whole cells moves the start of the grid.
+            self.cells.set_colors(cell_colors(state, state.map))
+            # A shift by whole cells is in the colours; the rest is in where the grid starts.
             rest = (state.map.manifold.theta_start + np.pi) / (2 * np.pi)
             self.cells.node.position = (rest * FLAT_SIZE[0], 0.0, 0.0)
 
 
 def flat_map_position(state: State, view: Viewpoint) -> Array:
-    """Return where the flat map is in nobody's way: beyond the object, or over it."""
+    """Return the centre (3,) of the flat map: beside the object away from the robots, or above it."""
     profile, pose = state.scene.profile, state.T_world_object
     centre = (pose @ [0.0, 0.0, (profile.h_min + profile.h_max) / 2, 1.0])[:3]
     if stand_around(state.scene, pose):

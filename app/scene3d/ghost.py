@@ -1,4 +1,4 @@
-"""The ghost arm: a candidate that fails, and the bodies that it hits. Read off the state, no browser."""
+"""The ghost: the robot at a candidate that fails, and the bodies that collide, as plain meshes."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from ..state.state import State
 
 __all__ = ["Ghost", "body_mesh", "ghost", "link_mesh"]
 
-SWELL = 0.0015
-"""How much (m) larger what is hit is drawn, so that its red lies over its own surface."""
+INFLATION = 0.0015
+"""Distance (m) by which meshes of colliding bodies are offset outwards, to hide the body's own surface."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """A robot where it cannot be.
+    """A robot in a configuration that fails.
 
     Attributes:
         robot: its name.
-        values: (n,) values of all its joints.
-        hits: the bodies that are closer to each other than they may be, its own links among them.
+        values: (n,) values of all its joints, in rad or m.
+        hits: the bodies that collide or are too close, links of the robot itself among them.
     """
 
     robot: str
@@ -39,48 +39,48 @@ class Ghost:
     hits: frozenset[BodyName]
 
     def links(self) -> frozenset[str]:
-        """Return its own links that hit something."""
+        """Return the names of the robot's own links that collide."""
         return frozenset(body.link for body in self.hits if body.body == self.robot)
 
     def others(self) -> frozenset[BodyName]:
-        """Return the other bodies that are hit."""
+        """Return the colliding bodies that are not links of the robot."""
         return frozenset(body for body in self.hits if body.body != self.robot)
 
 
 def ghost(state: State) -> Ghost | None:
-    """Return the ghost to show: of the shown candidate of the picked cell, if that fails."""
-    shown_candidate = state.shown_candidate
-    if shown_candidate is None or state.explanation is None or shown_candidate.reason == Reason.FEASIBLE:
+    """Return the ghost of the candidate that is shown; None if it is feasible or something else is shown."""
+    candidate = state.shown_candidate
+    if candidate is None or state.explanation is None or candidate.reason == Reason.FEASIBLE:
         return None
     if state.shown_task or playback_frame(state) or state.climb_step:  # the arms show something else
         return None
     arm = state.scene.arm(state.arm)
-    hits = frozenset(body for c in shown_candidate.collisions for body in (c.a, c.b))
-    return Ghost(arm.robot.name, arm.robot_values(shown_candidate.ended, state.explanation.opening), hits)
+    hits = frozenset(body for c in candidate.collisions for body in (c.a, c.b))
+    return Ghost(arm.robot.name, arm.robot_values(candidate.ended, state.explanation.opening), hits)
 
 
 def link_mesh(model: RobotModel, link: str) -> trimesh.Trimesh:
-    """Return the collision shapes of a link, in its frame: what the planner sees of it."""
+    """Return the convex collision shapes of a link as one mesh, in the link frame."""
     return _joined([trimesh.convex.convex_hull(points) for points in model.hulls(link)])
 
 
 def body_mesh(scene: Scene, body: BodyName, T_world_object: Array) -> tuple[trimesh.Trimesh, Array]:
-    """Return the shape of a body that is hit, a little swollen, and its pose (4, 4).
+    """Return the mesh of a colliding body, offset outwards by `INFLATION`, and its pose (4, 4) in the world.
 
     Args:
         scene: the scene.
-        body: an obstacle, the object, or a link of a robot that is parked.
-        T_world_object: where the object is.
+        body: an obstacle, the object, or a link of a robot at home.
+        T_world_object: pose (4, 4) of the object.
     """
     if body.body in scene.robots:
         robot = scene.robots[body.body]
         links = robot.model.forward(robot.home)
         pose = robot.T_world_base @ links[robot.model.link_index(body.link)]
-        return _swollen(link_mesh(robot.model, body.link)), pose
+        return _inflated(link_mesh(robot.model, body.link)), pose
     for obstacle in scene.obstacles:
         if obstacle.name == body.body:
-            return _swollen(_obstacle_mesh(obstacle)), obstacle.T_world_obstacle
-    return _swollen(scene.profile.mesh()), T_world_object
+            return _inflated(_obstacle_mesh(obstacle)), obstacle.T_world_obstacle
+    return _inflated(scene.profile.mesh()), T_world_object
 
 
 def _obstacle_mesh(o: Obstacle) -> trimesh.Trimesh:
@@ -110,6 +110,6 @@ def _joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces), process=False)
 
 
-def _swollen(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+def _inflated(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     normals = np.asarray(mesh.vertex_normals)
-    return trimesh.Trimesh(mesh.vertices + SWELL * normals, mesh.faces, process=False)
+    return trimesh.Trimesh(mesh.vertices + INFLATION * normals, mesh.faces, process=False)

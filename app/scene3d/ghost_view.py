@@ -1,4 +1,4 @@
-"""The ghost arm in 3D, and in red what it hits."""
+"""The ghost in the 3D view: pale, with the bodies that collide in red."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ PALE_OPACITY, HIT_OPACITY = 0.35, 0.75
 
 
 class GhostView:
-    """Shows the collision shapes of a robot where it cannot be; made when they are first needed.
+    """Shows the collision shapes of the ghost; nodes are added when they are first needed.
 
     Args:
         client: the browser.
-        root: name of its node.
+        root: path of its node.
         scene: the scene.
     """
 
@@ -35,42 +35,42 @@ class GhostView:
         self._bodies: dict[BodyName, viser.MeshHandle] = {}
 
     def show(self, state: State) -> None:
-        """Bring it up to the state."""
-        found = ghost(state)
-        if found:
-            self._make(found, state)
+        """Update it to a state."""
+        shown = ghost(state)
+        if shown:
+            self._make(shown, state)
         for robot, links in self._robots.items():
-            is_shown = found is not None and found.robot == robot
-            hit = found.links() if found and is_shown else frozenset()
+            is_shown = shown is not None and shown.robot == robot
+            hit = shown.links() if shown and is_shown else frozenset()
             for link, (pale, red) in links.items():
                 pale.visible, red.visible = is_shown and link not in hit, is_shown and link in hit
         for body, node in self._bodies.items():
-            node.visible = found is not None and body in found.others()
+            node.visible = shown is not None and body in shown.others()
             if body.body == self.scene.file.object.name:
                 set_pose(node, state.T_world_object)
-        if found:
-            self._pose(found)
+        if shown:
+            self._pose(shown)
 
-    def _make(self, found: Ghost, state: State) -> None:
-        """Add what was not shown before."""
-        model = self.scene.robots[found.robot].model
-        if found.robot not in self._robots:
-            self._robots[found.robot] = {
+    def _make(self, shown: Ghost, state: State) -> None:
+        """Add the nodes that it needs and that were not needed before."""
+        model = self.scene.robots[shown.robot].model
+        if shown.robot not in self._robots:
+            self._robots[shown.robot] = {
                 link: (
-                    self._add(f"{found.robot}/{link}/pale", link_mesh(model, link), PALE, PALE_OPACITY),
-                    self._add(f"{found.robot}/{link}/hit", link_mesh(model, link), HIT, HIT_OPACITY),
+                    self._add(f"{shown.robot}/{link}/pale", link_mesh(model, link), PALE, PALE_OPACITY),
+                    self._add(f"{shown.robot}/{link}/hit", link_mesh(model, link), HIT, HIT_OPACITY),
                 )
                 for link in model.colliding_links()
             }
-        for body in found.others() - set(self._bodies):
+        for body in shown.others() - set(self._bodies):
             mesh, pose = body_mesh(self.scene, body, state.T_world_object)
             node = self._bodies[body] = self._add(f"hit{len(self._bodies)}", mesh, HIT, HIT_OPACITY)
             set_pose(node, pose)
 
-    def _pose(self, found: Ghost) -> None:
-        robot = self.scene.robots[found.robot]
-        poses = robot.T_world_base @ robot.model.forward(found.values)
-        for link, nodes in self._robots[found.robot].items():
+    def _pose(self, shown: Ghost) -> None:
+        robot = self.scene.robots[shown.robot]
+        poses = robot.T_world_base @ robot.model.forward(shown.values)
+        for link, nodes in self._robots[shown.robot].items():
             for node in nodes:
                 set_pose(node, poses[robot.model.link_index(link)])
 

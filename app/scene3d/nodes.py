@@ -1,4 +1,4 @@
-"""Nodes of viser's scene tree: their poses, and the links of a robot."""
+"""Helpers for nodes of viser's scene tree: setting a pose, adding the links of a robot."""
 
 from __future__ import annotations
 
@@ -13,13 +13,22 @@ __all__ = ["add_links", "set_pose"]
 
 
 def set_pose(node: viser.SceneNodeHandle, pose: Array) -> None:
-    """Put a node at a pose (4, 4) in its parent."""
+    """Set the pose (4, 4) of a node in its parent's frame."""
     node.wxyz = quat_wxyz(pose)
     node.position = pose[:3, 3]
 
 
 def add_links(client: viser.ClientHandle, root: str, model: RobotModel) -> dict[str, viser.GlbHandle]:
-    """Add the visible links of a robot under a node; link name → its node."""
+    """Add the visible links of a robot.
+
+    Args:
+        client: the browser.
+        root: path of the node to add them under.
+        model: the robot's model.
+
+    Returns:
+        Link name → its node.
+    """
     visuals = link_visuals(model.urdf)
     return {
         link: client.scene.add_glb(f"{root}/{k}", glb, cast_shadow=False, receive_shadow=False)

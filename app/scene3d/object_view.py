@@ -11,29 +11,37 @@ from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, from_position_quat, rotation_z
 from symgrasp.scene.scene import Scene
 
-from ..html.profile import deviation_colors
 from ..render.cell_colors import cell_colors
+from ..render.deviation import deviation_colors
+from ..render.drawn_poses import drawn_object_pose
 from ..render.palette import INK, PICK, rgb
-from ..render.playback import drawn_object_pose
 from ..render.prints import on_surface
 from ..state.state import State
-from .cell_mesh import CellMesh, OnCell, around
+from .cell_mesh import CellMesh, OnCell, surface_quads
 from .nodes import set_pose
 
 __all__ = ["ObjectView"]
 
 
 OBJECT = (222, 226, 230)
-
+"""Colour (sRGB) of the object where no map is shown."""
 
 SEAM_LIFT = 0.0012
+"""Distance (m) of the lines from the object's surface."""
 
 
 class ObjectView:
-    """The object, which turns, under its coloured surface, which does not.
+    """The object, which turns by δ, and the coloured cells on its surface, which do not.
 
     Turning the object by δ shifts the map by -δ in the object's frame, so in the world the colours
     stay where they are: m((h, θ), T·Rz(δ)) = m((h, θ + δ), T).
+
+    Args:
+        client: the browser.
+        root: path of the node to add it under.
+        scene: the scene.
+        on_cell: called with the cell of the surface that was clicked.
+        on_drag: called with the pose (4, 4) that the gizmo was dragged to.
     """
 
     def __init__(
@@ -53,7 +61,9 @@ class ObjectView:
         )  # fmt: skip
         _add_seam(client, f"{root}/object/seam", scene.profile)
         self.pick = add.add_icosphere(f"{root}/object/pick", radius=0.007, color=rgb(PICK), visible=False)
-        self.surface = CellMesh(client, f"{root}/surface", *around(self.grid), self.grid.angles, on_cell)
+        self.surface = CellMesh(
+            client, f"{root}/surface", *surface_quads(self.grid), self.grid.angles, on_cell
+        )
         self.gizmo = add.add_transform_controls(f"{root}/gizmo", scale=0.16, line_width=3.0, depth_test=False)
 
         @self.gizmo.on_update
@@ -61,14 +71,14 @@ class ObjectView:
             on_drag(from_position_quat(event.target.position, event.target.wxyz))
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
-        """Bring it up to the state."""
+        """Update it to a state; the gizmo only if asked, as a person may be dragging it."""
         set_pose(self.body, drawn_object_pose(state))
         set_pose(self.surface.node, drawn_object_pose(state) @ rotation_z(-state.delta))
         if state.display.symmetry_error and state.object_choice and state.object_choice.measurement:
             colors = deviation_colors(state.object_choice.measurement, self.grid)
-            self.surface.paint(on_surface(state, colors))
+            self.surface.set_colors(on_surface(state, colors))
         elif state.result:
-            self.surface.paint(cell_colors(state, state.result.map))
+            self.surface.set_colors(cell_colors(state, state.result.map))
         self.pick.visible = state.pick is not None
         if state.pick:
             self.pick.position = self.grid.contact(state.pick.h, state.pick.theta)
@@ -78,7 +88,7 @@ class ObjectView:
 
 
 def _add_seam(client: viser.ClientHandle, name: str, profile: Profile) -> None:
-    """Draw lines along the object at θ = 0 and every quarter turn, which turn with it."""
+    """Add lines along the object at every quarter turn from θ = 0; they turn with it."""
     h, r = profile.points.T
     r = r + SEAM_LIFT
     low, high = [0.0, 0.0, h[0] - SEAM_LIFT], [0.0, 0.0, h[-1] + SEAM_LIFT]

@@ -14,7 +14,13 @@ __all__ = ["RobotView"]
 
 
 class RobotView:
-    """The links of one robot."""
+    """The links of one robot.
+
+    Args:
+        client: the browser.
+        root: path of its node.
+        robot: the robot.
+    """
 
     def __init__(self, client: viser.ClientHandle, root: str, robot: Robot) -> None:
         self.model = robot.model
@@ -24,7 +30,7 @@ class RobotView:
         self._shown: Array | None = None
 
     def show(self, values: Array) -> None:
-        """Take the joint values (n,) of the whole robot."""
+        """Move the links to joint values (n,) of the whole robot, in rad or m."""
         if self._shown is not None and np.array_equal(values, self._shown):
             return
         self._shown = values

@@ -10,7 +10,7 @@ import viser
 from symgrasp.poses import Array
 from symgrasp.scene.scene import Scene
 
-from ..html.readout import joint_values
+from ..render.drawn_poses import drawn_joint_values
 from ..state.page_link import Camera
 from ..state.state import State
 from .backdrop import add_floor, add_lights, add_obstacle
@@ -18,7 +18,7 @@ from .flat_map import FlatMap
 from .ghost_view import GhostView
 from .object_view import ObjectView
 from .robot_view import RobotView
-from .viewpoint import FIELD_OF_VIEW, viewpoint
+from .viewpoint import FIELD_OF_VIEW, choose_viewpoint
 
 __all__ = ["SceneView"]
 
@@ -28,10 +28,14 @@ class SceneView:
 
     Args:
         client: the browser.
-        width: width (px) of the view at first: browsers tell it only once its panels are in place.
+        width: width (px) of the view at first; browsers report it only after the panels are laid out.
         on_surface: called with the cell (row, column) that was clicked on the object.
-        on_board: called with the cell that was clicked on the flat map.
+        on_flat_map: called with the cell that was clicked on the flat map.
         on_drag: called with the pose (4, 4) that the gizmo was dragged to.
+
+    Attributes:
+        camera: the camera to show the next scene from; None for a viewpoint that suits the scene.
+        flat_map: the flat map; None before a scene is shown.
     """
 
     def __init__(
@@ -48,12 +52,17 @@ class SceneView:
         self._scene: Scene | None = None
         self._builds = 0
         self._dark = False
-        self.camera: Camera | None = None  # where the first scene is looked at from, and whereto
+        self.camera: Camera | None = None
         self._root = self._object_root = ""
         self.flat_map: FlatMap | None = None
 
     def show(self, state: State, *, move_gizmo: bool) -> None:
-        """Bring the view up to the state; the gizmo only moves along if nobody is dragging it."""
+        """Update the view to a state.
+
+        Args:
+            state: the state.
+            move_gizmo: move the gizmo as well; not while a person is dragging it.
+        """
         if self._scene is None or state.scene.robots is not self._scene.robots:
             self._build(state)
         elif (state.scene.profile, state.scene.settings) != (self._scene.profile, self._scene.settings):
@@ -62,8 +71,8 @@ class SceneView:
             self._dark = state.display.dark
             add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.display.dark)
         with self.client.atomic():
-            if state.is_current or not state.busy:  # arms wait where they are for a new map
-                for name, values in joint_values(state).items():
+            if state.is_current or not state.busy:  # else the arms keep still until the map arrives
+                for name, values in drawn_joint_values(state).items():
                     self.robots[name].show(values)
             if state.missing_request is None or not state.busy:
                 self.ghost.show(state)
@@ -71,18 +80,18 @@ class SceneView:
             if self.flat_map:
                 self.flat_map.show(state)
 
-    def seen_from(self, camera: Camera) -> None:
-        """Turn the flat map to where it is looked at from, if it can no longer be read from there."""
+    def camera_moved(self, camera: Camera) -> None:
+        """Turn the flat map to the camera where it can no longer be read from there."""
         if self.flat_map:
             self.flat_map.face(camera)
 
     def _build(self, state: State) -> None:
-        """Replace everything by another scene."""
+        """Replace all nodes by those of another scene."""
         client, scene = self.client, state.scene
-        root = self._root = self._replace(self._root, "/stage")
+        root = self._root = self._replace(self._root, "/scene")
         self._object_root = ""
         given, self.camera = self.camera, None
-        view = viewpoint(scene, state.T_world_object)
+        view = choose_viewpoint(scene, state.T_world_object)
         view = self._viewpoint = view.seen_from(given) if given else view
         with client.atomic():
             client.camera.fov = FIELD_OF_VIEW
@@ -102,23 +111,23 @@ class SceneView:
         }
 
     def _build_object(self, state: State) -> None:
-        """Replace the object and its map by another."""
-        root = self._object_root = self._replace(self._object_root, f"{self._root}/thing")
+        """Replace the nodes of the object, its map and the ghost."""
+        root = self._object_root = self._replace(self._object_root, f"{self._root}/object")
         self.client.scene.add_frame(root, show_axes=False)
         self.object = ObjectView(self.client, root, state.scene, self.on_surface, self.on_drag)
         self.ghost = GhostView(self.client, f"{root}/ghost", state.scene)
-        self.flat_map = FlatMap(self.client, f"{root}/board", state, self._viewpoint, self.on_flat_map)
+        self.flat_map = FlatMap(self.client, f"{root}/flat_map", state, self._viewpoint, self.on_flat_map)
         self._scene = state.scene
 
     def _replace(self, old: str, new: str) -> str:
-        """Remove a node; return the name of a new one, since browsers keep poses under their names."""
+        """Remove a node and return an unused path for its successor: browsers keep the pose of a path."""
         if old:
             self.client.scene.remove_by_name(old)
         self._builds += 1
         return f"{new}{self._builds}"
 
     def _aspect(self) -> float:
-        """Return width by height of the 3D view."""
+        """Return the ratio of width to height of the 3D view."""
         camera = self.client.camera
         width, self._first_width = self._first_width or camera.image_width, None
         return width / max(camera.image_height, 1)

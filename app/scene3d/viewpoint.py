@@ -1,4 +1,4 @@
-"""Where the camera stands at first, so that robots and object are in plain sight."""
+"""The camera's first pose: one from which robots and object are visible."""
 
 from __future__ import annotations
 
@@ -11,39 +11,36 @@ from symgrasp.poses import Array
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 
-__all__ = ["FIELD_OF_VIEW", "Viewpoint", "stand_around", "viewpoint"]
+__all__ = ["FIELD_OF_VIEW", "Viewpoint", "choose_viewpoint", "stand_around"]
 
 
 FIELD_OF_VIEW = np.deg2rad(42)
+"""Vertical field of view (rad)."""
 
+ELEVATION = np.deg2rad(24)
+"""Angle (rad) of the camera above the horizontal."""
 
-VIEW_HEIGHT = np.deg2rad(24)
-
-
-VIEW_WIDTH = 1.3
-"""Smallest width (m) that is seen where the camera looks at."""
-
+MIN_WIDTH = 1.3
+"""Least width (m) of the view at the point the camera looks at."""
 
 STEEP = 1e-3
-"""A camera that is less (m) than this beside what it looks at is above it: it has no direction."""
-
+"""A camera nearer (m) than this to the vertical through the point it looks at has no azimuth."""
 
 AZIMUTHS = np.deg2rad([65, -65, 40, -40, 90, -90, 115, -115])
-"""Directions to look from, against that from robot to object, the better ones first."""
-
+"""Azimuths (rad) to choose from, relative to the direction from robot to object; the first wins a tie."""
 
 AROUND = 0.3
-"""Several robots whose middle is nearer (m) to the object than this stand around it."""
+"""Robots surround an object that is nearer (m) than this to the mean of their bases."""
 
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """How a scene is looked at.
+    """A direction to see a scene from, and how much of it is in view.
 
     Attributes:
-        look_at: the point (3,) in the middle of the picture.
+        look_at: the point (3,) in the middle of the view.
         direction: from there towards the camera (3,), horizontal, of length 1.
-        width: how much (m) is seen there from left to right.
+        width: of the view (m) at that point.
     """
 
     look_at: Array
@@ -52,38 +49,42 @@ class Viewpoint:
 
     @property
     def right(self) -> Array:
-        """Direction (3,) that points right in the picture."""
+        """Horizontal unit vector (3,) that points to the right in the view."""
         return np.cross([0.0, 0.0, 1.0], self.direction)
 
     def seen_from(self, camera: Sequence[float]) -> Viewpoint:
-        """Return the view that a camera has of the same: see `app.state.page_link.Camera`."""
+        """Return this viewpoint with the direction of a camera; see `app.state.page_link.Camera`."""
         direction = (np.array(camera[:3]) - camera[3:]) * [1.0, 1.0, 0.0]
         length = np.linalg.norm(direction)
         return replace(self, direction=direction / length) if length > STEEP else self
 
     def camera(self, aspect: float) -> Array:
-        """Return where the camera stands (3,), for a picture of this width by height."""
+        """Return the position (3,) of the camera for a view with this ratio of width to height."""
         distance = self.width / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.35, 1.1))
-        rise = np.array([0.0, 0.0, np.sin(VIEW_HEIGHT)])
-        return self.look_at + distance * (np.cos(VIEW_HEIGHT) * self.direction + rise)
+        rise = np.array([0.0, 0.0, np.sin(ELEVATION)])
+        return self.look_at + distance * (np.cos(ELEVATION) * self.direction + rise)
 
 
-def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
-    """Choose how to look at a scene: robots and object side by side, the object in plain sight.
+def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
+    """Choose a viewpoint with robots and object side by side and the object visible.
 
-    Of the directions in question the one is taken from which boxes and cylinders hide the least of
-    the object and its axis is foreshortened least.
+    Of `AZIMUTHS`, the one wins from which boxes and cylinders hide least of the object and its axis is
+    least foreshortened.
+
+    Args:
+        scene: the scene.
+        T_world_object: pose (4, 4) of the object.
     """
     bases = np.array([robot.T_world_base[:3, 3] for robot in scene.robots.values()])
     axis = np.array([[0.0, 0.0, h, 1.0] for h in np.linspace(scene.profile.h_min, scene.profile.h_max, 5)])
     points = (axis @ T_world_object.T)[:, :3]
     middle = [0.0, 0.0, (scene.profile.h_min + scene.profile.h_max) / 2, 1.0]
-    places = np.array([(task.T_world_object @ middle)[:3] for task in scene.tasks.values()])
+    centres = np.array([(task.T_world_object @ middle)[:3] for task in scene.tasks.values()])
     ahead = (points[2] - bases.mean(axis=0)) * [1.0, 1.0, 0.0]
     look_at = 0.8 * points[2] + 0.2 * (bases.mean(axis=0) + np.array([0.0, 0.0, 0.5]))
-    room = 0.2
-    if len(bases) > 1:  # all of them are looked at, also one that is far from the object
-        room = 0.4
+    margin = 0.2
+    if len(bases) > 1:  # all of them are in view, also one far from the object
+        margin = 0.4
         everything = np.concatenate([bases, points])[:, :2]
         look_at[:2] = (everything.min(axis=0) + everything.max(axis=0)) / 2
     if stand_around(scene, T_world_object):
@@ -93,26 +94,26 @@ def viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     def view(azimuth: float) -> Viewpoint:
         direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         right = np.cross([0.0, 0.0, 1.0], direction)
-        reach = np.abs((np.concatenate([bases, points, places]) - look_at) @ right).max() + room
-        return Viewpoint(look_at, direction, float(max(VIEW_WIDTH, 2 * reach)))
+        reach = np.abs((np.concatenate([bases, points, centres]) - look_at) @ right).max() + margin
+        return Viewpoint(look_at, direction, float(max(MIN_WIDTH, 2 * reach)))
 
-    def badness(view: Viewpoint) -> float:
+    def cost(view: Viewpoint) -> float:
         eye = view.camera(aspect=1.0)
         hidden = sum(_hides(o, point, eye) for o in scene.obstacles for point in points)
         return hidden + 2 * abs(float(T_world_object[:3, 2] @ view.direction))
 
-    return min((view(start + a) for a in AZIMUTHS), key=badness)
+    return min((view(start + a) for a in AZIMUTHS), key=cost)
 
 
 def stand_around(scene: Scene, T_world_object: Array) -> bool:
-    """Whether several robots stand around the object."""
+    """Return whether several robots stand around the object, at a pose (4, 4)."""
     bases = np.array([robot.T_world_base[:3, 3] for robot in scene.robots.values()])
     middle = T_world_object @ [0.0, 0.0, (scene.profile.h_min + scene.profile.h_max) / 2, 1.0]
     return len(bases) > 1 and bool(np.linalg.norm((middle[:3] - bases.mean(axis=0))[:2]) < AROUND)
 
 
 def _hides(o: Obstacle, point: Array, eye: Array) -> bool:
-    """Whether the bounding box of a box or cylinder cuts the line of sight to a point."""
+    """Return whether the bounding box of a box or cylinder intersects the line from eye to point."""
     if o.kind == "box":
         half = np.array(o.size) / 2
     elif o.kind == "cylinder":

@@ -1,4 +1,4 @@
-"""What robots look like: the visual shapes of a URDF as one GLB for each link."""
+"""The visual shapes of a URDF as one GLB for each link."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ __all__ = ["check_visuals", "link_visuals"]
 
 Color = tuple[int, ...]
 
-PLAIN: Color = (200, 202, 206, 255)
-"""Colour of shapes that neither the URDF nor the mesh gives one."""
+DEFAULT_COLOR: Color = (200, 202, 206, 255)
+"""Colour of shapes that have none in the URDF nor in the mesh."""
 
-WHITEST = 235
-"""Brightest channel shown: pure white has no shading left to tell its shape."""
+MAX_BRIGHTNESS = 235
+"""Channels are clipped to this: pure white leaves no room for shading."""
 
-FINEST = 2000
-"""Triangles of a visual; those with more are simplified, so that small machines draw them smoothly, too."""
+MAX_TRIANGLES = 2000
+"""Visuals with more triangles are simplified to this many, so that slow machines draw them smoothly."""
 
-CARE = 3
-"""Of 0 to 10: lower ones keep closer to the shape but, in metres, may stop early."""
+DECIMATION_AGGRESSION = 3
+"""0 to 10: lower values keep closer to the shape, but with lengths in metres may stop early."""
 
 CREASE = np.deg2rad(30)
-"""Edges of simplified meshes that are sharper look sharp."""
+"""Edges of simplified meshes with a larger angle (rad) between their faces are not smoothed."""
 
 
 @lru_cache(maxsize=16)
 def link_visuals(urdf: bytes) -> dict[str, bytes]:
-    """Return link name → GLB in the link frame, of every link that can be seen.
+    """Return link name → GLB in the link frame, of every link with a visual shape.
 
     Args:
         urdf: the robot with everything that is mounted on it, as `symgrasp.robot.model.RobotModel.urdf`
@@ -64,7 +64,7 @@ def link_visuals(urdf: bytes) -> dict[str, bytes]:
 
 
 def check_visuals(scene: Scene) -> None:
-    """Read everything of a scene that is shown.
+    """Read every mesh of a scene that the 3D view shows.
 
     Raises:
         MeshError: a mesh cannot be read.
@@ -84,16 +84,18 @@ def _add_visual(
     meshes = _shapes(visual, link)
     own = [_own_color(mesh) for mesh in meshes]
     given = named.get(visual.material.name) if visual.material is not None else None
-    # A mesh of several colours knows better than the one colour of the URDF; a mesh of one
-    # colour (often an exporter's grey) does not.
+    # The colours of a mesh with several come before the single one of the URDF; those of a mesh with
+    # one do not, as that is often an exporter's grey.
     painted = len({color for color in own if color}) > 1
     origin = np.eye(4) if visual.origin is None else visual.origin
-    share = FINEST / sum(len(mesh.faces) for mesh in meshes)
+    share = MAX_TRIANGLES / sum(len(mesh.faces) for mesh in meshes)
     for mesh, color in zip(meshes, own, strict=True):
         mesh = _simplified(mesh, share)
         if given is not None and not painted:
             color = tuple(round(255 * c) for c in given)
-        paint = np.minimum(color or PLAIN, [WHITEST, WHITEST, WHITEST, 255]).astype(np.uint8)
+        paint = np.minimum(
+            color or DEFAULT_COLOR, [MAX_BRIGHTNESS, MAX_BRIGHTNESS, MAX_BRIGHTNESS, 255]
+        ).astype(np.uint8)
         material = PBRMaterial(baseColorFactor=paint, metallicFactor=0.0, roughnessFactor=0.55)
         mesh.visual = TextureVisuals(material=material)
         mesh.merge_vertices(merge_tex=True, merge_norm=False)
@@ -136,5 +138,5 @@ def _simplified(mesh: trimesh.Trimesh, share: float) -> trimesh.Trimesh:
     if share >= 1.0:
         return mesh
     mesh.merge_vertices(merge_tex=True, merge_norm=True)  # where vertices are double, gaps would open
-    simple = mesh.simplify_quadric_decimation(percent=1.0 - share, aggression=CARE)
+    simple = mesh.simplify_quadric_decimation(percent=1.0 - share, aggression=DECIMATION_AGGRESSION)
     return smooth_shade(simple, angle=CREASE)

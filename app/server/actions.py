@@ -69,7 +69,7 @@ class Actions:
             lambda state, scene: changes.open_scene(state, scene, name),
         )
 
-    def load_scene(self, name: str, content: bytes) -> None:
+    def upload_scene(self, name: str, content: bytes) -> None:
         """Read an uploaded scene and show it."""
 
         def run(progress: Progress) -> UploadedScene:
@@ -85,7 +85,7 @@ class Actions:
         if state := self._session.state:
             self._change_object(f"Loading {option}", partial(self._with_option, state, option))
 
-    def upload(self, name: str, content: bytes, scale: float) -> None:
+    def upload_object(self, name: str, content: bytes, scale: float) -> None:
         """Measure a mesh and put the object into the scene."""
         state = self._session.state
         if state is None:
@@ -172,7 +172,7 @@ class Actions:
 
         self.change(make)
 
-    def save_view(self) -> None:
+    def save_3d_view(self) -> None:
         """Draw the 3D view into a file, and send it to the browser."""
         state = self._session.state
         if state is None:

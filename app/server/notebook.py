@@ -12,7 +12,7 @@ from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
 from ..compute.plan_service import plan_result
-from ..scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
+from ..scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
 from ..state import changes
 from ..state.plan_changes import show_results, show_step
 from ..state.plan_results import PlanResults
@@ -63,6 +63,6 @@ def plan_html(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], Feasibili
 
 
 def _drawn(state: State) -> str:
-    view = viewpoint(state.scene, state.T_world_object)
+    view = choose_viewpoint(state.scene, state.T_world_object)
     camera = (*view.camera(ASPECT).tolist(), *view.look_at.tolist())
     return snapshot_html(state, camera, FIELD_OF_VIEW)

@@ -50,7 +50,7 @@ class PlanActions:
             lambda state, found: show_results(state, found[0].added_to(state.plan_results, found[1])),
         )
 
-    def more(self) -> None:
+    def list_more(self) -> None:
         """List further plans."""
         state = self._session.state
         if state is None or not state.plan_results.more:

@@ -93,7 +93,7 @@ class Session:
 
         @client.camera.on_update
         async def _(_: viser.CameraHandle) -> None:
-            self.view.seen_from(camera_of(client))
+            self.view.camera_moved(camera_of(client))
             self.change(lambda s: changes.seen_from(s, camera_of(client)))
 
         name = f"painter {client.client_id}"

@@ -19,9 +19,9 @@ __all__ = [
     "UPLOAD_LIMIT",
     "ObjectChoice",
     "check_size",
-    "choices",
     "from_library",
     "from_mesh",
+    "object_options",
 ]
 
 OWN = "the scene's own"
@@ -51,7 +51,7 @@ class ObjectChoice:
     measurement: Measurement | None = None
 
 
-def choices(uploaded: ObjectChoice | None = None) -> tuple[str, ...]:
+def object_options(uploaded: ObjectChoice | None = None) -> tuple[str, ...]:
     """Return what there is to choose from."""
     return (OWN, *library_objects(), *([uploaded.option] if uploaded else []))
 

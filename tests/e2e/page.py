@@ -15,7 +15,7 @@ from playwright.sync_api import ConsoleMessage, Locator, Page, expect
 
 from app.panels.layout import panel_widths
 from app.render.palette import rgb
-from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
+from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 
@@ -162,7 +162,7 @@ class GraspPage:
         box, size = self.page.locator("canvas").first.bounding_box(), self.page.viewport_size
         assert box
         assert size
-        view = viewpoint(scene, scene.task().T_world_object)
+        view = choose_viewpoint(scene, scene.task().T_world_object)
         eye = view.camera((size["width"] - sum(panel_widths(size["width"]))) / size["height"])
         forward = (view.look_at - eye) / np.linalg.norm(view.look_at - eye)
         right = np.cross(forward, [0.0, 0.0, 1.0])

@@ -11,9 +11,9 @@ import pytest
 from PIL import Image
 from playwright.sync_api import expect
 
-from app.html.candidates import candidate_line
+from app.html.candidates import candidate_text
 from app.html.map import sample_columns
-from app.render.cell_colors import coloured
+from app.render.cell_colors import colored_map
 from app.scene3d.ghost_view import HIT
 from app.state.map_view_state import RollChoice
 from symgrasp.feasibility.color_by import ColorBy
@@ -35,7 +35,7 @@ def bottle_map() -> FeasibilityMap:
 
 
 def drawn(m: FeasibilityMap, view: ColorBy) -> np.ndarray:
-    found = coloured(m, RollChoice.EITHER, view)
+    found = colored_map(m, RollChoice.EITHER, view)
     return found.colors[found.index[::-1, sample_columns(m.manifold)]]
 
 
@@ -116,14 +116,14 @@ def test_the_candidates_of_a_cell(open_page, bottle_map):
     hit = pick(page, bottle_map, Reason.SCENE_COLLISION)
     best = hit.best
     assert best
-    expect(page.text(candidate_line(best))).to_be_visible()
+    expect(page.text(candidate_text(best))).to_be_visible()
     expect(page.page.locator("img[alt='candidates']")).to_be_visible()
     page.wait_for_view(lambda v: reds(v) > reds(parked) + 300)
     shoot(page, "ghost")
     last = len(hit.candidates)
     page.slide("Candidate", last)
     expect(page.text(f"Candidate {last} of {last}")).to_be_visible()
-    expect(page.text(candidate_line(hit.candidates[-1]))).to_be_visible()
+    expect(page.text(candidate_text(hit.candidates[-1]))).to_be_visible()
     expect(page.text("One of")).to_be_visible()
 
     held = pick(page, bottle_map, Reason.FEASIBLE)
@@ -132,7 +132,7 @@ def test_the_candidates_of_a_cell(open_page, bottle_map):
     expect(page.text(f" of {len(held.candidates)}: φ")).to_be_visible()
     page.wait_for_view(lambda v: reds(v) < reds(parked) + 50)
     page.slide("Candidate", 1)
-    expect(page.text(candidate_line(held.best))).to_be_visible()
+    expect(page.text(candidate_text(held.best))).to_be_visible()
 
     pick(page, bottle_map, Reason.UNREACHABLE)
     expect(page.text("Out of reach: no configuration of the arm gets there")).to_be_visible()

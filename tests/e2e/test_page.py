@@ -12,11 +12,11 @@ import pybullet_data
 import pytest
 from playwright.sync_api import expect
 
-from app.html.candidates import candidate_line
+from app.html.candidates import candidate_text
 from app.html.map import sample_columns
 from app.render.palette import REASONS
 from app.scene3d.flat_map import FLAT_SIZE, flat_map_position
-from app.scene3d.viewpoint import viewpoint
+from app.scene3d.viewpoint import choose_viewpoint
 from app.state import changes
 from app.state.map_view_state import RollChoice
 from app.state.object_choice import from_mesh
@@ -131,7 +131,7 @@ def test_an_infeasible_cell_says_why(open_page, bottle_map):
     assert best
     assert best.collisions[0].b.body in ("table", "parcel", "lamp")
     expect(page.text("panda cannot hold it here: hits an obstacle. The best of")).to_be_visible()
-    expect(page.text(candidate_line(best))).to_be_visible()
+    expect(page.text(candidate_text(best))).to_be_visible()
 
 
 def test_the_roll_can_be_chosen(open_page, bottle_map):
@@ -161,7 +161,7 @@ def test_clicking_the_object_picks_the_cell_under_the_pointer(open_page, bottle_
 
 def test_clicking_the_flat_map_picks_a_cell(open_page, bottle_map):
     page = open_page()
-    view = viewpoint(BOTTLE, BOTTLE.task().T_world_object)
+    view = choose_viewpoint(BOTTLE, BOTTLE.task().T_world_object)
     grid = bottle_map.manifold
     row, column = grid.cell(0.08, np.deg2rad(150.0))
     x = (np.rad2deg(grid.theta[column]) / 360) * FLAT_SIZE[0]

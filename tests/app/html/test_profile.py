@@ -13,13 +13,11 @@ import pytest
 import trimesh
 
 from app.html.profile import (
-    NO_SURFACE,
-    deviation_cells,
-    deviation_colors,
     holds_html,
     profile_html,
     symmetry_html,
 )
+from app.render.deviation import NO_SURFACE, deviation_cells, deviation_colors
 from app.render.palette import DIVERGING
 from app.state import changes
 from app.state.object_choice import ObjectChoice, from_mesh

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.scene3d.cell_mesh import LIFT, around, flat
+from app.scene3d.cell_mesh import LIFT, flat_quads, surface_quads
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
 from tests.strategies import profiles
@@ -16,7 +16,7 @@ from tests.strategies import profiles
 @given(profiles(), st.integers(2, 30), st.integers(3, 60))
 def test_quads_wrap_the_object(profile, heights, angles):
     grid = Manifold(profile, heights, angles)
-    poses, sizes = around(grid)
+    poses, sizes = surface_quads(grid)
     assert len(poses) == len(sizes) == heights * angles
     rotation = poses[:, :3, :3]
     assert np.allclose(np.swapaxes(rotation, 1, 2) @ rotation, np.eye(3), atol=1e-9)
@@ -37,7 +37,7 @@ def test_quads_wrap_the_object(profile, heights, angles):
 @given(st.integers(1, 30), st.integers(1, 60))
 def test_the_flat_map_is_filled_without_overlap(heights, angles):
     grid = Manifold(Profile([[0, 0.1], [0.2, 0.1]]), heights, angles)
-    poses, sizes = flat(grid, 0.4, 0.2)
+    poses, sizes = flat_quads(grid, 0.4, 0.2)
     low, high = poses[:, :2, 3] - sizes[:, :2] / 2, poses[:, :2, 3] + sizes[:, :2] / 2
     assert np.allclose(low.min(axis=0), [-0.2, -0.1])
     assert np.allclose(high.max(axis=0), [0.2, 0.1])

@@ -12,10 +12,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from app.panels.object_panel import span
-from app.scene3d.flat_map import ASIDE
+from app.panels.object_panel import position_range
+from app.scene3d.flat_map import MIN_FACING
 from app.scene3d.scene_view import SceneView
-from app.scene3d.viewpoint import FIELD_OF_VIEW, viewpoint
+from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
 from app.server.viser_server import quiet_server
 from symgrasp.scene.scene import Scene
 from tests.app.state.test_state import opened
@@ -60,14 +60,14 @@ ANGLES = st.floats(-np.pi, np.pi)
 def test_the_flat_map_is_seen_from_the_front_however_the_camera_goes_round(view, angles):
     for angle in angles:
         eye = np.array([0.5 + 1.5 * np.cos(angle), 1.5 * np.sin(angle), 0.8])
-        view.seen_from((*eye, 0.5, 0.0, 0.1))
-        assert front_towards(view, eye) >= ASIDE - 1e-9
+        view.camera_moved((*eye, 0.5, 0.0, 0.1))
+        assert front_towards(view, eye) >= MIN_FACING - 1e-9
 
 
 def test_a_camera_right_above_leaves_the_flat_map_as_it_is(view):
     before = view.flat_map.frame.wxyz.copy()
     x, y, z = view.flat_map.frame.position
-    view.seen_from((x, y, z + 2.0, 0.5, 0.0, 0.1))
+    view.camera_moved((x, y, z + 2.0, 0.5, 0.0, 0.1))
     assert np.array_equal(view.flat_map.frame.wxyz, before)
 
 
@@ -83,7 +83,7 @@ def test_a_view_that_begins_with_a_camera_has_the_flat_map_towards_it(server, an
 def test_every_robot_and_every_task_is_in_the_picture(name, aspect):
     scene = Scene.load(name)
     pose = scene.task().T_world_object
-    seen = viewpoint(scene, pose)
+    seen = choose_viewpoint(scene, pose)
     eye = seen.camera(aspect)
     forward = (seen.look_at - eye) / np.linalg.norm(seen.look_at - eye)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -102,7 +102,7 @@ def test_the_object_can_be_moved_a_metre_beyond_everything(name):
     poses = [robot.T_world_base for robot in scene.robots.values()]
     poses += [task.T_world_object for task in scene.tasks.values()]
     for axis in range(3):
-        low, high = span(scene, axis)
+        low, high = position_range(scene, axis)
         places = [100 * pose[axis, 3] for pose in poses]
         assert low % 10 == high % 10 == 0
         assert 100 <= min(places) - low < 110

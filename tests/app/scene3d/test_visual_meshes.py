@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.scene3d.visual_meshes import FINEST, link_visuals
+from app.scene3d.visual_meshes import MAX_TRIANGLES, link_visuals
 from symgrasp.errors import SymgraspError
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
@@ -91,8 +91,8 @@ def test_a_fine_mesh_is_shown_with_fewer_triangles_in_the_same_place(tmp_path):
     fine = trimesh.creation.torus(0.1, 0.03, major_sections=200, minor_sections=100)
     fine.export(tmp_path / "m.stl")  # every triangle with vertices of its own
     seen = loaded(link_visuals(urdf(tmp_path, '<mesh filename="m.stl"/>'))["base"]).to_mesh()
-    assert len(fine.faces) > 10 * FINEST
-    assert 0.9 * FINEST < len(seen.faces) <= FINEST
+    assert len(fine.faces) > 10 * MAX_TRIANGLES
+    assert 0.9 * MAX_TRIANGLES < len(seen.faces) <= MAX_TRIANGLES
     points = trimesh.sample.sample_surface(fine, 2000, seed=1)[0]
     _, distance, _ = trimesh.proximity.closest_point(seen, points + np.array([0.0, 0.0, 0.5]))
     assert distance.max() < 0.001

@@ -17,10 +17,11 @@ from PIL import Image
 from trimesh import transform_points
 
 from app.compute.map_service import MapService
-from app.html.candidates import candidate_html, candidate_line, candidates_html, fates
+from app.html.candidates import candidate_html, candidate_text, candidates_html, reason_grid
 from app.html.map import legend_html
-from app.html.readout import check_html, grasp_html, joint_values
-from app.render.cell_colors import cell_colors, coloured
+from app.html.readout import comparison_html, grasp_html
+from app.render.cell_colors import cell_colors, colored_map
+from app.render.drawn_poses import drawn_joint_values
 from app.render.map_picture import map_picture, picture_name
 from app.render.prints import shown_prints
 from app.scene3d.ghost import body_mesh, ghost
@@ -89,7 +90,7 @@ def test_turning_the_object_only_rolls_any_colours(color_by):
 def test_the_legend_of_values_is_a_scale_in_their_unit():
     state = opened()
     html = legend_html(state.map, state.map_view.roll, ColorBy.CLEARANCE)
-    high = coloured(state.map, state.map_view.roll, ColorBy.CLEARANCE).scale.high
+    high = colored_map(state.map, state.map_view.roll, ColorBy.CLEARANCE).scale.high
     assert "clearance (mm)" in html
     assert f"<span>{high:g}</span>" in html
     assert high >= 1e3 * np.nanmax(state.map.clearance)
@@ -140,7 +141,9 @@ def test_the_recomputed_map_is_the_shifted_one(delta):
     assert np.allclose(check.map.T_world_object, state.map.T_world_object)
     checked = job_changes.result_arrived(job_changes.started(state, 1, "", state.next_request), 1, check)
     assert checked.next_request is None
-    assert f"{np.rad2deg(delta):.2f}°: <b>0 of {check.map.reason.size} cells differ" in check_html(checked)
+    assert f"{np.rad2deg(delta):.2f}°: <b>0 of {check.map.reason.size} cells differ" in comparison_html(
+        checked
+    )
 
 
 def test_the_comparison_counts_what_differs(service):
@@ -269,10 +272,10 @@ def test_a_failing_candidate_is_a_ghost_and_a_feasible_one_the_arm(service):
         at = arm.robot_values(shown_candidate.ended, held.explanation.opening)
         if shown_candidate.reason == Reason.FEASIBLE:
             assert ghost(shown) is None
-            assert np.array_equal(joint_values(shown)["panda"], at)
+            assert np.array_equal(drawn_joint_values(shown)["panda"], at)
         else:
             assert np.array_equal(ghost(shown).values, at)
-            assert np.array_equal(joint_values(shown)["panda"], arm.robot.home)
+            assert np.array_equal(drawn_joint_values(shown)["panda"], arm.robot.home)
     reasons = {shown_candidate.reason for shown_candidate in held.explanation.candidates}
     assert Reason.FEASIBLE in reasons
     assert len(reasons) > 1
@@ -323,7 +326,7 @@ def bounds(points: np.ndarray) -> np.ndarray:
 def test_the_candidates_are_drawn_by_redundancy_and_branch(service):
     state = opened()
     hit = explained(service, changes.choose_cell(state, *cell_with(state, Reason.SCENE_COLLISION)))
-    cells = fates(hit.explanation)
+    cells = reason_grid(hit.explanation)
     assert cells.shape[1] == len(hit.explanation.phi)
     best = {}
     for v in hit.explanation.candidates:
@@ -332,7 +335,7 @@ def test_the_candidates_are_drawn_by_redundancy_and_branch(service):
     html = candidates_html(hit)
     assert f"{len(hit.explanation.candidates)} candidates" in html
     assert html.count("sg-ring") == 1
-    assert candidate_line(hit.shown_candidate) in candidate_html(hit)
+    assert candidate_text(hit.shown_candidate) in candidate_html(hit)
     assert "The best of" in grasp_html(hit)
     assert "One of" in grasp_html(changes.choose_candidate(hit, 1))
 

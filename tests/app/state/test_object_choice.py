@@ -10,7 +10,7 @@ import pybullet_data
 import pytest
 
 from app.state import object_choice as module
-from app.state.object_choice import OWN, UNITS, choices, from_library, from_mesh
+from app.state.object_choice import OWN, UNITS, from_library, from_mesh, object_options
 from symgrasp.errors import SymgraspError
 from symgrasp.object.library import library_objects, load_object
 
@@ -75,9 +75,9 @@ def test_a_file_over_the_limit_is_refused_before_it_is_looked_at(monkeypatch):
 
 
 def test_the_library_is_offered_and_nothing_else_is_loaded():
-    assert choices() == (OWN, *library_objects())
+    assert object_options() == (OWN, *library_objects())
     uploaded = from_mesh("b.stl", stl(), 1.0)
-    assert choices(uploaded)[-1] == "b.stl (upload)"
+    assert object_options(uploaded)[-1] == "b.stl (upload)"
     choice = from_library("tennis_ball")
     assert np.array_equal(choice.profile.points, load_object("tennis_ball")[1].points)
     for name in ("no_such", "static_scenes/objects/tennis_ball.yaml", "/etc/passwd"):

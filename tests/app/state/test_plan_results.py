@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from app.compute import plan_service
 from app.compute.cache import SharedCache
 from app.compute.map_service import MapService
-from app.compute.plan_service import PLAN_LIMIT, PlanRequest, PlanService
-from app.html.readout import joint_values
-from app.render.playback import drawn_object_pose, playback_frame
+from app.compute.plan_service import PlanRequest, PlanService
+from app.files.plan_formats import PLAN_LIMIT
+from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
+from app.render.playback import playback_frame
 from app.render.prints import shown_prints
 from app.server.plan_actions import opened as plan_opened
 from app.state import changes, job_changes, plan_changes
@@ -169,7 +170,7 @@ def test_while_the_arms_are_played_the_object_stays_in_the_hand(position):
     hold = state.shown_task.holds[0]
     arm = state.scene.arm("panda")
     names = arm.robot.model.joint_names
-    values = joint_values(state)["panda"]
+    values = drawn_joint_values(state)["panda"]
     q = np.array([values[names.index(name)] for name in arm.joint_names])
     assert np.all(arm.lower <= q)
     assert np.all(q <= arm.upper)
@@ -279,7 +280,7 @@ def test_a_climb_is_replayed_with_both_hands_on_the_maps():
         shown = plan_changes.show_frame(state, frame)
         left, right = shown_prints(shown)
         assert (left & right).sum() <= step.collisions  # prints go on beyond the object's ends
-        values = joint_values(shown)
+        values = drawn_joint_values(shown)
         for name, cell in zip(climb.arms, step.cells, strict=True):
             arm = shown.scene.arm(name)
             witness = shown.plan_results.maps["lift", name].map.witness(cell)

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest, PlanService
-from app.html.readout import joint_values, status_html
+from app.html.readout import status_html
 from app.panels.keyboard import next_arm
+from app.render.drawn_poses import drawn_joint_values
 from app.state import changes, job_changes, plan_changes
 from app.state.map_view_state import RollChoice
 from app.state.object_choice import OWN, from_library
@@ -347,21 +348,21 @@ def test_a_feasible_pick_poses_the_arm_and_another_parks_it(roll):
     home = state.scene.robots["panda"].home
     row, column = np.argwhere(shown == Reason.FEASIBLE)[0]
     held = changes.choose_cell(state, row, column)
-    values = joint_values(held)["panda"]
+    values = drawn_joint_values(held)["panda"]
     arm = state.scene.arm()
     witness = held.map.witness(held.cell)
     assert np.array_equal(values, arm.robot_values(witness.q, witness.opening))
     assert not np.allclose(values, home)
     row, column = np.argwhere(shown != Reason.FEASIBLE)[0]
-    assert np.array_equal(joint_values(changes.choose_cell(state, row, column))["panda"], home)
-    assert np.array_equal(joint_values(changes.clear_pick(held))["panda"], home)
+    assert np.array_equal(drawn_joint_values(changes.choose_cell(state, row, column))["panda"], home)
+    assert np.array_equal(drawn_joint_values(changes.clear_pick(held))["panda"], home)
 
 
 def test_the_arm_does_not_trust_an_old_map():
     state = opened()
     row, column = np.argwhere(RollChoice.EITHER.reason(state.map) == Reason.FEASIBLE)[0]
     moved = changes.moved(changes.choose_cell(state, row, column), x=0.5)
-    assert np.array_equal(joint_values(moved)["panda"], state.scene.robots["panda"].home)
+    assert np.array_equal(drawn_joint_values(moved)["panda"], state.scene.robots["panda"].home)
 
 
 # -- plans ----------------------------------------------------------------------------------
@@ -381,14 +382,14 @@ def test_a_plan_is_shown_task_by_task_with_one_grasp():
         grasps.add((shown.pick.h, shown.pick.theta))
         joints = task.holds[0].joints
         names = state.scene.robots["panda"].model.joint_names
-        values = joint_values(shown)["panda"]
+        values = drawn_joint_values(shown)["panda"]
         assert {n: values[names.index(n)] for n in joints} == joints
     assert len(grasps) == 1
 
 
 def test_both_arms_hold_in_a_bimanual_plan_and_either_map_can_be_seen():
     state = with_plan("log_two_robots", "bimanual")
-    values = joint_values(state)
+    values = drawn_joint_values(state)
     for name, robot in state.scene.robots.items():
         assert not np.allclose(values[name], robot.home)
     other = changes.choose_arm(state, "right")
@@ -478,7 +479,7 @@ def test_no_order_of_changes_breaks_the_picture(name, sequence):
             state = job_changes.failed(state, str(error))
         assert state.task in state.scene.tasks
         assert state.arm in state.scene.task(state.task).arms
-        assert set(joint_values(state)) == set(state.scene.robots)
+        assert set(drawn_joint_values(state)) == set(state.scene.robots)
         assert state.base.matrix().shape == (4, 4)
         if state.pick:
             assert state.cell is not None

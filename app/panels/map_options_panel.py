@@ -1,4 +1,4 @@
-"""How the map is looked at, and the map as a file."""
+"""Options of the map: its colours, the handprint, the comparison; and the map as a picture file."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..state.state import State
 from .actions import Actions
 from .panel import Panel
 
-__all__ = ["ViewPanel"]
+__all__ = ["MapOptionsPanel"]
 
 
-class ViewPanel(Panel):
-    """Chooses what the colours stand for, and saves the picture."""
+class MapOptionsPanel(Panel):
+    """Chooses what the map shows and saves its picture."""
 
     def __init__(self, gui: viser.GuiApi, actions: Actions) -> None:
         super().__init__(gui, actions)
-        self.view = self.choice("Colours show", tuple(ColorBy))
-        self.on(self.view, lambda s, v: replace(s, map_view=replace(s.map_view, color_by=ColorBy(v))))
+        self.color_by = self.dropdown("Colours show", tuple(ColorBy))
+        self.on(self.color_by, lambda s, v: replace(s, map_view=replace(s.map_view, color_by=ColorBy(v))))
         self.handprint = gui.add_checkbox(
             "Handprint", False, hint="The cells under the hand of the picked grasp."
         )
@@ -36,7 +36,7 @@ class ViewPanel(Panel):
         self.save.on_click(lambda _: actions.save_map(self.save.value))
 
     def write_inputs(self, state: State) -> None:
-        """Show what is chosen."""
-        self.view.value = state.map_view.color_by
+        """Set the options."""
+        self.color_by.value = state.map_view.color_by
         self.handprint.value = state.map_view.handprint
         self.compare.value = state.map_view.compare

@@ -1,0 +1,49 @@
+"""Where a state's robots and object are drawn: joint values and the object's pose."""
+
+from __future__ import annotations
+
+from symgrasp.poses import Array
+from symgrasp.reason import Reason
+
+from ..state.state import State
+from .playback import plan_joint_values, playback_frame
+
+__all__ = ["drawn_joint_values", "drawn_object_pose"]
+
+
+def drawn_joint_values(state: State) -> dict[str, Array]:
+    """Return the joint values that the robots of a state are drawn at.
+
+    Robots park at home, except the arms that hold the object in the plan's task that is shown,
+    or the chosen arm at the chosen candidate of the picked cell, if that is feasible, or its witness.
+
+    Returns:
+        Robot name → values (n,) of all its joints, in rad or m.
+    """
+    if frame := playback_frame(state):
+        return frame.joint_values
+    if state.shown_task:
+        return plan_joint_values(state.scene, state.shown_task)
+    values = {robot.name: robot.home.copy() for robot in state.scene.robots.values()}
+    if state.climb_step and state.plan_results.climb:
+        for name, cell in zip(state.plan_results.climb.arms, state.climb_step.cells, strict=True):
+            arm = state.scene.arm(name)
+            witness = state.plan_results.maps[state.task, name].map.witness(cell)
+            if witness:
+                q = arm.robot_values(witness.q, witness.opening)
+                moved = q != arm.robot.home
+                values[arm.robot.name][moved] = q[moved]
+    elif state.shown_candidate and state.explanation:
+        if state.shown_candidate.reason == Reason.FEASIBLE:
+            arm = state.scene.arm(state.arm)
+            values[arm.robot.name] = arm.robot_values(state.shown_candidate.q, state.explanation.opening)
+    elif state.is_current and state.map and state.cell and (witness := state.map.witness(state.cell)):
+        arm = state.scene.arm(state.arm)
+        values[arm.robot.name] = arm.robot_values(witness.q, witness.opening)
+    return values
+
+
+def drawn_object_pose(state: State) -> Array:
+    """Return the pose (4, 4) that the object is drawn at; during a playback a hand may carry it."""
+    frame = playback_frame(state)
+    return frame.T_world_object if frame else state.T_world_object
