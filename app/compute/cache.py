@@ -95,7 +95,7 @@ class SharedCache:
             InputError: there is none of that name.
         """
         scene, choice = self.scene_with(link.scene or self.first, link.object or OWN)
-        for arm, hand in link.hands.items():
+        for arm, hand in link.hand.items():
             if scene.replaceable_hands.get(arm) != hand:
                 scene = scene.with_hand(arm, hand)
                 check_visuals(scene)

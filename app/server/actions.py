@@ -14,7 +14,7 @@ from symgrasp.scene.scene import Scene
 
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
-from ..files.links import link_of
+from ..files.links import Link
 from ..files.scene_files import read_scene, scene_yaml
 from ..render.map_picture import map_picture, picture_name
 from ..scene3d.visual_meshes import check_visuals
@@ -167,8 +167,8 @@ class Actions:
 
         def make(state: State) -> State:
             camera = camera_of(self._client)
-            address = f"{self._address}?{link_of(state, self._as_opened(state), camera)}"
-            return changes.linked(state, address, camera)
+            link = Link.of(state, self._as_opened(state), camera)
+            return changes.linked(state, f"{self._address}?{link.query()}", camera)
 
         self.change(make)
 

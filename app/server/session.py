@@ -19,7 +19,7 @@ from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
 from ..compute.job_queue import Job, JobQueue
 from ..compute.process_pool import ProcessPool
-from ..files.links import parse_link
+from ..files.links import Link
 from ..panels.layout import Layout
 from ..scene3d.scene_view import SceneView
 from ..state import changes, job_changes
@@ -211,7 +211,7 @@ class Session:
         """Show what the address says; if that cannot be done, `_failed` shows the first scene and why not."""
 
         def run(_: Progress) -> tuple[State, Camera | None]:
-            link = parse_link(self.visit.query)
+            link = Link.parse(self.visit.query)
             scene, choice = self.cache.linked(link)
             name = link.scene or self.cache.first
             return link.apply(replace(State.of(scene, name), object_choice=choice)), link.camera

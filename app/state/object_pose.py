@@ -37,7 +37,7 @@ class ObjectPose:
         """Take a pose (4, 4) apart."""
         axis = pose[:3, 2]
         lean = float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2]))
-        towards = float(np.arctan2(axis[1], axis[0])) if lean > 1e-9 else 0.0
+        towards = float(np.arctan2(axis[1], axis[0])) if lean > 1e-12 else 0.0
         x, y, z = pose[:3, 3].tolist()
         return ObjectPose(x, y, z, lean, towards, spin(pose))
 

@@ -11,11 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.compute.cache import SharedCache
-from app.files.links import LONGEST, link_of, parse_link
+from app.files.links import LONGEST, Link
 from app.panels.files_panel import link_html
 from app.state import changes, job_changes
 from app.state.map_view_state import RollChoice
 from app.state.object_choice import from_library
+from app.state.object_pose import ObjectPose
 from app.state.state import Pick, State
 from app.state.task_list import TaskList
 from app.state.undo import remember, undo
@@ -38,11 +39,11 @@ def opened(name: str) -> State:
 
 
 def query_of(state: State, camera: tuple[float, ...] | None = None) -> str:
-    return link_of(state, load_small(state.scene_name), camera)
+    return Link.of(state, load_small(state.scene_name), camera).query()
 
 
 def reopened(query: str, name: str) -> State:
-    link = parse_link(query)
+    link = Link.parse(query)
     assert link.scene == name
     return link.apply(opened(name))
 
@@ -89,18 +90,18 @@ def test_a_link_is_short_and_readable():
     assert "&at.pick=50," in query_of(state)
     query = query_of(opened("soda_can"), (1.0, 0.5, 0.7, 0.1, 0.0, 0.25))
     assert query == "scene=soda_can&task=pick&arm=panda&camera=1.000,0.500,0.700,0.100,0.000,0.250"
-    assert parse_link(query).camera == (1.0, 0.5, 0.7, 0.1, 0.0, 0.25)
+    assert Link.parse(query).camera == (1.0, 0.5, 0.7, 0.1, 0.0, 0.25)
 
 
 def test_objects_of_the_library_and_hands_come_back():
     cache = SharedCache("log_iiwa_and_panda")
-    scene, object_choice = cache.linked(parse_link("object=log_70mm&hand.iiwa=pr2"))
+    scene, object_choice = cache.linked(Link.parse("object=log_70mm&hand.iiwa=pr2"))
     assert scene.replaceable_hands["iiwa"] == "pr2"
     assert object_choice
     assert object_choice.option == "log_70mm"
     state = replace(State.of(scene, "log_iiwa_and_panda"), object_choice=object_choice)
-    link = link_of(state, cache.scene(state.scene_name))
-    again, _ = cache.linked(parse_link(link))
+    link = Link.of(state, cache.scene(state.scene_name)).query()
+    again, _ = cache.linked(Link.parse(link))
     assert again.sha256 == scene.sha256
     assert "tasks" not in link
 
@@ -109,10 +110,10 @@ def test_what_was_uploaded_is_in_no_link():
     scene = load_small("soda_can")
     state = changes.open_upload(State.of(scene, "soda_can"), UploadedScene("mine.yaml (upload)", scene))
     with pytest.raises(SymgraspError, match=r"link: scene: 'an upload': .*save the scene instead"):
-        link_of(state, scene)
+        Link.of(state, scene)
     mesh = replace(from_library("log_70mm"), measurement=object())  # pyright: ignore[reportArgumentType]
     with pytest.raises(SymgraspError, match="link: object: 'an upload'"):
-        link_of(changes.choose_object(State.of(scene, "soda_can"), scene, mesh), scene)
+        Link.of(changes.choose_object(State.of(scene, "soda_can"), scene, mesh), scene)
 
 
 # -- the list of tasks ----------------------------------------------------------------------
@@ -199,7 +200,7 @@ def test_a_link_that_would_be_too_long_to_be_read_is_not_made():
     ):
         for _ in range(200):
             assert len(query_of(state)) <= LONGEST
-            parse_link(query_of(state))
+            Link.parse(query_of(state))
             state = changes.add_task(state)
 
 
@@ -266,6 +267,20 @@ def test_a_link_that_is_shown_is_marked_once_something_else_is_shown():
         ("arms.pick=panda,panda", "link: arms.pick: 'panda': expected every name once"),
         ("arms.pik=panda", "link: arms.pik: 'panda': expected arms of a task: one of 'pick'"),
         ("tasks=pick&arms.pick=", "link: arms.pick: '': expected names with commas"),
+        ("at.pick=1,2,x,4,5,6", "link: at.pick: 'x': expected a number"),
+        ("at.pick=1,2,3,4,5,inf", "link: at.pick: 'inf': expected a number"),
+        (
+            "at.pick=1,2,3,4,5,6&at.pick=1,2,3,4,5,6",
+            "link: at.pick: '1,2,3,4,5,6': expected every setting once",
+        ),
+        ("at=1,2,3,4,5,6", "link: at: '1,2,3,4,5,6': expected one of .*'at.<task>'"),
+        ("hand=pr2", "link: hand: 'pr2': expected one of .*'hand.<arm>'"),
+        ("task.pick=1", "link: task.pick: '1': expected one of"),
+        ("h=5&theta=x", "link: theta: 'x': expected a number"),
+        ("h=100001", "link: h: '100001': expected a number"),
+        ("dark=true", "link: dark: 'true': expected one of '0', '1'"),
+        ("view=x", "link: view: 'x': expected one of"),
+        ("camera=1,2,3,4,5,1e6", "link: camera: '1e6': expected a number"),
         ("tsk=pick", "link: tsk: 'pick': expected .*did you mean 'task'"),
         ("scene=" + "x" * 5000, "link: length: 5006: expected at most 4000 characters"),
     ],
@@ -273,11 +288,81 @@ def test_a_link_that_is_shown_is_marked_once_something_else_is_shown():
 def test_what_is_wrong_with_a_link_is_said_in_a_line(query, message):
     cache = SharedCache("bottle_on_table")
     with pytest.raises(SymgraspError, match=message) as error:
-        link = parse_link(query)
+        link = Link.parse(query)
         scene, _ = cache.linked(link)
         link.apply(State.of(scene, ""))
     assert "\n" not in str(error.value)
 
 
 def test_what_viser_understands_is_left_to_it():
-    assert parse_link("darkMode&initialCameraFov=1&websocket=x&turn=5").settings == {"turn": "5"}
+    assert Link.parse("darkMode&initialCameraFov=1&websocket=x&turn=5") == Link(turn=5)
+
+
+# -- the model ------------------------------------------------------------------------------
+
+WORDS = st.none() | NAMES
+CAMERAS = st.none() | st.tuples(*[st.floats(-1e4, 1e4)] * 6)
+OBJECT_POSES = st.builds(ObjectPose, LENGTHS, LENGTHS, LENGTHS, st.floats(0, 3), ANGLES, ANGLES)
+NAME_LISTS = st.lists(NAMES, min_size=1, max_size=3, unique=True)
+GRASPS = st.just({}) | st.fixed_dictionaries(
+    {"h": st.floats(-1e5, 1e5), "theta": st.floats(-180, 180), "side": st.none() | st.integers(0, 1)}
+)
+
+
+@given(
+    st.fixed_dictionaries(
+        {"scene": WORDS, "object": WORDS, "task": WORDS, "arm": WORDS, "camera": CAMERAS},
+        optional={
+            "hand": st.dictionaries(NAMES, NAMES, max_size=2),
+            "tasks": st.none() | NAME_LISTS,
+            "arms": st.dictionaries(NAMES, NAME_LISTS, max_size=2),
+            "at": st.dictionaries(NAMES, OBJECT_POSES, max_size=2),
+            "turn": st.floats(-360, 360),
+            "roll": st.sampled_from(RollChoice),
+            "view": st.sampled_from(ColorBy),
+            "board": st.booleans(),
+            "gizmo": st.booleans(),
+            "dark": st.booleans(),
+        },
+    ),
+    GRASPS,
+)
+def test_a_link_is_read_as_it_was_written(values, grasp):
+    link = Link(**values, **grasp)
+    query = link.query()
+    assert Link.parse(query) == link
+    assert Link.parse(query).query() == query
+
+
+def test_settings_are_written_in_one_order():
+    query = (
+        "scene=two&object=log_70mm&hand.a=pr2&hand.b=wsg50&task=x&arm=a&tasks=x,y,z&at.x=1,2,3,4,5,6"
+        "&arms.y=a,b&at.y=1.5,2,3,4,5,-6&arms.z=b&turn=30&roll=0°&view=clearance&board=0&gizmo=1&dark=1"
+        "&camera=1.000,0.500,0.700,0.100,0.000,0.250&h=12&theta=-40&side=180"
+    )
+    assert Link.parse(query).query() == query.replace("°", "%C2%B0")
+    assert Link.parse("&".join(reversed(query.split("&")))) == Link.parse(query)
+    assert Link.parse("board=1&gizmo=0&dark=0&turn=0&roll=either&view=reason").query() == ""
+
+
+def test_a_task_may_stand_behind_its_arm():
+    name = "handover_between_robots"
+    first, last = (load_small(name).tasks[task].arms[0] for task in ("pick", "place"))
+    for query in (f"task=place&arm={last}", f"arm={last}&task=place"):
+        state = Link.parse(query).apply(opened(name))
+        assert (state.task, state.arm) == ("place", last)
+    for query in (f"task=place&arm={first}", f"arm={first}&task=place"):
+        with pytest.raises(SymgraspError, match=f"link: arm: '{first}': expected one of '{last}'"):
+            Link.parse(query).apply(opened(name))
+
+
+def test_an_angle_or_a_side_without_a_height_picks_nothing():
+    assert Link.parse("theta=x&side=90") == Link()
+
+
+def test_a_number_that_could_not_be_read_is_not_written():
+    state = changes.moved(opened("soda_can"), x=1001.0)
+    with pytest.raises(SymgraspError, match=r"^link: at.pick: '100100': expected a number$"):
+        query_of(state)
+    with pytest.raises(SymgraspError, match=r"^link: camera: 'nan': expected a number$"):
+        query_of(opened("soda_can"), (np.nan, 0.0, 0.0, 0.0, 0.0, 0.0))

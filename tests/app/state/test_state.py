@@ -95,6 +95,11 @@ def test_lean_and_direction_are_those_of_the_axis(lean, towards, spin):
     assert np.arctan2(axis[1], axis[0]) == pytest.approx(towards, abs=1e-6)
 
 
+def test_the_direction_of_a_small_lean_is_kept():
+    pose = ObjectPose(0.0, 0.0, 0.0, lean=1e-9, towards=2.0).matrix()
+    assert np.allclose(ObjectPose.of(pose).matrix(), pose, rtol=0, atol=1e-11)
+
+
 # -- turning: nothing is computed -----------------------------------------------------------
 
 
