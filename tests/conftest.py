@@ -1,8 +1,10 @@
-"""Scenes that many tests share, loaded once."""
+"""Scenes that many tests share, loaded once, and how tests are shared among processes."""
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +23,41 @@ settings.register_profile("ci", derandomize=True, deadline=None)
 settings.register_profile("local", deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 
+ROOT = Path(__file__).parent.parent
+
+LONGEST = ("tests/e2e", "tests/app/server", "tests/planners", "tests/plan", "tests/test_packaging.py")
+"""Folders and files whose tests take longest."""
+
 SHIPPED = list(shipped_scenes())
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile what is not compiled yet, unless the tests run in this process, which does so as it goes."""
+    if not config.getoption("numprocesses", None) or config.getoption("collectonly"):
+        return  # in a worker it is not set
+    from tests.compile_all import fingerprint
+
+    key, compiled = "symgrasp/compiled", fingerprint()
+    assert config.cache
+    if config.cache.get(key, "") != compiled:
+        subprocess.run([sys.executable, "-m", "tests.compile_all"], cwd=ROOT, check=True)
+        config.cache.set(key, compiled)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the tests of a folder in one process, the longest first.
+
+    They share servers, maps and plans; and two browsers at once would only wait for each other.
+    """
+
+    def group(item: pytest.Item) -> str:
+        file = item.path.relative_to(ROOT)
+        return str(file.parent if len(file.parts) > 2 else file)
+
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(group(item)))
+    items.sort(key=lambda i: LONGEST.index(group(i)) if group(i) in LONGEST else len(LONGEST))
 
 
 @cache

@@ -74,9 +74,10 @@ class Wire:
         return self.html()
 
     def set(self, label: str, value: Any) -> None:
-        """Change a widget as a person does."""
-        labelled = (uuid for uuid, w in self.widgets.items() if w.get("label") == label)
-        uuid = next(uuid for uuid in labelled if self.widgets[uuid]["value"] is not None)  # no folder
+        """Change a widget as a person does, once it is there."""
+        while not (found := [uuid for uuid, w in self.widgets.items() if _is_input(w, label)]):
+            self._read()
+        uuid = found[0]
         self.widgets[uuid]["value"] = value  # what the page sends for an instant before, it sends no more
         self._send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
 
@@ -121,3 +122,8 @@ class Wire:
         connection.request("GET", path, headers={"Referer": page})
         assert connection.getresponse().status == 200
         connection.close()
+
+
+def _is_input(widget: dict[str, Any], label: str) -> bool:
+    """Return whether a widget has that label and a value; folders have none."""
+    return widget.get("label") == label and widget["value"] is not None
