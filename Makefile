@@ -8,11 +8,11 @@ BIN := $(VENV)/bin
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
 
-test: $(VENV)/dev.stamp  ## install, then run every check and test, the tests on all cores
+test: $(VENV)/dev.stamp  ## install, then run every check and test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
-	$(BIN)/pytest --numprocesses auto $(ARGS)
+	$(BIN)/pytest $(ARGS)
 
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
