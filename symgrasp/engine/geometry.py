@@ -14,7 +14,8 @@ from symgrasp.engine.tree import Tree, build
 from symgrasp.meshes import read_mesh
 from symgrasp.object.profile import COLLISION_FACETS
 from symgrasp.poses import Array, inverse
-from symgrasp.robot.model import Joint, RobotModel
+from symgrasp.robot.joint import Joint
+from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene

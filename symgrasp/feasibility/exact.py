@@ -9,7 +9,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from time import perf_counter
-from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -26,6 +25,7 @@ from symgrasp.feasibility.cell import CLEARANCE_LIMIT
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
+from symgrasp.feasibility.search_recording import FixedBodies, PieceBodies, record_search
 from symgrasp.ik import SphericalIK, solver_for
 from symgrasp.ik.retreat import retreat_distances
 from symgrasp.object.manifold import ROLLS, Manifold
@@ -46,30 +46,6 @@ TELL = 0.05
 
 _ALL_CORES = threading.Lock()
 """Of numba's thread pools, one does not bear two parallel searches at once, and none is faster for it."""
-
-
-class _FixedBodies(NamedTuple):
-    """How close the bodies are that the arm does not move: the same for every candidate of a map.
-
-    Attributes:
-        gap: distance (m) that they have at least, at most `CLEARANCE_LIMIT`.
-        collision: their deepest collision, which every candidate shares; None where there is none.
-    """
-
-    gap: float
-    collision: Collision | None
-
-
-class _Bodies(NamedTuple):
-    """What the pieces of the engine's geometry are called in a map.
-
-    Attributes:
-        number: (P,) body of each piece in the map's list of names.
-        reason: (P,) what a collision with the piece is called.
-    """
-
-    number: np.ndarray
-    reason: np.ndarray
 
 
 class ExactEngine:
@@ -173,7 +149,7 @@ class ExactEngine:
         if progress and not len(rows):
             progress(1.0)
 
-    def _fixed_bodies(self) -> _FixedBodies:
+    def _fixed_bodies(self) -> FixedBodies:
         """Measure the bodies that the arm does not move, with the object where it is now."""
         with_object = self.world.pairs_within(self.arm, self._reach, (self.world.scene.file.object.name,))
         gap, deepest = CLEARANCE_LIMIT, None
@@ -183,7 +159,7 @@ class ExactEngine:
             depth = self.world.margin_for(c.reason) - distance
             if depth > 0 and (deepest is None or depth > deepest.depth):
                 deepest = c._replace(depth=depth)
-        return _FixedBodies(max(gap, 0.0), deepest)
+        return FixedBodies(max(gap, 0.0), deepest)
 
     def _is_fixed(self, c: Collision) -> bool:
         """Whether a pair involves the arm's robot, but no link that the arm moves."""
@@ -191,10 +167,10 @@ class ExactEngine:
         own = [body.link for body in (c.a, c.b) if body.body == name]
         return bool(own) and not self._geometry.moving_links.intersection(own)
 
-    def _bodies(self, draft: MapDraft) -> _Bodies:
+    def _bodies(self, draft: MapDraft) -> PieceBodies:
         """Name all pieces in a map."""
         names = self._geometry.names
-        return _Bodies(
+        return PieceBodies(
             np.array([draft.body_index(str(name)) for name in names]),
             np.array([self._collision_reason(name) for name in names]),
         )
@@ -211,10 +187,10 @@ class ExactEngine:
     def _search(
         self,
         draft: MapDraft,
-        bodies: _Bodies,
+        bodies: PieceBodies,
         rows: np.ndarray,
         T_base_tool: Array,
-        fixed: _FixedBodies,
+        fixed: FixedBodies,
     ) -> Iterator[None]:
         """Search some rows of the map; pause after every cell that PyBullet decided."""
         inputs = search.SearchInput(
@@ -240,7 +216,7 @@ class ExactEngine:
             )
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.manifold.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
-        _record(draft, bodies, found, cells, fixed)
+        record_search(draft, bodies, found, cells, fixed)
         for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.undecided_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             self._decide(
@@ -301,42 +277,6 @@ class ExactEngine:
 
 def _same(a: Collision, b: Collision) -> bool:
     return (a.a, a.b) == (b.a, b.b) and min(a.depth, b.depth) > 1e-6 and abs(a.depth - b.depth) < 1e-7
-
-
-def _record(
-    draft: MapDraft,
-    bodies: _Bodies,
-    found: search.SearchResult,
-    cells: tuple[np.ndarray, ...],
-    fixed: _FixedBodies,
-) -> None:
-    """Write down what the search found for m cells, before PyBullet decides the open ones.
-
-    Args:
-        draft: the map.
-        bodies: what its pieces are called.
-        found: for each of m cells.
-        cells: rolls, rows and columns (m,) of these cells.
-        fixed: the bodies that the arm does not move: where they collide, they are what spoils a cell.
-    """
-
-    def those(chosen: np.ndarray) -> tuple[np.ndarray, ...]:
-        return tuple(part[chosen] for part in cells)
-
-    status = found.status
-    draft.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, Reason.UNREACHABLE)
-    feasible = status == search.FEASIBLE
-    sample, branch = found.solution[feasible].T
-    draft.record_feasible(those(feasible), found.q[feasible], sample, branch, found.clearance[feasible])
-    blocked = status == search.BLOCKED
-    hit = (status == search.HIT) | blocked
-    named = hit & (found.pair[:, 0] >= 0)
-    draft.reason[those(named)] = bodies.reason[found.pair[named, 1]]
-    draft.record_pairs(those(named), bodies.number[found.pair[named]], found.depth[named])
-    draft.reason[those(blocked)] = Reason.APPROACH_BLOCKED
-    if fixed.collision is not None:
-        for cell in zip(*those(hit), strict=True):
-            draft.record_failure(cell, fixed.collision.reason, fixed.collision)
 
 
 def _spread(count: int) -> np.ndarray:

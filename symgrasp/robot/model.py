@@ -5,58 +5,26 @@ from __future__ import annotations
 import hashlib
 import io
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import trimesh
 import yourdfpy
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.files import file_sha256, resolve
-from symgrasp.meshes import read_mesh
-from symgrasp.poses import Array, from_rotation, rotation_about
+from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
+from symgrasp.robot.joint import Joint, joint_motion
+from symgrasp.robot.link_shapes import check_shape, collision_hull
 
-__all__ = ["Joint", "RobotModel"]
+__all__ = ["RobotModel"]
 
 LARGEST_LIMIT = 1e4
 """Joint limits and sizes of shapes must be below this (rad or m)."""
 
 MOVING = ("revolute", "continuous", "prismatic")
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """One joint of the tree.
-
-    Attributes:
-        name: its name in the URDF.
-        kind: its type in the URDF: revolute, continuous, prismatic or fixed.
-        parent: index of the parent link.
-        child: index of the child link.
-        origin: pose (4, 4) of the joint in its parent link at zero.
-        axis: unit axis (3,) in the joint frame.
-        lower: lower limit (rad or m); -inf for a continuous joint.
-        upper: upper limit.
-        source: index into the robot's joint values, or -1 for a fixed joint.
-        ratio: value of this joint for each unit of the source (1 unless it mimics).
-        offset: value of this joint where the source is zero.
-    """
-
-    name: str
-    kind: str
-    parent: int
-    child: int
-    origin: Array
-    axis: Array
-    lower: float
-    upper: float
-    source: int
-    ratio: float = 1.0
-    offset: float = 0.0
 
 
 class RobotModel:
@@ -96,7 +64,7 @@ class RobotModel:
         self._collisions = {link.name: list(link.collisions) for link in urdf.robot.links}
         for link, shapes in self._collisions.items():
             for shape in shapes:
-                _check_shape(self.path, link, shape)
+                check_shape(self.path, link, shape)
         self.sha256 = self._content_sha256()
         self._hulls: dict[str, tuple[Array, ...]] = {}
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
@@ -218,7 +186,7 @@ class RobotModel:
         for joint in self.joints:
             pose = poses[..., joint.parent, :, :] @ joint.origin
             if joint.source >= 0:
-                pose = pose @ _motion(joint, joint.ratio * q[..., joint.source] + joint.offset)
+                pose = pose @ joint_motion(joint, joint.ratio * q[..., joint.source] + joint.offset)
             poses[..., joint.child, :, :] = pose
         return poses
 
@@ -263,7 +231,7 @@ class RobotModel:
             hulls = []
             for shape in self._collisions[link]:
                 origin = np.eye(4) if shape.origin is None else np.asarray(shape.origin, dtype=float)
-                hulls.append(_hull(shape, self.mesh_path, link) @ origin[:3, :3].T + origin[:3, 3])
+                hulls.append(collision_hull(shape, self.mesh_path, link) @ origin[:3, :3].T + origin[:3, 3])
             self._hulls[link] = tuple(hulls)
         return self._hulls[link]
 
@@ -292,29 +260,6 @@ class RobotModel:
         return ET.tostring(root)
 
 
-def _check_shape(path: Path, link: str, shape: yourdfpy.Collision) -> None:
-    """Check that the sizes of a collision shape are positive; a mesh may be mirrored by a negative scale.
-
-    Raises:
-        UrdfError: the shape has no geometry, a size is not a positive number, or a scale is zero.
-    """
-    geometry = shape.geometry
-    if geometry is None:
-        raise UrdfError(path, f"link {link}: collision", None, "a geometry")
-    sizes: list[float] = []
-    if geometry.box is not None:
-        sizes = list(np.ravel(geometry.box.size))
-    elif geometry.cylinder is not None:
-        sizes = [geometry.cylinder.radius, geometry.cylinder.length]
-    elif geometry.sphere is not None:
-        sizes = [geometry.sphere.radius]
-    elif geometry.mesh is not None and geometry.mesh.scale is not None:
-        sizes = list(np.abs(np.ravel(geometry.mesh.scale)))
-    if not all(0 < size < LARGEST_LIMIT for size in sizes):
-        shown = [float(size) for size in sizes]
-        raise UrdfError(path, f"link {link}: collision", shown, "sizes that are positive numbers")
-
-
 def _root_link(urdf: yourdfpy.URDF) -> str:
     """Return the only link that is no child of a joint; raise ValueError where there are none or several."""
     children = {joint.child for joint in urdf.robot.joints}
@@ -322,42 +267,3 @@ def _root_link(urdf: yourdfpy.URDF) -> str:
     if len(roots) != 1:
         raise ValueError(f"{len(roots)} root links {roots}")
     return roots[0]
-
-
-def _motion(joint: Joint, value: Array) -> Array:
-    """Return the poses (..., 4, 4) of a joint's frame relative to zero, at values (...) (rad or m)."""
-    if joint.kind == "prismatic":
-        return from_rotation(np.eye(3), value[..., None] * joint.axis)
-    return from_rotation(rotation_about(joint.axis, value))
-
-
-def _hull(shape: yourdfpy.Collision, find: Callable[[str, str], Path], link: str) -> Array:
-    """Return the vertices (n, 3) of a convex hull that contains a collision shape, in the shape's frame.
-
-    Args:
-        shape: the shape.
-        find: returns the file of a mesh reference, given also the link for messages.
-        link: the link that the shape belongs to.
-    """
-    geometry = shape.geometry
-    assert geometry is not None  # the parser requires it
-    if geometry.box is not None:
-        mesh = trimesh.creation.box(extents=geometry.box.size)
-    elif geometry.cylinder is not None:
-        # Circumscribed, so that the hull contains the round shape.
-        sides = 48
-        mesh = trimesh.creation.cylinder(
-            radius=geometry.cylinder.radius / np.cos(np.pi / sides),
-            height=geometry.cylinder.length,
-            sections=sides,
-        )
-    elif geometry.sphere is not None:
-        ball = trimesh.creation.icosphere(subdivisions=3)
-        inradius = np.einsum("ij,ij->i", ball.face_normals, ball.triangles_center).min()
-        mesh = ball.apply_scale(geometry.sphere.radius / inradius)
-    else:
-        assert geometry.mesh is not None  # the parser knows no other shape
-        mesh = read_mesh(find(geometry.mesh.filename, link), f"link {link}")
-        scale = geometry.mesh.scale
-        mesh.apply_scale(1.0 if scale is None else scale)
-    return np.asarray(mesh.convex_hull.vertices)

@@ -13,7 +13,8 @@ from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, from_rotation, inverse, rotation_about
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.handprint import Handprint, handprint
-from symgrasp.robot.model import Joint, RobotModel
+from symgrasp.robot.joint import Joint
+from symgrasp.robot.model import RobotModel
 
 __all__ = ["Arm", "Robot"]
 

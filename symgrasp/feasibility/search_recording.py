@@ -1,0 +1,74 @@
+"""Writes what the compiled search found into the draft of a map."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.engine import search
+from symgrasp.feasibility.map_draft import MapDraft
+from symgrasp.reason import Reason
+from symgrasp.world import Collision
+
+__all__ = ["FixedBodies", "PieceBodies", "record_search"]
+
+
+class FixedBodies(NamedTuple):
+    """How close the bodies are that the arm does not move: the same for every candidate of a map.
+
+    Attributes:
+        gap: distance (m) that they have at least, at most `CLEARANCE_LIMIT`.
+        collision: their deepest collision, which every candidate shares; None where there is none.
+    """
+
+    gap: float
+    collision: Collision | None
+
+
+class PieceBodies(NamedTuple):
+    """What the pieces of the engine's geometry are called in a map.
+
+    Attributes:
+        number: (P,) body of each piece in the map's list of names.
+        reason: (P,) what a collision with the piece is called.
+    """
+
+    number: np.ndarray
+    reason: np.ndarray
+
+
+def record_search(
+    draft: MapDraft,
+    bodies: PieceBodies,
+    found: search.SearchResult,
+    cells: tuple[np.ndarray, ...],
+    fixed: FixedBodies,
+) -> None:
+    """Write down what the search found for m cells, before PyBullet decides the open ones.
+
+    Args:
+        draft: the map.
+        bodies: what its pieces are called.
+        found: for each of m cells.
+        cells: rolls, rows and columns (m,) of these cells.
+        fixed: the bodies that the arm does not move: where they collide, they are what spoils a cell.
+    """
+
+    def those(chosen: np.ndarray) -> tuple[np.ndarray, ...]:
+        return tuple(part[chosen] for part in cells)
+
+    status = found.status
+    draft.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, Reason.UNREACHABLE)
+    feasible = status == search.FEASIBLE
+    sample, branch = found.solution[feasible].T
+    draft.record_feasible(those(feasible), found.q[feasible], sample, branch, found.clearance[feasible])
+    blocked = status == search.BLOCKED
+    hit = (status == search.HIT) | blocked
+    named = hit & (found.pair[:, 0] >= 0)
+    draft.reason[those(named)] = bodies.reason[found.pair[named, 1]]
+    draft.record_pairs(those(named), bodies.number[found.pair[named]], found.depth[named])
+    draft.reason[those(blocked)] = Reason.APPROACH_BLOCKED
+    if fixed.collision is not None:
+        for cell in zip(*those(hit), strict=True):
+            draft.record_failure(cell, fixed.collision.reason, fixed.collision)
