@@ -1,4 +1,4 @@
-"""What all sessions share because it never changes: loaded scenes and computed maps."""
+"""The cache that all sessions share: loaded scenes and computed maps."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from ..state.requests import MapKey, MapRequest, MapResult
 
 __all__ = ["SharedCache"]
 
-MAPS_KEPT = 64
-"""Maps that the server keeps, newest first; a big one (96 x 192 cells) takes about 4 MB."""
+MAX_MAPS = 64
+"""How many maps are kept, the most recently used; one of 96 x 192 cells takes about 4 MB."""
 
-POSES_KEPT = 6
-"""Of them, those of one task and arm that differ in pose: a drag leaves dozens that nobody comes back to."""
+MAX_POSES = 6
+"""How many of them may differ only in pose: a drag computes dozens that are never needed again."""
 
 
 class SharedCache:
-    """Scenes by name and maps by content; may be used from any thread.
+    """Scenes by name and maps by content; thread-safe.
 
     Args:
         first: the scene the page opens with, a shipped name or a file.
@@ -53,16 +53,16 @@ class SharedCache:
         self.scene(first)
 
     def scene(self, name: str) -> Scene:
-        """Return a scene by one of `names`, loaded and checked once.
+        """Return a scene by one of `names`; it is loaded and checked once.
 
         Raises:
             InputError: it is unusable.
         """
         with self._lock:
-            known = self._scenes.get(name)
-        if known:
-            return known
-        if name not in self.names:  # a page can ask for any name, but for no file
+            scene = self._scenes.get(name)
+        if scene:
+            return scene
+        if name not in self.names:  # else a browser could open any file of the server
             raise SceneError("page", "scene", name, one_of(self.names, name))
         scene = Scene.load(name)
         check_tasks(scene)
@@ -71,7 +71,7 @@ class SharedCache:
             return self._scenes.setdefault(name, scene)
 
     def scene_with(self, name: str, option: str) -> tuple[Scene, ObjectChoice | None]:
-        """Return a scene by name with its own object or one of the library, and that object.
+        """Return a scene by name with its own object or one of the library, and the object if of the library.
 
         Raises:
             InputError: one of them is unusable, or they do not go together.
@@ -80,9 +80,9 @@ class SharedCache:
         if option == OWN:
             return scene, None
         with self._lock:
-            known = self._with_object.get((name, option))
-        if known:
-            return known
+            cached = self._with_object.get((name, option))
+        if cached:
+            return cached
         choice = from_library(option)
         changed = scene.with_object(choice.name, choice.profile), choice
         with self._lock:
@@ -92,7 +92,7 @@ class SharedCache:
         """Return the scene of a link with its object and hands.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: there is no scene, object or hand of a name, or they do not fit.
         """
         scene, choice = self.scene_with(link.scene or self.first, link.object or OWN)
         for arm, hand in link.hand.items():
@@ -102,20 +102,20 @@ class SharedCache:
         return scene, choice
 
     def map(self, request: MapRequest) -> MapResult | None:
-        """Return a map that was computed before, with the names of the request."""
+        """Return the cached map of a request, renamed to its scene and task; None if there is none."""
         with self._lock:
-            known = self._maps.get(request.key)
-            if known:
+            cached = self._maps.get(request.key)
+            if cached:
                 self._maps.move_to_end(request.key)
-        return known.renamed(request) if known else None
+        return cached.renamed(request) if cached else None
 
     def keep(self, result: MapResult) -> None:
-        """Keep a map."""
+        """Add a map, and drop the least recently used beyond `MAX_MAPS` and `MAX_POSES`."""
         with self._lock:
             self._maps[result.request.key] = result
-            requests = [known.request for known in self._maps.values()]
-            alike = [r for r in requests if r.pose and r.differs_in_pose(result.request)]
-            for request in alike[:-POSES_KEPT]:
+            requests = [cached.request for cached in self._maps.values()]
+            alike = [r for r in requests if r.pose and r.differs_only_in_pose(result.request)]
+            for request in alike[:-MAX_POSES]:
                 del self._maps[request.key]
-            while len(self._maps) > MAPS_KEPT:
+            while len(self._maps) > MAX_MAPS:
                 self._maps.popitem(last=False)

@@ -1,6 +1,6 @@
 """Messages between the server and a process that computes for it.
 
-Both ends belong to one program: what arrives is unpickled. Arrays that cannot be written to arrive as such.
+Messages are pickled, as both ends belong to one program. Read-only arrays stay read-only.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Call:
-    """To the process: call a method of its services; messages about it bear its job id."""
+    """To the process: call a method of its services; a `Cancel` refers to the call by its job id."""
 
     job_id: int
     method: str
@@ -49,7 +49,7 @@ class ProgressReport:
 
 @dataclass(frozen=True)
 class Compiling:
-    """From the process: it compiles code, for the first time on this machine."""
+    """From the process: it compiles code that is not in the cache of this machine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,21 +75,21 @@ class Failure:
 
 
 class Pipe(Protocol):
-    """What a channel needs of a connection, as `multiprocessing` makes them."""
+    """The interface of a `multiprocessing` connection that a channel uses."""
 
     def send_bytes(self, buf: bytes, /) -> None:
         """Send a message."""
 
     def recv_bytes(self) -> bytes:
-        """Wait for a message."""
+        """Wait for a message and return it."""
         ...
 
     def poll(self, timeout: float | None = 0.0, /) -> bool:
-        """Wait for a message for so long (s); return whether there is one, or the end."""
+        """Wait at most a timeout (s); return whether there is a message or the other end is closed."""
         ...
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
 
 
 class Channel:
@@ -106,22 +106,22 @@ class Channel:
         """Send a message.
 
         Raises:
-            OSError: the other end is gone.
+            OSError: the other end is closed.
         """
         self._pipe.send_bytes(pickle.dumps(message, protocol=5))
 
     def receive(self) -> Any:
-        """Wait for a message.
+        """Wait for a message and return it.
 
         Raises:
-            EOFError, OSError: the other end is gone.
+            EOFError, OSError: the other end is closed.
         """
         return pickle.loads(self._pipe.recv_bytes())
 
     def poll(self, timeout: float = 0.0) -> bool:
-        """Wait for a message for so long (s); return whether there is one, or the end."""
+        """Wait at most a timeout (s); return whether there is a message or the other end is closed."""
         return self._pipe.poll(timeout)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._pipe.close()

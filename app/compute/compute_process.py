@@ -1,4 +1,4 @@
-"""The process that computes for one session, as its job queue calls it; it may die without harm."""
+"""Remote calls into the process that computes for one session; a new one replaces it if it dies."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from .process_pool import ProcessPool, WorkerProcess
 __all__ = ["ComputeProcess", "ProcessDied"]
 
 POLL_INTERVAL = 0.05
-"""Time (s) after which a cancel is noticed although the process sends nothing."""
+"""Longest time (s) between two checks for a cancel while the process sends nothing."""
 
 CANCEL_TIMEOUT = 10.0
-"""How long (s) a call may go on after a cancel. Compiled code and new physics worlds take their time."""
+"""Time (s) after a cancel until the process is killed: compiled code cannot be interrupted."""
 
 
 class ProcessDied(Exception):
@@ -47,8 +47,8 @@ class ComputeProcess:
 
     Args:
         pool: starts the process.
-        keep: called with every map that is computed.
-        compiling: called when the process compiles something for the first time on this machine.
+        keep: called with every computed map.
+        compiling: called when the process begins to compile code.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class ComputeProcess:
 
     @property
     def pid(self) -> int | None:
-        """Number of the process, None when there is none."""
+        """Process id, None while there is no process."""
         return self._process.pid if self._process else None
 
     def close(self) -> None:
@@ -90,23 +90,23 @@ class ComputeProcess:
         return self._call("explain", progress, request)
 
     def check_tasks(self, scene: Scene, progress: Progress) -> None:
-        """Check the tasks of a scene that was uploaded."""
+        """Check the tasks of an uploaded scene; see `MapService.check_tasks`."""
         self._call("check_tasks", progress, scene)
 
-    def plan(self, request: PlanRequest, known: Maps, progress: Progress) -> tuple[PlanOutcome, Maps]:
-        """Run a planner; return what it found, and the maps it used by task and arm.
+    def plan(self, request: PlanRequest, cached: Maps, progress: Progress) -> tuple[PlanOutcome, Maps]:
+        """Run a planner; return its outcome and the maps it used, by task and arm.
 
         Args:
             request: which planner for what.
-            known: those of the maps it takes that were computed before.
-            progress: told the finished share; may raise `Cancelled`.
+            cached: those of the maps it needs that were computed before.
+            progress: called with the finished share; may raise `Cancelled`.
         """
-        outcome = self._call("plan", progress, request, known, maps=request.maps)
+        outcome = self._call("plan", progress, request, cached, maps=request.maps)
         self._planner = self._process
-        return outcome, known | self._results(request.maps)
+        return outcome, cached | self._results(request.maps)
 
     def more(self, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
-        """Return further plans of the last list, and whether there may be still more.
+        """Return the next plans of the last planner, and whether there may be more.
 
         Raises:
             NoPlanError: the process that made the list is gone, and the list with it.
@@ -116,7 +116,7 @@ class ComputeProcess:
         return self._call("more", progress)
 
     def open(self, content: bytes, name: str, progress: Progress) -> tuple[OpenedPlan, Maps]:
-        """Read a plan file and verify it; if it holds, return it with its scene, and its maps."""
+        """Read and verify a plan file; return the report, and plan, scene and maps if the plan holds."""
         opened: OpenedPlan = self._call("open", progress, content, name)
         if opened.scene is None:
             return opened, {}
@@ -129,16 +129,16 @@ class ComputeProcess:
 
     def _results(self, requests: Sequence[MapRequest]) -> Maps:
         """Return the maps that the last call computed, as the answers to requests."""
-        wanted = {(request.task, request.arm): request for request in requests}
-        found = ((c, wanted.get((c.map.task, c.map.arm))) for c in self._computed)
-        return {(r.task, r.arm): MapResult(r, c.map, c.contacts) for c, r in found if r}
+        by_key = {(request.task, request.arm): request for request in requests}
+        pairs = ((c, by_key.get((c.map.task, c.map.arm))) for c in self._computed)
+        return {(r.task, r.arm): MapResult(r, c.map, c.contacts) for c, r in pairs if r}
 
     def _call(self, method: str, progress: Progress, *args: object, maps: Sequence[MapRequest] = ()) -> Any:
         """Call a method of the services in the process.
 
         Args:
             method: its name there.
-            progress: told the finished share; may raise `Cancelled`.
+            progress: called with the finished share; may raise `Cancelled`.
             args: of the method, besides its progress.
             maps: the maps that it may compute.
         """
@@ -151,7 +151,7 @@ class ComputeProcess:
             return self._follow(process, progress)
         except Cancelled:
             process.cancelled_at = time.monotonic()
-            with suppress(OSError):  # dead already: found out when it is needed next
+            with suppress(OSError):  # it is dead already, which the next call notices
                 process.channel.send(Cancel(process.job_id))
             raise
         except (EOFError, OSError) as error:
@@ -161,7 +161,7 @@ class ComputeProcess:
             raise ProcessDied(text) from error
 
     def _ready(self, progress: Progress) -> WorkerProcess:
-        """Return a process that waits for a call."""
+        """Return an idle process: the present one, once a cancelled call has ended, or a new one."""
         process = self._process
         if process and process.cancelled_at is not None:
             try:
@@ -175,7 +175,7 @@ class ComputeProcess:
         return self._process
 
     def _await_end(self, process: WorkerProcess, since: float, progress: Progress) -> None:
-        """Wait until the call that was cancelled ends, but not for ever."""
+        """Wait until the cancelled call has ended; after `CANCEL_TIMEOUT` end the process instead."""
         while process.cancelled_at is not None:
             if process.channel.poll(POLL_INTERVAL):
                 message = process.channel.receive()
@@ -189,7 +189,7 @@ class ComputeProcess:
             progress(0.0)
 
     def _follow(self, process: WorkerProcess, progress: Progress) -> Any:
-        """Return what a call returns, and pass on what it reports."""
+        """Receive messages until the call under way ends, and return its result."""
         channel, share = process.channel, 0.0
         while True:
             if not channel.poll(POLL_INTERVAL):
@@ -204,7 +204,7 @@ class ComputeProcess:
             elif isinstance(message, Compiling):
                 self._compiling()
             elif isinstance(message, Failure):
-                if isinstance(message.error, (EOFError, OSError)):  # not of this connection
+                if isinstance(message.error, (EOFError, OSError)):  # it is not about this connection
                     raise RuntimeError(f"{type(message.error).__name__}: {message.error}")
                 raise message.error
             else:

@@ -1,4 +1,4 @@
-"""Long computations off the threads that answer the browser: one at a time, the newest wins."""
+"""A queue that runs computations one at a time on its own thread; a new job replaces all others."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A computation and its listeners; all are called on the thread of the queue.
+    """A computation and its callbacks; all run on the thread of the queue.
 
     Attributes:
         run: computes; calls its argument with the finished share, which may raise `Cancelled`.
@@ -42,12 +42,11 @@ class JobQueue:
     """One thread, with room for one waiting job.
 
     A new job replaces the waiting one and cancels the one under way, which stops at its next
-    progress; its listeners may still receive a last call that was on its way.
+    progress; a callback of it that is already running still ends.
 
     Args:
         name: of the thread.
-        finish: called on the thread at the very end, and after a job broke in an unexpected way, to free
-            what the jobs used.
+        finish: frees what the jobs used; called on the thread at its end and after a job failed unexpectedly.
     """
 
     def __init__(self, name: str, finish: Callable[[], object]) -> None:
@@ -60,24 +59,24 @@ class JobQueue:
         self._thread.start()
 
     def submit(self, job: Job) -> None:
-        """Do this next, and nothing else any more."""
+        """Run a job next; the waiting job is dropped and the one under way cancelled."""
         with self._changed:
             if not self._closed:
                 self._waiting, self._running = job, None
                 self._changed.notify()
 
     def cancel(self) -> None:
-        """Stop the job under way and forget the one that waits."""
+        """Cancel the job under way and drop the waiting one."""
         with self._changed:
             self._waiting = self._running = None
 
     def compiling(self) -> None:
-        """Tell the listener of the job under way that code is compiled for it."""
+        """Call `Job.compiling` of the job under way."""
         if job := self._running:
             job.compiling()
 
     def close(self) -> None:
-        """Cancel everything and end the thread; may be called from anywhere, more than once."""
+        """Cancel everything and end the thread; may be called from any thread and more than once."""
         with self._changed:
             self._closed = True
             self._waiting = self._running = None
@@ -103,7 +102,7 @@ class JobQueue:
 
     def _do(self, job: Job) -> None:
         def progress(share: float) -> None:
-            self._tell(job, job.progress, share)
+            self._notify(job, job.progress, share)
             if self._running is not job:
                 raise Cancelled
 
@@ -113,17 +112,17 @@ class JobQueue:
         except Cancelled:
             return
         except SymgraspError as error:
-            self._tell(job, job.failed, str(error))
+            self._notify(job, job.failed, str(error))
         except Exception as error:  # whatever a library raises must not end the thread
             died = isinstance(error, ProcessDied)
             log.error("a computation failed", exc_info=None if died else error)
             self._finish()
             text = " ".join(str(error).split())
             text = text if died else f"unexpected {type(error).__name__}: {text}"
-            self._tell(job, job.failed, f"{text}; what you set is kept, and the physics begins anew")
+            self._notify(job, job.failed, f"{text}; what you set is kept, and the physics begins anew")
         else:
-            self._tell(job, job.done, result)
+            self._notify(job, job.done, result)
 
-    def _tell(self, job: Job, listener: Callable[[Any], None], value: Any) -> None:
+    def _notify(self, job: Job, callback: Callable[[Any], None], value: Any) -> None:
         if self._running is job:
-            listener(value)
+            callback(value)

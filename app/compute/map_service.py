@@ -1,4 +1,4 @@
-"""Computes maps of one session in a physics world of its own; runs in that session's process."""
+"""Computes the maps of one session; runs in that session's process."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ __all__ = ["MapService"]
 
 
 class MapService:
-    """Computes maps; used by one thread at a time.
+    """Computes maps in a physics world of its own; used by one thread at a time.
 
-    The world of the last scene is kept: moving the object or editing tasks rebuilds nothing.
+    The world of the last scene is kept and reused when only the object's pose or the tasks change.
 
     Args:
         on_map: called with every map that `map` and `maps` compute.
@@ -55,8 +55,17 @@ class MapService:
         self._on_map(result)
         return result
 
-    def maps(self, requests: Sequence[MapRequest], known: Maps, progress: Progress) -> tuple[Maps, Progress]:
-        """Return maps by task and arm, computed unless known, and the progress of what follows."""
+    def maps(self, requests: Sequence[MapRequest], cached: Maps, progress: Progress) -> tuple[Maps, Progress]:
+        """Compute the maps that are not cached.
+
+        Args:
+            requests: the maps.
+            cached: (task, arm) → map, of those computed before.
+            progress: called with the finished share; may raise `Cancelled`.
+
+        Returns:
+            All maps by task and arm, and the progress to use for the computation that follows.
+        """
         parts = len(requests) + 1
 
         def part(k: int) -> Progress:
@@ -65,7 +74,7 @@ class MapService:
         maps: Maps = {}
         for k, request in enumerate(requests):
             key = request.task, request.arm
-            maps[key] = known[key] if key in known else self.map(request, part(k))
+            maps[key] = cached[key] if key in cached else self.map(request, part(k))
         return maps, part(len(requests))
 
     def compare(
@@ -76,7 +85,7 @@ class MapService:
         Args:
             request: which map, and by how much the object is turned.
             shifted_from: that map, for the object that is not turned.
-            progress: told the finished share; may raise `Cancelled`.
+            progress: called with the finished share; may raise `Cancelled`.
         """
         shifted, task = shifted_from.shift(request.delta), request.map.moved_task()
         turned = replace(task, T_world_object=task.T_world_object @ rotation_z(request.delta))
@@ -87,20 +96,20 @@ class MapService:
     def explain(self, request: ExplainRequest, progress: Progress) -> ExplainResult:
         """Compute the result of every candidate of a cell."""
         maker, the_map = self._maker_for(request.map.scene), request.map
-        found = maker.explain(the_map.arm, the_map.moved_task(), request.cell, progress=progress)
-        return ExplainResult(request, found)
+        explanation = maker.explain(the_map.arm, the_map.moved_task(), request.cell, progress=progress)
+        return ExplainResult(request, explanation)
 
     def check_tasks(self, scene: Scene, progress: Progress) -> None:
-        """Check that the object is inside of nothing in every task of a scene.
+        """Check that the object collides with no obstacle in any task of a scene.
 
         Raises:
-            SceneError: it is.
+            SceneError: it does.
         """
         progress(0.0)
         check_tasks(scene)
 
     def _maker_for(self, scene: Scene) -> MapMaker:
-        """Return a map maker for the scene's robots, obstacles and object; its tasks do not matter."""
+        """Return the present map maker if it is for the same robots, obstacles and object, else a new one."""
         old = self._maker
         if old and old.world.scene.map_sha256 == scene.map_sha256:
             return old
@@ -110,7 +119,7 @@ class MapService:
 
 
 def _contacts(world: BulletWorld, request: MapRequest) -> tuple[str, ...]:
-    """Say what the object is inside of, deepest first, each obstacle once."""
+    """Return a phrase for each obstacle that the object is inside of, deepest first."""
     world.set_object(request.T_world_object)
     deepest: dict[str, str] = {}
     for c in world.object_contacts():

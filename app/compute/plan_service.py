@@ -1,4 +1,4 @@
-"""Runs planners for one session, in its process, with the same calls as the command line."""
+"""Runs planners and verifies plan files for one session; runs in that session's process."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ from .map_service import MapService
 
 __all__ = ["OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService", "plan_result"]
 
-LISTED = 10
-"""How many plans are listed at a time."""
+PLANS_PER_BATCH = 10
+"""How many plans are computed at a time."""
 
 FeasibilityMaps = Mapping[tuple[str, str], FeasibilityMap]
 """(task, arm) → map."""
@@ -49,7 +49,7 @@ FeasibilityMaps = Mapping[tuple[str, str], FeasibilityMap]
 
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
-    """Run a planner.
+    """A call of a planner.
 
     Attributes:
         scene: the scene as loaded.
@@ -69,7 +69,7 @@ class PlanRequest:
 
     @property
     def tasks(self) -> list[Task]:
-        """The tasks that are planned."""
+        """The tasks to plan."""
         tasks = list(self.scene.tasks.values())
         if self.kind == "sequential":
             return [task for task in tasks if task.arms == (self.name,)]
@@ -77,7 +77,7 @@ class PlanRequest:
 
     @property
     def maps(self) -> list[MapRequest]:
-        """The maps it takes; none where the planner refuses the tasks anyway."""
+        """The maps that the planner needs; none where it would reject the tasks."""
         if self.kind == "bimanual" and len(self.tasks[0].arms) == 1:
             return []
         return [
@@ -89,13 +89,13 @@ class PlanRequest:
 
 @dataclass(frozen=True, eq=False)
 class PlanOutcome:
-    """What a planner found.
+    """The outcome of a planner.
 
     Attributes:
         kind: which planner.
-        plans: the first plans of its list; none where there is a refusal.
-        more: whether the list may go on.
-        refusal: why it found nothing.
+        plans: the first plans, best first; none where there is a refusal.
+        more: whether there may be further plans.
+        refusal: why there is no plan.
         climb: the hill climbing, if that was the method.
     """
 
@@ -106,7 +106,7 @@ class PlanOutcome:
     climb: ClimbReplay | None = None
 
     def added_to(self, results: PlanResults, maps: Maps) -> PlanResults:
-        """Return the results of a page with this outcome, which was made from those maps."""
+        """Return a page's plan results with this outcome and the maps that it was computed from."""
         if self.plans:
             return results.found(self.kind, self.plans, maps, more=self.more, climb=self.climb)
         assert self.refusal
@@ -138,30 +138,30 @@ class PlanService:
 
     def __init__(self, maps: MapService, folders: tuple[Path, ...]) -> None:
         self._maps, self._folders = maps, folders
-        self._list: Plans | None = None
+        self._plans: Plans | None = None
         self._scene: Scene | None = None
         self._progress: Progress | None = None
 
     def close(self) -> None:
-        """End the list of plans, which holds a physics world."""
-        if self._list:
-            self._list.close()
-            self._list = None
+        """End the planner, which holds a physics world."""
+        if self._plans:
+            self._plans.close()
+            self._plans = None
 
-    def plan(self, request: PlanRequest, known: Maps, progress: Progress) -> PlanOutcome:
+    def plan(self, request: PlanRequest, cached: Maps, progress: Progress) -> PlanOutcome:
         """Run a planner.
 
         Args:
             request: which planner for what.
-            known: those of the maps it takes that were computed before.
-            progress: told the finished share; may raise `Cancelled`.
+            cached: those of the maps it needs that were computed before.
+            progress: called with the finished share; may raise `Cancelled`.
 
         Raises:
             SceneError: the scene has nothing for that planner.
         """
         self.close()
         scene = moved(request.scene, request.poses)
-        results, progress = self._maps.maps(request.maps, known, progress)
+        results, progress = self._maps.maps(request.maps, cached, progress)
         maps = {key: result.map for key, result in results.items()}
         try:
             if request.method == "hill_climb":
@@ -170,9 +170,9 @@ class PlanService:
                 plan = plan_sequential(scene, request.name, maps, request.method, progress)
                 return PlanOutcome(request.kind, (plan_result(plan, scene),))
             self._progress, self._scene = progress, scene
-            self._list = self._new_list(request, scene, maps)
-            plans, more = self._next()
-            assert plans  # a planner that finds nothing says why
+            self._plans = self._start_planner(request, scene, maps)
+            plans, more = self._next_plans()
+            assert plans  # without a plan it raises NoPlanError
             return PlanOutcome(request.kind, plans, more)
         except NoPlanError as error:
             self.close()
@@ -180,18 +180,18 @@ class PlanService:
             return PlanOutcome(request.kind, refusal=Refusal(str(error), conflict))
 
     def more(self, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
-        """Return further plans of the last list, and whether there may be still more."""
+        """Return the next plans of the last planner, and whether there may be more."""
         self._progress = progress
-        return self._next()
+        return self._next_plans()
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
-        """Read a plan file and verify it; if it holds, return all that is needed to show it.
+        """Read and verify a plan file; if the plan holds, return all that is needed to show it.
 
-        Nothing of it is built before its references to files are known to be harmless.
+        The references to files in its scene are checked before anything is loaded.
 
         Raises:
             PlanError: the file is too large or is not a plan.
-            SceneError: its scene refers to files that an upload may not.
+            SceneError: its scene refers to files that an uploaded scene may not use.
         """
         self.close()
         if len(content) > PLAN_LIMIT:
@@ -210,37 +210,37 @@ class PlanService:
         self._maps.maps(requests, {}, lambda share: progress((1 + share) / 2))
         return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene))
 
-    def _new_list(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:
-        def tell(share: float) -> None:
-            assert self._progress  # that of the call under way, which may be `more`
+    def _start_planner(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:
+        def report_progress(share: float) -> None:
+            assert self._progress  # replaced by every call, so that `more` reports its own
             self._progress(share)
 
         if request.kind == "sequential":
-            return sequential_plans(scene, request.name, maps, tell)
+            return sequential_plans(scene, request.name, maps, report_progress)
         if request.kind == "bimanual":
-            return bimanual_plans(scene, request.name, maps, tell)
-        return handover_plans(scene, maps, tell)
+            return bimanual_plans(scene, request.name, maps, report_progress)
+        return handover_plans(scene, maps, report_progress)
 
-    def _next(self) -> tuple[tuple[PlanResult, ...], bool]:
-        if self._list is None or self._scene is None:
+    def _next_plans(self) -> tuple[tuple[PlanResult, ...], bool]:
+        if self._plans is None or self._scene is None:
             return (), False
         scene = self._scene
-        plans = tuple(plan_result(plan, scene) for plan in islice(self._list, LISTED))
-        more = len(plans) == LISTED
+        plans = tuple(plan_result(plan, scene) for plan in islice(self._plans, PLANS_PER_BATCH))
+        more = len(plans) == PLANS_PER_BATCH
         if not more:
             self.close()
         return plans, more
 
 
 def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: Progress) -> PlanOutcome:
-    """Climb, and search completely on the same maps to compare."""
+    """Run the hill climbing, and the complete search on the same maps to compare."""
     steps: list[ClimbStep] = []
-    found = exact = refusal = None
+    climbed = exact = refusal = None
     try:
         plan = plan_bimanual(
             scene, request.name, maps, "hill_climb", request.seed, progress=progress, trace=steps
         )
-        found = plan_result(plan, scene)
+        climbed = plan_result(plan, scene)
     except NoPlanError as error:
         refusal = Refusal(str(error))
     try:
@@ -248,9 +248,9 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
     except NoPlanError as error:
         refusal = Refusal(str(error))
     arms = request.tasks[0].arms
-    climb = ClimbReplay(request.name, arms, request.seed, tuple(steps), found, exact) if steps else None
-    if found:
-        return PlanOutcome(request.kind, (found,), climb=climb)
+    climb = ClimbReplay(request.name, arms, request.seed, tuple(steps), climbed, exact) if steps else None
+    if climbed:
+        return PlanOutcome(request.kind, (climbed,), climb=climb)
     return PlanOutcome(request.kind, refusal=refusal, climb=climb)
 
 

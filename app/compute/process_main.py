@@ -1,4 +1,4 @@
-"""The main loop of a process that computes for one session and has all of its PyBullet."""
+"""The main function of a process that computes for one session; only it runs PyBullet."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ REPORT_INTERVAL = 0.03
 
 
 def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
-    """Answer calls until the other end hangs up.
+    """Answer calls until the connection is closed.
 
     Args:
         pipe: to the process that started this one.
         folders: where the files of an uploaded scene may lie.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the server, which hangs up
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the server, which closes the pipe
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         _Server(Channel(pipe), folders).run()
     except (EOFError, OSError):
-        return  # the other end hung up
+        return  # the server closed the pipe
 
 
 def _end_with_parent() -> None:
-    """End at once, whatever is being computed, when the server is gone."""
+    """End this process as soon as the server has ended."""
     parent = parent_process()
     assert parent
     connection.wait([parent.sentinel])
@@ -69,7 +69,7 @@ class _Server:
     def run(self) -> None:
         while True:
             message = self._channel.receive()
-            if isinstance(message, Call):  # else it cancels a call that is over
+            if isinstance(message, Call):  # else it cancels a call that has ended
                 self._job_id, self._reported = message.job_id, 0.0
                 self._channel.send(self._answer(message))
 
@@ -81,12 +81,12 @@ class _Server:
             return Failure(Cancelled())
         except SymgraspError as error:
             return Failure(error)
-        except Exception as error:  # whatever a library raises is told
+        except Exception as error:  # the server reports whatever a library raises
             log.exception("a computation failed")
             return Failure(_portable(error))
 
     def _map(self, request: MapRequest, progress: Progress) -> None:
-        self._maps.map(request, progress)  # sent already
+        self._maps.map(request, progress)  # it is sent as a ComputedMap
 
     def _progress(self, share: float) -> None:
         while self._channel.poll():
@@ -99,7 +99,7 @@ class _Server:
 
 
 def _portable(error: Exception) -> Exception:
-    """Return an error that arrives: some cannot be pickled, or not be built again."""
+    """Return an error that can be pickled and unpickled: itself, or one with the same text."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:

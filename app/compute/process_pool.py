@@ -1,4 +1,4 @@
-"""Starts the processes that compute, and keeps one ready."""
+"""Starts the processes that compute, and keeps a spare one ready."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ SPAWN = multiprocessing.get_context("spawn")
 
 
 class WorkerProcess:
-    """A process that answers calls, and the channel to it.
+    """A process that answers calls, and the channel to it; started at once.
 
     Args:
         folders: where the files of an uploaded scene may lie.
 
     Attributes:
         channel: to the process.
-        job_id: that of the last call.
+        job_id: number of the last call.
         cancelled_at: when (s, monotonic) that call was cancelled, if it has not ended since.
     """
 
@@ -41,17 +41,24 @@ class WorkerProcess:
 
     @property
     def pid(self) -> int:
-        """Number of the process."""
+        """Process id."""
         assert self._process.pid
         return self._process.pid
 
     @property
     def is_alive(self) -> bool:
-        """Whether it runs."""
+        """Whether the process runs."""
         return self._process.is_alive()
 
     def end(self, grace: float = 0.0) -> str:
-        """End it, whatever it does, after it had some time (s); return how it ended by itself, if it did."""
+        """Kill the process.
+
+        Args:
+            grace: time (s) in which it may end by itself first.
+
+        Returns:
+            Signal or exit code by which it ended itself; empty if it was killed.
+        """
         self._process.join(grace)
         code = self._process.exitcode
         self._process.kill()
@@ -61,9 +68,7 @@ class WorkerProcess:
 
 
 class ProcessPool:
-    """Starts processes; keeps one ready that has imported everything, as that takes a second or two.
-
-    May be used from any thread.
+    """Starts processes and keeps a spare one, since the imports take a second or two; thread-safe.
 
     Args:
         folders: where the files of an uploaded scene may lie.
@@ -76,13 +81,13 @@ class ProcessPool:
         self._closed = False
 
     def prepare(self) -> None:
-        """Start a process for later, unless there is one."""
+        """Start the spare process, unless there is one."""
         with self._lock:
             if self._spare is None and not self._closed:
                 self._spare = WorkerProcess(self._folders)
 
     def take(self) -> WorkerProcess:
-        """Return a process; it belongs to the caller, who ends it."""
+        """Return the spare process or a new one; the caller has to end it."""
         with self._lock:
             process, self._spare = self._spare, None
             if process and not process.is_alive:
@@ -93,7 +98,7 @@ class ProcessPool:
         return process
 
     def close(self) -> None:
-        """End the process that was kept ready."""
+        """End the spare process."""
         with self._lock:
             self._closed = True
             if self._spare:

@@ -1,4 +1,4 @@
-"""The first map of a server, computed before anybody asks for it."""
+"""Computes the first map of a server before the first browser connects."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ __all__ = ["compute_first_map"]
 
 log = logging.getLogger(__name__)
 
-PATIENCE = 5.0
-"""How long (s) people wait for the first map before the page opens without it."""
+TIME_LIMIT = 5.0
+"""Time (s) after which the server starts without the first map."""
 
 
 def compute_first_map(cache: SharedCache) -> None:
-    """Compute the first map of the first scene, unless that takes too long to wait for.
+    """Compute the first map of the first scene, unless that takes longer than `TIME_LIMIT`.
 
-    What goes wrong is left for the page to say.
+    Errors are only logged: the page computes the map again and shows them.
     """
     scene = cache.scene(cache.first)
     task = scene.task()
-    begun: list[float] = []
+    times: list[float] = []
 
     def progress(share: float) -> None:
-        begun.append(time.monotonic())  # first called when everything is compiled
-        if begun[-1] - begun[0] > PATIENCE and share < 1:
+        times.append(time.monotonic())  # the first call comes after compiling
+        if times[-1] - times[0] > TIME_LIMIT and share < 1:
             raise Cancelled
 
     maps = MapService(cache.keep)

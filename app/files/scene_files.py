@@ -1,9 +1,8 @@
-"""Scenes as files of the page: written as they were changed, and read without trusting them.
+"""Scenes as files of the page: saving a changed scene, and reading an uploaded one safely.
 
-An uploaded scene comes from whoever uses the page, so it must not make the server read whatever
-lies on its machine. It may refer to files that installed Python packages ship (``package://…``) and
-to files in the server's own folders of scenes; anything else is refused, and the refusal does not
-tell whether there is such a file.
+An uploaded scene is not trusted: it must not make the server read arbitrary files. It may refer to
+files that installed Python packages ship (``package://…``) and to files in the server's own folders
+of scenes; anything else is an error, which does not reveal whether there is such a file.
 """
 
 from __future__ import annotations
@@ -25,15 +24,16 @@ from ..state.uploaded_scene import UploadedScene
 __all__ = ["SCENE_LIMIT", "read_scene", "refuse_foreign_files", "scene_yaml"]
 
 SCENE_LIMIT = 1_000_000
-"""Largest scene file (bytes) that is looked at."""
+"""Largest scene file (bytes) that is read."""
 
 MAX_NAME = 100
+"""Characters of a file name that are kept."""
 
 SHIPPED = f"package://{SCENES_DIR.name}/"
 
 
 def scene_yaml(scene: Scene) -> str:
-    """Write a scene so that the page and the command line read the same scene again.
+    """Return a scene as a YAML document that the page and the command line read back as the same scene.
 
     Files that come with this software are written as ``package://``; others keep their absolute
     paths, and the first lines say so.
@@ -62,7 +62,7 @@ def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> UploadedSc
     Args:
         name: of the file.
         content: what it holds.
-        folders: where the server's own scenes lie; relative paths are sought there, in this order.
+        folders: of the server's own scenes; relative paths are looked up there, in this order.
 
     Raises:
         SceneError: the file is too large or no scene, or refers to a file that it may not.
@@ -89,12 +89,12 @@ def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> UploadedSc
 
 
 def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable[Path]) -> None:
-    """Refuse the content of a scene that came with a plan if it refers to a file that it may not.
+    """Raise an error if the scene in an uploaded plan refers to a file that it may not use.
 
-    A plan is checked as it is written, so its paths have to be absolute.
+    A plan is verified exactly as written, so its paths have to be absolute.
 
     Raises:
-        SceneError: it does, or is no content of a scene.
+        SceneError: it does, or the content is no scene.
     """
     try:
         plain = SceneFile.model_validate(content).model_dump(mode="json", exclude_none=True)
@@ -109,10 +109,10 @@ def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable
 
 
 def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> Path | str:
-    """Return where an allowed reference leads; packages stay references."""
+    """Return the path of an allowed reference; one into a package is returned unchanged."""
     if reference.startswith("package://"):
         package = package_dir(reference.removeprefix("package://").partition("/")[0])
-        # A folder beside which the server happens to run passes for a package without code.
+        # A folder in the working directory would pass for a namespace package: require code in it.
         if package and ((package / "__init__.py").is_file() or package.resolve() == SCENES_DIR):
             path = _inside(resolve(reference, package), [package.resolve()])
             if path:
@@ -127,7 +127,7 @@ def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> Path
 
 
 def _inside(path: Path | None, roots: list[Path]) -> Path | None:
-    """Return the path with every link and ``..`` followed, if it leads into one of the folders."""
+    """Return the path with links and ``..`` resolved, if it is inside one of the folders, else None."""
     if path is None:
         return None
     path = path.resolve()
@@ -135,7 +135,7 @@ def _inside(path: Path | None, roots: list[Path]) -> Path | None:
 
 
 def _references(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], str]]:
-    """Give all references to files in the content of a scene: field, the mapping it is in, its key."""
+    """Yield every reference to a file in the content of a scene: field, the mapping it is in, its key."""
     holders: list[tuple[str, dict[str, Any]]] = [("object", content["object"])]
     for i, robot in enumerate(content["robots"]):
         holders.append((f"robots[{i}]", robot))

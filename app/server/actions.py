@@ -1,4 +1,4 @@
-"""What widgets ask for besides plans: scenes, objects, hands, files, links."""
+"""The actions of one browser besides those about plans: scenes, objects, hands, files, links."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ SceneWithObject = tuple[Scene, ObjectChoice | None]
 
 
 class Actions:
-    """What the widgets of one browser ask for; see `app.panels.actions.Actions`.
+    """The actions of one browser; see `app.panels.actions.Actions`.
 
     Args:
         session: the browser's session.
         client: the browser.
         cache: what all sessions share.
-        process: computes for this one.
-        address: where the page was opened, without the query.
+        process: computes for this session.
+        address: that the page was opened at, without the query.
     """
 
     def __init__(
@@ -59,13 +59,13 @@ class Actions:
     # -- scene, object, hand ----------------------------------------------------------------
 
     def open_scene(self, name: str) -> None:
-        """Load a scene by name, or show the uploaded one again."""
+        """Open a scene by its name in the menu, which may be that of the uploaded one."""
         state = self._session.state
         uploaded = state.uploaded_scene if state else None
-        known = uploaded.scene if uploaded and uploaded.option == name else None
+        chosen = uploaded.scene if uploaded and uploaded.option == name else None
         self._session.submit(
             f"Loading {name}",
-            lambda _: known or self._cache.scene(name),
+            lambda _: chosen or self._cache.scene(name),
             lambda state, scene: changes.open_scene(state, scene, name),
         )
 
@@ -81,12 +81,12 @@ class Actions:
         self._session.submit(f"Opening {name}", run, changes.open_upload)
 
     def choose_object(self, option: str) -> None:
-        """Put another object into the scene."""
+        """Replace the scene's object by an option of the menu."""
         if state := self._session.state:
             self._change_object(f"Loading {option}", partial(self._with_option, state, option))
 
     def upload_object(self, name: str, content: bytes, scale: float) -> None:
-        """Measure a mesh and put the object into the scene."""
+        """Measure an uploaded mesh and put the object into the scene; one unit of it is ``scale`` metres."""
         state = self._session.state
         if state is None:
             return
@@ -112,7 +112,7 @@ class Actions:
 
     def _change_object(self, label: str, run: Callable[[], SceneWithObject]) -> None:
         self._session.submit(
-            label, lambda _: run(), lambda state, found: changes.choose_object(state, *found)
+            label, lambda _: run(), lambda state, result: changes.choose_object(state, *result)
         )
 
     def _with_option(self, state: State, option: str) -> SceneWithObject:
@@ -127,13 +127,13 @@ class Actions:
         return _with_object(state, shared or from_library(option))
 
     def _as_opened(self, state: State) -> Scene:
-        """Return the scene as it was opened, without what became of its object, hands and tasks since."""
+        """Return the scene as it was opened, with its own object, hands and tasks."""
         return state.shown_upload or self._cache.scene(state.scene_name)
 
     # -- computing --------------------------------------------------------------------------
 
     def stop_or_retry(self) -> None:
-        """Stop the computation, the picture stays as it is; or begin again what was stopped."""
+        """Cancel the computation under way, or restart the one that was cancelled or failed."""
 
         def stop_or_retry(state: State) -> State:
             if state.busy:
@@ -145,7 +145,7 @@ class Actions:
     # -- files ------------------------------------------------------------------------------
 
     def save_map(self, kind: str) -> None:
-        """Send the map as it is shown to the browser; see `app.render.map_picture.FORMATS`."""
+        """Send the map that is shown as a picture, in a format of `app.render.map_picture.FORMATS`."""
         state = self._session.state
         if state is None:
             return
@@ -157,13 +157,13 @@ class Actions:
         self._session.send(picture_name(state, kind), content)
 
     def save_scene(self) -> None:
-        """Send the scene, as it was changed, to the browser."""
+        """Send the scene with all changes to the browser as a YAML file."""
         if state := self._session.state:
             scene = state.moved_scene()
             self._session.send(_file_name(scene.name, ".yaml"), scene_yaml(scene).encode())
 
     def make_link(self) -> None:
-        """Put what is shown into an address."""
+        """Make a link that opens the page as it is."""
 
         def make(state: State) -> State:
             camera = camera_of(self._client)
@@ -173,7 +173,7 @@ class Actions:
         self.change(make)
 
     def save_3d_view(self) -> None:
-        """Draw the 3D view into a file, and send it to the browser."""
+        """Send the 3D view to the browser as an HTML file."""
         state = self._session.state
         if state is None:
             return
@@ -191,7 +191,7 @@ class Actions:
 
 
 def camera_of(client: viser.ClientHandle) -> Camera:
-    """Return where a browser's camera stands and the point it looks at."""
+    """Return the position of a browser's camera and the point it looks at."""
     camera = client.camera
     return tuple(float(v) for v in (*camera.position, *camera.look_at))
 

@@ -1,4 +1,4 @@
-"""Who is here: every browser gets a session of its own once it came in through the front door."""
+"""The sessions of a server: one for each browser that has loaded the page through the proxy."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ def open_lobby(cache: SharedCache, host: str, port: int) -> Iterator[Lobby]:
         OSError: the port cannot be listened on.
     """
     server = quiet_server()
-    reception = Lobby(cache, lambda client_id: client_id in server.get_clients())
-    server.on_client_connect(reception.arrived)
-    server.on_client_disconnect(reception.left)
+    lobby = Lobby(cache, lambda client_id: client_id in server.get_clients())
+    server.on_client_connect(lobby.connected)
+    server.on_client_disconnect(lobby.disconnected)
     try:
-        door = Proxy(host, port, server.get_port(), reception.visited)
+        proxy = Proxy(host, port, server.get_port(), lobby.visited)
         try:
-            yield reception
+            yield lobby
         finally:
-            door.close()
+            proxy.close()
     finally:
-        reception.close()
+        lobby.close()
         server.stop()
 
 
@@ -50,20 +50,20 @@ class Lobby:
     """Opens and closes the sessions of a server; its methods may be called from any thread.
 
     Args:
-        store: what all sessions share.
-        is_here: whether the browser of that number is still connected.
+        cache: what all sessions share.
+        is_here: called with a client id; returns whether that browser is still connected.
     """
 
-    def __init__(self, cache: SharedCache, is_here: Callable[[int], bool]) -> None:
-        self._cache, self._is_here = cache, is_here
+    def __init__(self, cache: SharedCache, is_connected: Callable[[int], bool]) -> None:
+        self._cache, self._is_connected = cache, is_connected
         self._pool = ProcessPool(cache.folders)
         self._lock = threading.Condition()
         self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
         self._sessions: dict[int, Session] = {}
 
     @property
-    def open(self) -> int:
-        """How many sessions there are."""
+    def session_count(self) -> int:
+        """How many sessions are open."""
         return len(self._sessions)
 
     def wait_until_empty(self, timeout: float | None = None) -> bool:
@@ -71,36 +71,42 @@ class Lobby:
         with self._lock:
             return self._lock.wait_for(lambda: not self._sessions, timeout)
 
-    def arrived(self, client: viser.ClientHandle) -> None:
-        """A browser connected to viser: ask it to come in through the door, and show something meanwhile."""
+    def connected(self, client: viser.ClientHandle) -> None:
+        """Handle a browser that connected to viser: have it load the picture with a new token."""
         token = secrets.token_urlsafe(24)
         client.gui.set_panel_label("symgrasp")
         client.gui.configure_theme(show_logo=False, show_share_button=False)
         with self._lock:
-            greeting = client.gui.add_html(
+            placeholder = client.gui.add_html(
                 f'<div style="{STYLE}">Loading …<img src="{HELLO}{token}" alt="" width="1" height="1"></div>'
             )
-            self._waiting[token] = client, greeting
+            self._waiting[token] = client, placeholder
 
     def visited(self, visit: Visit) -> bool:
-        """A browser came in: open its session, unless it is a stranger or was served already."""
+        """Handle a browser that loaded its picture through the proxy: open its session.
+
+        Returns:
+            Whether the token belongs to a browser that waits for its session.
+        """
         with self._lock:
-            if (known := self._waiting.pop(visit.token, None)) is None:
+            if (waiting := self._waiting.pop(visit.token, None)) is None:
                 return False
-        threading.Thread(target=self._open, args=(*known, visit), daemon=True).start()
+        threading.Thread(target=self._open, args=(*waiting, visit), daemon=True).start()
         return True
 
-    def left(self, client: viser.ClientHandle) -> None:
-        """A browser disconnected."""
+    def disconnected(self, client: viser.ClientHandle) -> None:
+        """Handle a browser that disconnected: close its session."""
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
             self._lock.notify_all()
-            self._waiting = {t: known for t, known in self._waiting.items() if known[0] is not client}
+            self._waiting = {
+                token: waiting for token, waiting in self._waiting.items() if waiting[0] is not client
+            }
         if session:
             session.close()
 
     def close(self) -> None:
-        """Close all sessions."""
+        """Close all sessions and the pool of processes."""
         with self._lock:
             sessions, self._sessions = list(self._sessions.values()), {}
             self._waiting.clear()
@@ -109,9 +115,9 @@ class Lobby:
             session.close()
         self._pool.close()
 
-    def _open(self, client: viser.ClientHandle, greeting: viser.GuiHtmlHandle, visit: Visit) -> None:
+    def _open(self, client: viser.ClientHandle, placeholder: viser.GuiHtmlHandle, visit: Visit) -> None:
         try:
-            greeting.remove()
+            placeholder.remove()
             self._pool.prepare()
             session = Session(client, self._cache, self._pool, visit)
         except Exception as error:
@@ -124,5 +130,5 @@ class Lobby:
             return
         with self._lock:
             self._sessions[client.client_id] = session
-        if not self._is_here(client.client_id):  # gone while its session was made
-            self.left(client)
+        if not self._is_connected(client.client_id):  # it disconnected while its session was opened
+            self.disconnected(client)

@@ -1,4 +1,4 @@
-"""The 3D view of a map or a plan as one HTML document, for notebooks and scripts: what viser writes down."""
+"""The 3D view of a map or a plan as one HTML document, for notebooks and scripts."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from .snapshot import snapshot_html
 __all__ = ["map_html", "plan_html"]
 
 ASPECT = 1.6
-"""Width by height that the view is framed for."""
+"""Ratio of width to height that the camera is placed for."""
 
 HEIGHT = 400
 """Height (px) of the view of each task of a plan."""
 
 
 def map_html(m: FeasibilityMap, scene: Scene) -> str:
-    """Draw a map on the object, with the arm at home.
+    """Return the HTML document of a map on its object, with the arm at home.
 
     Args:
         m: the map, of a task of the scene.
@@ -44,15 +44,15 @@ def map_html(m: FeasibilityMap, scene: Scene) -> str:
 
 
 def plan_html(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap]) -> str:
-    """Draw every task of a plan: the turned object, and the arms that hold it.
+    """Return the HTML document of every task of a plan: the turned object and the arms that hold it.
 
     Args:
         plan: the plan.
         scene: its scene.
         maps: (task, arm) → map, of every task and arm of the plan.
     """
-    known = {(task, arm): MapResult(MapRequest(scene, arm, task), m) for (task, arm), m in maps.items()}
-    results = PlanResults().found(plan.kind, (plan_result(plan, scene),), known, more=False)
+    map_results = {(task, arm): MapResult(MapRequest(scene, arm, task), m) for (task, arm), m in maps.items()}
+    results = PlanResults().found(plan.kind, (plan_result(plan, scene),), map_results, more=False)
     state = show_results(State.of(scene, scene.name), results)
     views = [
         f"<h3>{escape(task.name)}</h3>"

@@ -1,4 +1,4 @@
-"""What widgets ask for about plans: planning, listing, opening and downloading."""
+"""The actions about plans: running planners, listing more plans, opening and downloading files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["PlanActions"]
 
 
 class PlanActions:
-    """Plans for one browser; see `app.panels.actions.PlanActions`.
+    """The actions about plans of one browser; see `app.panels.actions.PlanActions`.
 
     Args:
         session: the browser's session.
@@ -32,7 +32,7 @@ class PlanActions:
         self._session, self._process, self._cache = session, process, cache
 
     def run(self, kind: PlanKind, method: str = "") -> None:
-        """Run a planner, with the method chosen for it unless another is asked for."""
+        """Run a planner, with the method chosen on the page unless one is given."""
         state = self._session.state
         if state is None:
             return
@@ -42,29 +42,29 @@ class PlanActions:
         elif kind == "sequential":
             method = method or results.sequence_method
         request = PlanRequest(state.scene, kind, method, name, state.poses, results.seed)
-        known = {(r.task, r.arm): result for r in request.maps if (result := self._cache.map(r))}
+        cached = {(r.task, r.arm): result for r in request.maps if (result := self._cache.map(r))}
 
         self._session.submit(
             "Planning",
-            lambda progress: self._process.plan(request, known, progress),
-            lambda state, found: show_results(state, found[0].added_to(state.plan_results, found[1])),
+            lambda progress: self._process.plan(request, cached, progress),
+            lambda state, result: show_results(state, result[0].added_to(state.plan_results, result[1])),
         )
 
     def list_more(self) -> None:
-        """List further plans."""
+        """Compute further plans and add them to the list."""
         state = self._session.state
         if state is None or not state.plan_results.more:
             return
         self._session.submit(
-            "Listing more solutions", self._process.more, lambda state, found: more_listed(state, *found)
+            "Listing more solutions", self._process.more, lambda state, result: more_listed(state, *result)
         )
 
     def open_file(self, name: str, content: bytes) -> None:
-        """Verify a plan that was uploaded, and show it if it holds."""
+        """Verify an uploaded plan file, and show the plan if it holds."""
         self._session.submit(
             f"Verifying {name}",
             lambda progress: self._process.open(content, name, progress),
-            lambda state, found: opened(state, *found),
+            lambda state, result: show_opened_plan(state, *result),
         )
 
     def download(self, format_name: str) -> None:
@@ -77,12 +77,12 @@ class PlanActions:
             self._session.send(name + ending, write(plan).encode())
 
 
-def opened(state: State, found: OpenedPlan, maps: Maps) -> State:
-    """Show a plan from a file, with its scene; one that does not hold is only reported."""
-    report, plan = found.report, found.plan
-    if found.scene is None or plan is None:
+def show_opened_plan(state: State, opened: OpenedPlan, maps: Maps) -> State:
+    """Show a plan from a file with its scene, or only the report where it does not hold."""
+    report, plan = opened.report, opened.plan
+    if opened.scene is None or plan is None:
         return replace(state, plan_results=replace(state.plan_results, opened=report))
     chosen = state.plan_results
     results = PlanResults(chosen.sequence_method, chosen.hands_method, chosen.seed)
     results = replace(results.found(plan.plan.kind, (plan,), maps, more=False), opened=report)
-    return show_results(open_upload(state, found.scene), results)
+    return show_results(open_upload(state, opened.scene), results)

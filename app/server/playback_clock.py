@@ -1,4 +1,4 @@
-"""When the playback of a page goes on, and by how much."""
+"""The timing of a page's playback."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..state.state import State
 __all__ = ["PlaybackClock"]
 
 INTERVAL = 0.05
-"""Time (s) between two pictures of what is played."""
+"""Time (s) between two frames of the playback."""
 
 
 class PlaybackClock:
@@ -18,18 +18,18 @@ class PlaybackClock:
         self._last: float | None = None
 
     def wait(self, state: State | None, now: float) -> float | None:
-        """Return how long (s) until the playback goes on, None while nothing is played.
+        """Return the time (s) until the next frame is due, None while nothing is played.
 
         Args:
             state: what is shown.
-            now: the time (s), from any beginning.
+            now: the time (s) of a monotonic clock.
         """
         if state is None or not state.plan_results.playing:
             return None
         return max(0.0, INTERVAL - (now - self._last)) if self._last is not None else 0.0
 
     def advanced(self, state: State, now: float) -> State:
-        """Return the state with its playback where it is at a time (s), if it is due to go on."""
+        """Return the state with its playback advanced to a time (s), if a frame is due."""
         if not state.plan_results.playing:
             self._last = None
         elif self._last is None:  # it has just begun

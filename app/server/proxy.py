@@ -1,15 +1,15 @@
-"""What stands between browsers and viser: lets in only what comes from this server's own page.
+"""The proxy between browsers and viser: it passes on only what comes from this server's own page.
 
-viser accepts a websocket from any web page and does not tell which address a browser has opened.
-So viser listens on a port of its own on this machine, and this door, on the port that people know,
-passes connections on to it. It refuses
+viser accepts a websocket from any web page and does not say which address a browser has opened.
+So viser listens on a port of its own on this machine, and this proxy, the server's front door,
+listens on the public port and passes connections on to it. It refuses
 
 * websockets that a page of another origin opens (the ``Origin`` header names another host),
 * on a loopback address, requests for another host's name (DNS rebinding).
 
-Whoever finds viser's own port meets an empty page: a browser is served after it has loaded a
-picture with a secret name through the door, from a page of the door's own. That request also
-carries, as its ``Referer``, the address that was opened.
+viser's own port alone serves an empty page: a browser gets a session after it has loaded a picture
+with a secret token in its path through the proxy, from a page of the same origin. The ``Referer``
+of that request is the address that was opened.
 """
 
 from __future__ import annotations
@@ -25,25 +25,26 @@ from urllib.parse import urlsplit, urlunsplit
 __all__ = ["HELLO", "Proxy", "Visit", "is_foreign"]
 
 HELLO = "/hello/"
-"""Where the picture is; its secret name comes after."""
+"""Path of the picture, followed by its secret token."""
 
 HEAD_LIMIT = 1 << 16
 """Largest head of a request (bytes)."""
 
-HEAD_SECONDS = 20.0
-"""How long a browser may take to say what it wants."""
+HEAD_TIMEOUT = 20.0
+"""Time (s) within which the head of a request must arrive."""
 
 CHUNK = 1 << 16
+"""Most bytes that are copied at a time."""
 
 PICTURE = b'<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
 
 
 @dataclass(frozen=True)
 class Visit:
-    """A browser that came in through the door.
+    """A browser that loaded its picture through the proxy.
 
     Attributes:
-        token: the secret name it knew.
+        token: the secret token in the path of the picture.
         query: what stood behind the ``?`` of the address it opened.
         address: the address without that.
     """
@@ -60,23 +61,19 @@ class _Request:
 
     @staticmethod
     def parse(head: bytes) -> _Request:
-        """Take the head of a request apart; names of headers in lower case."""
+        """Parse the head of a request; names of headers become lower case."""
         first, *lines = head.decode("latin-1").split("\r\n")
         _, path, _ = first.split(" ", 2)
         pairs = (line.partition(":") for line in lines if line)
         return _Request(path, {name.strip().lower(): value.strip() for name, _, value in pairs})
 
-    @property
-    def is_websocket(self) -> bool:
-        return self.headers.get("upgrade", "").lower() == "websocket"
-
 
 def is_foreign(headers: Mapping[str, str], *, loopback: bool) -> bool:
-    """Whether a request comes from a page of another origin, or asks for another host.
+    """Return whether a request comes from a page of another origin, or names another host.
 
     Args:
         headers: of the request, names in lower case.
-        loopback: whether the door is only open to this machine.
+        loopback: whether the proxy listens on a loopback address only.
     """
     host = headers.get("host", "")
     if loopback and not _is_loopback(urlsplit(f"//{host}").hostname or ""):
@@ -86,7 +83,7 @@ def is_foreign(headers: Mapping[str, str], *, loopback: bool) -> bool:
 
 
 def _is_own_picture(headers: Mapping[str, str]) -> bool:
-    """Whether a picture is loaded by a page of the same origin: browsers say so in one of two headers."""
+    """Return whether a page of the same origin loads the picture, by one of two headers of browsers."""
     if "sec-fetch-site" in headers:
         return headers["sec-fetch-site"] == "same-origin"
     return urlsplit(headers.get("referer", "")).netloc == headers.get("host")
@@ -102,19 +99,19 @@ def _is_loopback(name: str) -> bool:
 
 
 class Proxy:
-    """Passes connections on; runs on a thread of its own until closed.
+    """A reverse proxy for viser; runs on a thread of its own until closed.
 
     Args:
-        host, port: where people connect to.
-        inner: port that viser listens on, on 127.0.0.1.
-        on_visit: told about a browser that came in; gives whether its token is known.
+        host, port: the public address to listen on.
+        viser_port: port that viser listens on, on 127.0.0.1.
+        on_visit: called when a browser loads its picture; returns whether its token is valid.
 
     Raises:
         OSError: the port cannot be listened on.
     """
 
-    def __init__(self, host: str, port: int, inner: int, on_visit: Callable[[Visit], bool]) -> None:
-        self._inner, self._on_visit = inner, on_visit
+    def __init__(self, host: str, port: int, viser_port: int, on_visit: Callable[[Visit], bool]) -> None:
+        self._viser_port, self._on_visit = viser_port, on_visit
         self._loopback = _is_loopback(host)
         self._loop = asyncio.new_event_loop()
         try:
@@ -124,11 +121,11 @@ class Proxy:
         except OSError:
             self._loop.close()
             raise
-        self._thread = threading.Thread(target=self._loop.run_forever, name="front door", daemon=True)
+        self._thread = threading.Thread(target=self._loop.run_forever, name="proxy", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Close the door and every connection through it."""
+        """Stop listening and close every connection."""
 
         async def end() -> None:
             self._server.close()
@@ -144,21 +141,21 @@ class Proxy:
 
     async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
-            head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), HEAD_SECONDS)
+            head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), HEAD_TIMEOUT)
             request = _Request.parse(head)
             if is_foreign(request.headers, loopback=self._loopback):
                 _reply(writer, "403 Forbidden", b"this page may only be opened by its own address\n")
             elif request.path.startswith(HELLO):
-                self._greet(request, writer)
+                self._serve_picture(request, writer)
             else:
                 await self._pass_on(head, reader, writer)
             await writer.drain()
         except (OSError, ValueError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
-            pass  # a browser that went away, or something that speaks no HTTP
+            pass  # the browser disconnected, or it is no HTTP
         finally:
             writer.close()
 
-    def _greet(self, request: _Request, writer: asyncio.StreamWriter) -> None:
+    def _serve_picture(self, request: _Request, writer: asyncio.StreamWriter) -> None:
         opened = urlsplit(request.headers.get("referer", "/"))
         address = urlunsplit((opened.scheme, opened.netloc, opened.path, "", ""))
         visit = Visit(request.path.removeprefix(HELLO), opened.query, address)
@@ -168,12 +165,12 @@ class Proxy:
             _reply(writer, "404 Not Found", b"")
 
     async def _pass_on(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Connect to viser and copy both ways until either side is done."""
-        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self._inner)
+        """Connect to viser and copy in both directions until either side closes."""
+        viser_reader, viser_writer = await asyncio.open_connection("127.0.0.1", self._viser_port)
         try:
-            inner_writer.write(head)
-            ways = [_copy(reader, inner_writer), _copy(inner_reader, writer)]
-            tasks = [asyncio.create_task(way) for way in ways]
+            viser_writer.write(head)
+            copies = [_copy(reader, viser_writer), _copy(viser_reader, writer)]
+            tasks = [asyncio.create_task(copy) for copy in copies]
             try:
                 await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             finally:
@@ -181,7 +178,7 @@ class Proxy:
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
         finally:
-            inner_writer.close()
+            viser_writer.close()
 
 
 async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -1,4 +1,4 @@
-"""Serving the page until it is interrupted."""
+"""The server's main function."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ def serve(scene: str, host: str, port: int) -> None:
     """
     _check_free(host, port)
     cache = _warm_cache(scene)
-    # A browser may leave while something is drawn for it.
+    # A browser may disconnect while something is drawn for it.
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     try:
         with open_lobby(cache, host, port):
             shown = f"[{host}]" if ":" in host else host
             print(f"symgrasp: http://{shown}:{port}", flush=True)
             threading.Event().wait()
-    except OSError as error:  # taken meanwhile
+    except OSError as error:  # the port was taken since the check
         raise _busy(port, (error.strerror or str(error)).lower()) from error
     except KeyboardInterrupt:
         print("\nsymgrasp: stopped", flush=True)
 
 
 def _warm_cache(scene: str) -> SharedCache:
-    """Return the cache with the first map in it, so that whoever opens the page finds it there."""
+    """Return the cache with the first map in it, so that the page opens with its map."""
     with notify_on_compile(lambda: print(f"symgrasp: {COMPILING_MESSAGE} …", file=sys.stderr, flush=True)):
         cache = SharedCache(scene)
         compute_first_map(cache)

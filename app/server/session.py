@@ -36,9 +36,10 @@ __all__ = ["Session"]
 log = logging.getLogger(__name__)
 
 LATE = 0.25
-"""Computations longer than this (s) are spoken of; others are over before one could read it."""
+"""Computations longer than this (s) are shown as running; a note about shorter ones could not be read."""
 
 Run = Callable[[Progress], Any]
+"""Computes a result; may raise `Cancelled` through its progress."""
 
 
 class Session:
@@ -46,7 +47,7 @@ class Session:
 
     Callbacks of widgets only change the state, which takes no time, so they never queue up. One thread
     draws the newest state, skipping those in between; another runs the jobs. Every new state goes
-    through `_commit`, which also looks up or starts what it is missing.
+    through `_commit`, which also looks up or starts the computation of what it is missing.
 
     Args:
         client: the browser.
@@ -79,11 +80,11 @@ class Session:
             raise
 
     def _build_page(self) -> None:
-        """Put everything on the page and begin to draw."""
+        """Add everything to the page, start the drawing thread, and open the first scene."""
         client = self.client
         self.actions = Actions(self, client, self.cache, self.process, self.visit.address)
         self.layout = Layout(client, self.actions, self.cache.names)
-        self.view = SceneView(
+        self.scene_view = SceneView(
             client,
             self.layout.view_width,
             on_surface=lambda i, j: self.change(lambda s: changes.choose_surface_cell(s, i, j)),
@@ -93,10 +94,10 @@ class Session:
 
         @client.camera.on_update
         async def _(_: viser.CameraHandle) -> None:
-            self.view.camera_moved(camera_of(client))
+            self.scene_view.camera_moved(camera_of(client))
             self.change(lambda s: changes.seen_from(s, camera_of(client)))
 
-        name = f"painter {client.client_id}"
+        name = f"draw {client.client_id}"
         threading.Thread(target=self._draw_until_closed, name=name, daemon=True).start()
         self._open_first()
 
@@ -154,13 +155,13 @@ class Session:
         if before is not None:
             state = remember(before, state, origin, time.monotonic())
         if before is None or state.input_values != before.input_values:
-            # What is being written now may just have been written over what a person entered.
+            # A write of the inputs that is under way may have overwritten what a person just entered.
             self._write_inputs |= origin != "inputs" or self._writing
             self._move_gizmo |= origin != "gizmo"
         while (request := state.next_request) is not None:
-            known = self.cache.map(request) if isinstance(request, MapRequest) else None
-            if known:
-                state = replace(state, busy=None, result=known)
+            cached = self.cache.map(request) if isinstance(request, MapRequest) else None
+            if cached:
+                state = replace(state, busy=None, result=cached)
             else:
                 state, job = self._begin(state, request)
         if state.is_obsolete:
@@ -182,7 +183,7 @@ class Session:
             label, arrived = f"Computing the map of {request.task}", job_changes.map_arrived
             run: Run = lambda progress: process.map(request, progress)  # noqa: E731
         elif isinstance(request, CompareRequest):
-            assert state.result  # the one that is compared with is shown
+            assert state.result  # a comparison is requested only while its map is shown
             label, shown = f"Recomputing the map of {request.map.task}", state.result.map
             run = lambda progress: process.compare(request, shown, progress)  # noqa: E731
         else:
@@ -208,7 +209,7 @@ class Session:
         )
 
     def _open_first(self) -> None:
-        """Show what the address says; if that cannot be done, `_failed` shows the first scene and why not."""
+        """Open what the address says; if that fails, `_failed` opens the first scene and shows the reason."""
 
         def run(_: Progress) -> tuple[State, Camera | None]:
             link = Link.parse(self.visit.query)
@@ -216,8 +217,8 @@ class Session:
             name = link.scene or self.cache.first
             return link.apply(replace(State.of(scene, name), object_choice=choice)), link.camera
 
-        def done(found: tuple[State, Camera | None]) -> None:
-            state, self.view.camera = found
+        def done(result: tuple[State, Camera | None]) -> None:
+            state, self.scene_view.camera = result
             with self._changed:
                 self._commit(state)
 
@@ -225,7 +226,7 @@ class Session:
 
     def _failed(self, job_id: int, problem: str) -> None:
         with self._changed:
-            self._write_inputs = True  # a scene that could not be loaded is still chosen in its widget
+            self._write_inputs = True  # the dropdown still shows the scene that could not be loaded
             if self.state is not None:
                 self._commit(job_changes.stopped(self.state, job_id, problem))
                 return
@@ -253,17 +254,17 @@ class Session:
         return self._closed or self.state is not self._drawn
 
     def _play(self) -> None:
-        """Let what is played go on; the lock is held."""
+        """Advance the playback; the lock is held."""
         if self.state is not None:
             self._commit(self._playback.advanced(self.state, time.monotonic()), "play")
 
     def _draw(self, state: State, *, write_inputs: bool, move_gizmo: bool) -> None:
         try:
             self.layout.show(state, write_inputs=write_inputs)
-            self.view.show(state, move_gizmo=move_gizmo)
-        except Exception as error:  # one bad picture must not end the page
+            self.scene_view.show(state, move_gizmo=move_gizmo)
+        except Exception as error:  # must not end the drawing thread
             log.exception("a picture could not be drawn")
-            with self._changed:  # the next picture makes up for what this one left out
+            with self._changed:  # so that the next drawing writes what this one left out
                 self._write_inputs |= write_inputs
                 self._move_gizmo |= move_gizmo
             text = f"the picture could not be drawn: {type(error).__name__}: {error}"

@@ -1,4 +1,4 @@
-"""What the actions of a page need of its session."""
+"""The interface of a session that its actions use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["SessionApi"]
 
 
 class SessionApi(Protocol):
-    """A browser's session, as its actions use it."""
+    """A browser's session, as far as its actions use it."""
 
     @property
     def state(self) -> State | None:
@@ -29,12 +29,12 @@ class SessionApi(Protocol):
         """
 
     def submit(self, label: str, run: Callable[[Progress], Any], show: Callable[[State, Any], State]) -> None:
-        """Run a job in place of the one under way; nothing before the first scene is loaded.
+        """Run a job in place of the one under way; ignored before the first scene is loaded.
 
         Args:
             label: what is computed, for the page.
             run: computes, on the thread of the queue.
-            show: returns the state with the result, unless another job has taken this one's place.
+            show: returns the state with the result; not called if another job has replaced this one.
         """
 
     def send(self, name: str, content: bytes) -> None:

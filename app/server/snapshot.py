@@ -17,29 +17,29 @@ __all__ = ["snapshot_html"]
 
 
 def snapshot_html(state: State, camera: Camera, fov: float) -> str:
-    """Draw a state once more, for nobody, and write down what was drawn.
+    """Return the HTML document of a state's 3D view.
 
-    viser writes down what all browsers of a server share, but not what one browser has of its own,
-    so the drawing is done on a server of its own.
+    viser serializes the scene that all browsers of a server share, not that of one browser, so the
+    state is drawn into the shared scene of a temporary server.
 
     Args:
         state: what to show.
-        camera: where the camera stands and what it looks at.
+        camera: the camera.
         fov: its vertical field of view (rad).
     """
     server = quiet_server()
     try:
-        # A server has all that the view asks of a browser, except a camera.
-        stage = SimpleNamespace(
+        # A server offers all that `SceneView` uses of a browser, except a camera.
+        client = SimpleNamespace(
             scene=server.scene,
             atomic=server.atomic,
             camera=SimpleNamespace(image_width=1280, image_height=800),
         )
-        view = SceneView(cast("viser.ClientHandle", stage), 0, _ignore, _ignore, lambda _: None)
+        view = SceneView(cast("viser.ClientHandle", client), 0, _ignore, _ignore, lambda _: None)
         view.camera = camera
         view.show(state, move_gizmo=True)
         assert view.flat_map
-        view.flat_map.title.text = "unrolled map"  # nobody answers clicks
+        view.flat_map.title.text = "unrolled map"  # without the hint to click it
         start = server.initial_camera
         start.position, start.look_at, start.fov = np.array(camera[:3]), np.array(camera[3:]), fov
         start.up = (0.0, 0.0, 1.0)
@@ -49,4 +49,4 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
 
 
 def _ignore(row: int, column: int) -> None:
-    """Clicks lead nowhere in a file."""
+    """Ignore a click: a file has no session."""

@@ -1,4 +1,4 @@
-"""The viser server that the front door stands before, quiet and sure to send what it is given."""
+"""The viser server behind the proxy, without console output and with a fix of its message buffer."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ __all__ = ["AsyncMessageBuffer", "WakingBuffer", "any_port", "quiet_server"]
 
 
 class _LoopEvent(asyncio.Event):
-    """An event that only its own loop sets."""
+    """An event that can only be set on its own event loop."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         super().__init__()
-        self._home = loop
+        self._loop_of_event = loop
 
     def set(self) -> None:
-        """Set it, if this is the loop's thread; elsewhere do nothing."""
+        """Set the event if this is the loop's thread, else do nothing."""
         try:
             here = asyncio.get_running_loop()
         except RuntimeError:
             return
-        if here is self._home:
+        if here is self._loop_of_event:
             super().set()
 
 
@@ -35,11 +35,10 @@ class _LoopEvent(asyncio.Event):
 class WakingBuffer(AsyncMessageBuffer):
     """viser's buffer of messages to a browser, whose sender always wakes up.
 
-    `AsyncMessageBuffer.push` sets the sender's event twice: at once from the calling thread, and once more
-    through the loop. An asyncio event is not made for the first. Where it falls between the moment in
-    which the sender finds the event unset and the moment in which it lines up to wait, the second finds
-    the event set already and wakes nobody: the browser gets no message any more. Here the first does
-    nothing.
+    `AsyncMessageBuffer.push` sets the sender's event twice: at once from the calling thread, and again
+    through the event loop. An asyncio event is not thread-safe: if the first call comes between the
+    sender's check of the event and its registration as a waiter, the second call sees the event set and
+    wakes no waiter, so that the browser gets no more messages. Here the first call does nothing.
     """
 
     def __post_init__(self) -> None:
@@ -47,17 +46,17 @@ class WakingBuffer(AsyncMessageBuffer):
 
 
 def any_port() -> int:
-    """Return a port of this machine that is free now."""
+    """Return a TCP port that is free on this machine at the moment."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
 
 
 def quiet_server() -> viser.ViserServer:
-    """Start a viser server that only this machine reaches, without its banner and farewell."""
-    # viser offers no place to hand it in.
+    """Start a viser server on a loopback address that prints nothing."""
+    # viser has no public way to replace its buffer.
     _infra.AsyncMessageBuffer = WakingBuffer  # pyright: ignore[reportPrivateImportUsage]
-    rich.get_console().quiet = True  # what viser prints its banner and farewell on, and nobody else here
+    rich.get_console().quiet = True  # only viser prints to this console
     server = viser.ViserServer(host="127.0.0.1", port=any_port(), verbose=False)
     server.scene.world_axes.visible = False
     return server

@@ -1,4 +1,4 @@
-"""Changes of the state that a person makes: scene, object, arm, pose, grasp, list of tasks."""
+"""Changes of the state by a person: scene, object, task, arm, pose, grasp, list of tasks, link."""
 
 from __future__ import annotations
 
@@ -46,17 +46,17 @@ __all__ = [
 ]
 
 GIZMO_NOISE = 1e-6
-"""Change of position (m) or axis below which the gizmo only turned: browsers send rounded numbers."""
+"""A gizmo that moved less (m, or of a unit vector) was only turned: browsers send rounded numbers."""
 
 CAMERA_NOISE = 1e-3
-"""How much (m) the camera may move before a link is out of date: what links are rounded to."""
+"""A camera that moved less (m) leaves a link up to date: links are rounded to this."""
 
 
 # -- scene, object, task, arm ---------------------------------------------------------------
 
 
 def open_scene(state: State, scene: Scene, name: str) -> State:
-    """Show another scene; what belongs to none stays."""
+    """Show another scene; uploads, display options and the history are kept."""
     return replace(
         State.of(scene, name),
         uploaded_object=state.uploaded_object,
@@ -68,7 +68,7 @@ def open_scene(state: State, scene: Scene, name: str) -> State:
 
 
 def open_upload(state: State, uploaded: UploadedScene) -> State:
-    """Show a scene that was uploaded."""
+    """Show an uploaded scene and keep it in the menu."""
     return open_scene(replace(state, uploaded_scene=uploaded), uploaded.scene, uploaded.option)
 
 
@@ -88,7 +88,7 @@ def choose_object(state: State, scene: Scene, choice: ObjectChoice | None) -> St
 
 
 def choose_task(state: State, name: str) -> State:
-    """Show another task, with its first arm unless the chosen one takes part."""
+    """Show another task, with its first arm unless the chosen one takes part in it."""
     task = state.scene.task(name)
     if name == state.task:
         return state
@@ -98,7 +98,11 @@ def choose_task(state: State, name: str) -> State:
 
 
 def choose_arm(state: State, name: str) -> State:
-    """Show the map of another arm of the task; of a plan that is shown, that arm's grasp."""
+    """Show the map of another arm of the task, with that arm's grasp if a plan is shown.
+
+    Raises:
+        InputError: the task has no such arm.
+    """
     arms = state.scene.task(state.task).arms
     if name not in arms:
         raise InputError("page", "arm", name, one_of(arms, name))
@@ -121,12 +125,20 @@ def toggled(state: State, switch: str) -> State:
 
 
 def turn(state: State, delta: float) -> State:
-    """Turn the object to δ (rad) about its axis: nothing is recomputed."""
+    """Set the turn δ (rad) of the object about its axis; maps are shifted, not recomputed.
+
+    Raises:
+        InputError: δ is not finite.
+    """
     return replace(state, delta=float(_finite("rotation", delta)), step=None, problem="")
 
 
 def moved(state: State, **changes: float) -> State:
-    """Move the object: fields of `ObjectPose`, in m and rad. A plan for other poses is dropped."""
+    """Set fields of the base pose (see `ObjectPose`, in m and rad); a plan is dropped if the pose changes.
+
+    Raises:
+        InputError: a value is not finite.
+    """
     for name, value in changes.items():
         _finite(name, value)
     pose = replace(state.base, **changes)
@@ -136,7 +148,7 @@ def moved(state: State, **changes: float) -> State:
 
 
 def drag(state: State, pose: Array) -> State:
-    """Take over the pose (4, 4) of the gizmo; a turn about the axis alone becomes δ."""
+    """Move the object to the pose (4, 4) of the gizmo; a rotation about its axis changes only δ."""
     new = ObjectPose.of(pose)
     delta = float(wrap(new.spin - state.base.spin))
     shift = np.linalg.norm(pose[:3, 3] - state.T_world_object[:3, 3])
@@ -148,14 +160,14 @@ def drag(state: State, pose: Array) -> State:
 
 
 def reset_pose(state: State) -> State:
-    """Put the object of this task back where the scene has it."""
+    """Reset the object's pose in the chosen task to that of the scene, and δ to 0."""
     poses = {name: pose for name, pose in state.poses.items() if name != state.task}
     after = state if len(poses) == len(state.poses) else without_plan(state)
     return replace(after, poses=poses, delta=0.0, step=None, problem="")
 
 
 def without_plan(state: State) -> State:
-    """Drop the plan, also one that is being made."""
+    """Drop all plan results, and whatever a person started that is being computed."""
     busy = state.busy if state.busy and state.busy.request else None
     results = state.plan_results.cleared()
     return replace(state, plan_results=results, step=None, busy=busy, refused=None, problem="")
@@ -165,7 +177,11 @@ def without_plan(state: State) -> State:
 
 
 def choose(state: State, h: float, theta: float) -> State:
-    """Pick the grasp at height h (m) and angle θ (rad) in the object's frame."""
+    """Pick the grasp at height h (m) and angle θ (rad) in the object's frame.
+
+    Raises:
+        InputError: h is outside of the object, or a value is not finite.
+    """
     profile = state.scene.profile
     if not profile.h_min <= _finite("h", h) <= profile.h_max:
         expected = f"{100 * profile.h_min:g} to {100 * profile.h_max:g} cm"
@@ -176,7 +192,7 @@ def choose(state: State, h: float, theta: float) -> State:
 
 
 def choose_cell(state: State, row: int, column: int) -> State:
-    """Pick the centre of a cell of the map as it is shown."""
+    """Pick the centre of a cell of the shifted map, `State.map`."""
     if state.map is None:
         return state
     manifold = state.map.manifold
@@ -184,7 +200,7 @@ def choose_cell(state: State, row: int, column: int) -> State:
 
 
 def choose_surface_cell(state: State, row: int, column: int) -> State:
-    """Pick a cell as it lies on the object's surface, whose colours do not turn with the object."""
+    """Pick a cell of the unshifted map, whose colours lie on the object's surface."""
     if state.result is None:
         return state
     _, turned = state.result.map.manifold.shift(state.delta)
@@ -192,18 +208,18 @@ def choose_surface_cell(state: State, row: int, column: int) -> State:
 
 
 def choose_roll(state: State, roll: RollChoice) -> State:
-    """Show other rolls; a pick keeps its place and takes the roll shown."""
+    """Show other rolls; a picked grasp keeps h and θ and takes the roll shown."""
     pick = replace(state.pick, roll=None) if state.pick else None
     return replace(state, pick=pick, map_view=replace(state.map_view.for_another_cell(), roll=roll))
 
 
 def choose_candidate(state: State, candidate: int) -> State:
-    """Show a candidate of the picked cell, by its index; the best is the first."""
+    """Show a candidate of the picked cell by its index; 0 is the best."""
     return replace(state, map_view=state.map_view.with_candidate(candidate), step=None)
 
 
 def clear_pick(state: State) -> State:
-    """Let go: the arms park."""
+    """Drop the picked grasp; the arms return home."""
     return replace(state, pick=None, map_view=state.map_view.for_another_cell(), step=None)
 
 
@@ -211,7 +227,7 @@ def clear_pick(state: State) -> State:
 
 
 def change_tasks(state: State, change: Callable[[TaskList], TaskList]) -> State:
-    """Add, remove, rename or reorder tasks. A plan for the others is dropped."""
+    """Change the list of tasks; plan results are dropped if it changes."""
     before = TaskList(state.scene, state.poses, state.task)
     after = change(before)
     if after == before:
@@ -231,7 +247,7 @@ def change_tasks(state: State, change: Callable[[TaskList], TaskList]) -> State:
 
 
 def add_task(state: State) -> State:
-    """Add a task with the object where it stands; that of the chosen task was only moved for this."""
+    """Add a task at the object's present pose; the chosen task returns to the pose it had when chosen."""
     pose = state.request.T_world_object
     return change_tasks(state, lambda tasks: tasks.added(pose, state.pose_when_chosen))
 
@@ -240,12 +256,12 @@ def add_task(state: State) -> State:
 
 
 def linked(state: State, address: str, camera: Camera) -> State:
-    """Take the link that was made of the state."""
+    """Store the link that was made of the state; its camera is the six numbers of `Camera`."""
     return replace(state, link=PageLink(address, state.link_values, camera), problem="")
 
 
 def seen_from(state: State, camera: Camera) -> State:
-    """Look from somewhere: a link made elsewhere is no longer that of what is shown."""
+    """Take a new camera pose: a link with another one becomes out of date."""
     if state.link is None or not state.link.values:
         return state
     if np.allclose(camera, state.link.camera, rtol=0, atol=CAMERA_NOISE):

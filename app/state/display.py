@@ -1,4 +1,4 @@
-"""What the page shows beside the map: switches that change nothing else."""
+"""Display options of the page."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ __all__ = ["Display"]
 
 @dataclass(frozen=True)
 class Display:
-    """Switches of the page.
+    """Display options of the page, each on or off.
 
     Attributes:
-        drag_handles: whether the handles that move the object are seen.
-        symmetry_error: whether the object's surface shows the symmetry error of its mesh and not the map.
-        flat_map: whether the unwrapped map is laid out in the 3D view as well.
-        dark: whether the page is dark.
+        drag_handles: whether the gizmo that moves the object is visible.
+        symmetry_error: whether the object's surface shows the symmetry error of its mesh instead of the map.
+        flat_map: whether the flat map is visible in the 3D view.
+        dark: whether the page has its dark theme.
     """
 
     drag_handles: bool = False

@@ -1,4 +1,4 @@
-"""Undo and redo of any immutable state, step by step; a drag is one step."""
+"""Undo and redo for any immutable state; all changes of one drag are one step."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ __all__ = ["DRAG_PAUSE", "STEPS_KEPT", "Drag", "History"]
 T = TypeVar("T")
 
 STEPS_KEPT = 100
-"""Steps that can be undone."""
+"""How many steps can be undone."""
 
 DRAG_PAUSE = 0.8
-"""Changes of one value that follow each other within this time (s) are one drag."""
+"""Changes of the same value less than this time (s) apart belong to one drag."""
 
 
 @dataclass(frozen=True)
@@ -23,25 +23,25 @@ class Drag:
 
     Attributes:
         values: names of the values that it changes.
-        time: when (s) it last changed one.
+        time: of its last change (s).
     """
 
     values: frozenset[object]
     time: float
 
     def includes(self, values: frozenset[object], time: float) -> bool:
-        """Return whether a change of these values at a time (s) is part of it."""
+        """Return whether a change of these values at a time (s) belongs to it."""
         return values <= self.values and 0 <= time - self.time < DRAG_PAUSE
 
 
 @dataclass(frozen=True, eq=False)
 class History(Generic[T]):
-    """The states that can be returned to, the nearest last.
+    """The states before and after the present one, each list with the nearest last.
 
     Attributes:
         past: states before the present one.
         future: states after it, which were undone.
-        drag: the drag that led to the present state, if one did.
+        drag: the drag whose last change made the present state, if one did.
     """
 
     past: tuple[T, ...] = ()
@@ -56,10 +56,10 @@ class History(Generic[T]):
         *,
         dragged: bool,
     ) -> History[T]:
-        """Return the history after a change: a new step, or none where it goes on with the present drag.
+        """Return the history after a change: with a new step, unless the change belongs to the present drag.
 
         Args:
-            before: makes the state before the change; called only for a new step.
+            before: returns the state before the change; called only for a new step.
             values: names of the changed values.
             time: when (s) they changed.
             dragged: whether the change may be part of a drag.

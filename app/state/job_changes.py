@@ -1,4 +1,4 @@
-"""Changes of the state that computations make: begin, go on, end, fail."""
+"""Changes of the state by computations: start, progress, result, cancellation, error."""
 
 from __future__ import annotations
 
@@ -22,18 +22,32 @@ __all__ = [
 
 
 def is_awaited(state: State, job_id: int) -> bool:
-    """Return whether a job is the computation under way."""
+    """Return whether the computation under way has this job id."""
     return state.busy is not None and state.busy.job_id == job_id
 
 
 def started(state: State, job_id: int, label: str, request: Request | None = None) -> State:
-    """A computation began; it replaces the one before."""
+    """Record that a computation was started, in place of the one under way.
+
+    Args:
+        state: the state.
+        job_id: number of its job.
+        label: what is computed, for the page.
+        request: what it answers; None for what a person started.
+    """
     problem = state.problem if request else ""
     return replace(state, busy=Busy(job_id, label, request), problem=problem)
 
 
 def progressed(state: State, job_id: int, share: float, late: bool = False) -> State:
-    """The computation is this far, and so late by now that the page says so."""
+    """Record the progress of a computation.
+
+    Args:
+        state: the state.
+        job_id: number of its job.
+        share: how much of it is done, 0 to 1.
+        late: whether it takes so long that the page shows it.
+    """
     busy = state.busy
     if busy is None or busy.job_id != job_id:
         return state
@@ -44,7 +58,7 @@ def progressed(state: State, job_id: int, share: float, late: bool = False) -> S
 
 
 def compiling(state: State, job_id: int) -> State:
-    """The computation waits for code that is compiled, now and perhaps once more before it ends."""
+    """Record that a computation has to compile code, which may happen several times."""
     busy = state.busy
     if busy is None or busy.job_id != job_id:
         return state
@@ -52,17 +66,17 @@ def compiling(state: State, job_id: int) -> State:
 
 
 def map_arrived(state: State, job_id: int, result: MapResult) -> State:
-    """Take a map: that of the object's pose, or on the way there that of an earlier one."""
+    """Show a computed map if it is for the object's pose, or for an earlier pose of the same drag."""
     awaited = is_awaited(state, job_id)
     after = replace(state, busy=None) if awaited else state
-    follows = awaited and not state.is_current and result.request.differs_in_pose(state.request)
+    follows = awaited and not state.is_current and result.request.differs_only_in_pose(state.request)
     if result.request != state.request and not follows:
         return after
     return replace(after, result=result, refused=None)
 
 
 def result_arrived(state: State, job_id: int, result: Comparison | ExplainResult) -> State:
-    """Take a result about the map, unless it is about an earlier one."""
+    """Show a comparison or explanation, unless it is about another map."""
     if not is_awaited(state, job_id):
         return state
     is_about_it = result.request.map == state.request
@@ -72,25 +86,25 @@ def result_arrived(state: State, job_id: int, result: Comparison | ExplainResult
 
 
 def ended(state: State) -> State:
-    """The computation is over."""
+    """Record that the computation under way has ended."""
     return replace(state, busy=None, problem="")
 
 
 def stopped(state: State, job_id: int, problem: str = "") -> State:
-    """The computation was cancelled or failed: it does not begin again unasked."""
+    """Record that a computation was cancelled, or failed with a problem; it is not restarted by itself."""
     if state.busy is None or state.busy.job_id != job_id:
         return state
     refused = state.missing_request
-    if problem and state.busy.request is None:  # it was not the map that failed
+    if problem and state.busy.request is None:  # the missing result did not fail
         refused = state.refused
     return replace(state, busy=None, refused=refused, problem=problem)
 
 
 def failed(state: State, problem: str) -> State:
-    """Something that was asked for cannot be done; nothing else changes."""
+    """Show a problem; nothing else changes."""
     return replace(state, problem=problem)
 
 
 def retried(state: State) -> State:
-    """Compute after all what was cancelled or failed."""
+    """Restart the computation that was cancelled or failed."""
     return replace(state, refused=None, problem="")

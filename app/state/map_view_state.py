@@ -1,4 +1,4 @@
-"""How the map is looked at, and what was computed for that: a recomputed map, a cell's candidates."""
+"""The display options of the map, and what was computed for it: a comparison, a cell's candidates."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["MapViewState", "RollChoice"]
 
 
 class RollChoice(Enum):
-    """Which of the two rolls a map shows; the value is what the page calls it."""
+    """Which of the two rolls a map shows; the values are labels of the page."""
 
     EITHER = "either"
     ZERO = "0°"
     HALF_TURN = "180°"
 
     def rolls(self, m: FeasibilityMap) -> np.ndarray:
-        """Return the index (H, A) of the roll that is shown: what got furthest, with most clearance."""
+        """Return the index (H, A) of the roll shown: of either, the one with the furthest reason."""
         if self is RollChoice.EITHER:
             return (m.reason + np.nan_to_num(m.clearance)).argmax(axis=0)
         return np.full(m.reason.shape[1:], 0 if self is RollChoice.ZERO else 1)
@@ -34,11 +34,11 @@ class RollChoice(Enum):
         return self.of(m, m.reason)
 
     def values(self, m: FeasibilityMap, color_by: ColorBy) -> np.ndarray:
-        """Return the values (H, A) that are shown when colouring by them, in their unit."""
+        """Return the values (H, A) of a colouring that are shown, in `ColorBy.unit`."""
         return self.of(m, m.values(color_by))
 
     def of(self, m: FeasibilityMap, cells: np.ndarray) -> np.ndarray:
-        """Return what is shown (H, A) of cells (R, H, A) of both rolls."""
+        """Select from cells (R, H, A) of both rolls those (H, A) that are shown."""
         return np.take_along_axis(cells, self.rolls(m)[None], axis=0)[0]
 
     def roll(self, m: FeasibilityMap, row: int, column: int) -> int:
@@ -48,16 +48,16 @@ class RollChoice(Enum):
 
 @dataclass(frozen=True)
 class MapViewState:
-    """How one browser looks at the map.
+    """How one browser shows the map.
 
     Attributes:
         roll: the rolls shown.
         color_by: what the colours stand for.
-        handprint: whether the picked grasp's print lies on it.
-        compare: whether the map is computed from scratch as well, to compare it with the shifted one.
+        handprint: whether the handprint of the picked grasp is drawn.
+        compare: whether the shifted map is compared with one computed from scratch.
         comparison: the newest result of that.
         explained: the candidates of the cell that was picked last.
-        candidate: index of the candidate shown; None for the one that decides the cell.
+        candidate: index of the candidate shown; None for the default, see `State.candidate`.
     """
 
     roll: RollChoice = RollChoice.EITHER
@@ -91,29 +91,29 @@ class MapViewState:
         return None
 
     def with_compare(self, compare: bool) -> MapViewState:
-        """Compare with a recomputed map, or no more."""
+        """Turn the comparison with a recomputed map on or off."""
         return replace(self, compare=compare, comparison=self.comparison if compare else None)
 
     def with_candidate(self, candidate: int) -> MapViewState:
-        """Show a candidate, by its index among the explained ones; the best is the first."""
+        """Show a candidate by its index among the explained ones; 0 is the best."""
         count = len(self.explained.explanation.candidates) if self.explained else 0
         return replace(self, candidate=int(np.clip(candidate, 0, count - 1)) if count else None)
 
     def with_result(self, result: Comparison | ExplainResult) -> MapViewState:
-        """Take a result about the map."""
+        """Store a result about the map."""
         if isinstance(result, Comparison):
             return replace(self, comparison=result if self.compare else None)
-        # A candidate that was chosen before anything was explained was brought back by an undo.
+        # A candidate without an explanation was restored by an undo: keep it.
         return replace(self, explained=result, candidate=None if self.explained else self.candidate)
 
     def without_results(self) -> MapViewState:
-        """Leave out what was computed."""
+        """Drop what was computed."""
         return replace(self, comparison=None, explained=None)
 
     def for_another_scene(self) -> MapViewState:
-        """Return how another scene is looked at: all rolls in the same colours, nothing computed yet."""
+        """Return it for another scene: both rolls, the same display options, nothing computed."""
         return MapViewState(color_by=self.color_by, handprint=self.handprint, compare=self.compare)
 
     def for_another_cell(self) -> MapViewState:
-        """Forget which candidate was chosen: another cell is picked."""
+        """Return it for another picked cell: the default candidate."""
         return replace(self, candidate=None)

@@ -1,4 +1,4 @@
-"""Objects that may take the place of a scene's own: those of the library, and uploaded meshes."""
+"""Objects that can replace a scene's own: those of the library, and uploaded meshes."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ __all__ = [
 ]
 
 OWN = "the scene's own"
-"""The option of the object that the scene came with."""
+"""The option for the scene's own object."""
 
 UPLOAD_LIMIT = 20_000_000
-"""Largest mesh file (bytes) that is looked at."""
+"""Largest mesh file (bytes) that is read."""
 
 UNITS: Mapping[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-"""Units that a mesh may be in → metres."""
+"""Name of a unit that a mesh may be in → its length in metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +41,8 @@ class ObjectChoice:
     Attributes:
         option: its name in the menu of the page.
         name: what the scene calls it.
-        profile: its r(h).
-        measurement: how the mesh was measured, of an uploaded one.
+        profile: its radius over height.
+        measurement: that of its mesh, if it was uploaded.
     """
 
     option: str
@@ -52,7 +52,7 @@ class ObjectChoice:
 
 
 def object_options(uploaded: ObjectChoice | None = None) -> tuple[str, ...]:
-    """Return what there is to choose from."""
+    """Return all options: the scene's own object, the library, and the uploaded one if any."""
     return (OWN, *library_objects(), *([uploaded.option] if uploaded else []))
 
 
@@ -60,18 +60,19 @@ def from_library(choice: str) -> ObjectChoice:
     """Load an object of the library.
 
     Raises:
-        ProfileError: there is none of that name.
+        InputError: there is none of that name.
+        ProfileError: its profile is unusable.
     """
-    if choice not in library_objects():  # a page can ask for any name, but for no file
+    if choice not in library_objects():  # else a browser could open any file of the server
         raise InputError("library", "object", choice, one_of(library_objects(), choice))
     return ObjectChoice(choice, *load_object(choice))
 
 
 def check_size(name: str, content: bytes) -> None:
-    """Refuse a file that is too large to be looked at.
+    """Check the size of a mesh file.
 
     Raises:
-        MeshError: it is.
+        MeshError: it is larger than `UPLOAD_LIMIT`.
     """
     if len(content) > UPLOAD_LIMIT:
         size, limit = f"{len(content) / 1e6:.1f} MB", f"{UPLOAD_LIMIT / 1e6:g} MB"
@@ -82,18 +83,18 @@ def from_mesh(name: str, content: bytes, scale: float) -> ObjectChoice:
     """Measure the object of revolution in the content of a mesh file.
 
     Args:
-        name: of the file; its ending says what it is.
-        content: what it holds.
-        scale: metres in one of its units.
+        name: of the file; its ending is that of its format.
+        content: of the file.
+        scale: length (m) of one of its units.
 
     Raises:
-        MeshError: the file is too large or unusable, or shows no object of revolution.
+        MeshError: the file is too large or unusable, or is not a solid of revolution.
     """
     check_size(name, content)
     file = Path(Path(name).name)
     if file.suffix.lower() not in MESH_ENDINGS:
         raise MeshError(name, "ending", file.suffix, one_of(MESH_ENDINGS, file.suffix.lower()))
-    # A folder of its own: a mesh may refer to files beside it, and there are none.
+    # In an empty folder, since a mesh may refer to files beside it.
     with tempfile.TemporaryDirectory(prefix="symgrasp-") as folder:
         path = Path(folder, "mesh" + file.suffix.lower())
         path.write_bytes(content)

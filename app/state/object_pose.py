@@ -1,4 +1,4 @@
-"""A pose of the object as a person sets it: position, lean, spin."""
+"""A pose of the object in the parameters that a person sets: position, lean, spin."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["ObjectPose", "moved"]
 
 @dataclass(frozen=True)
 class ObjectPose:
-    """A pose as a person sets it: where the bottom stands, which way the axis leans, the spin.
+    """A pose by the position of its origin, the lean of its axis and the spin about it.
 
     Attributes:
-        x, y, z: origin of the object (m).
+        x, y, z: origin of the object in the world (m).
         lean: angle (rad) between the axis and the world's z.
         towards: azimuth (rad) that the axis leans towards.
         spin: turn (rad) about the object's own axis.
@@ -34,7 +34,7 @@ class ObjectPose:
 
     @staticmethod
     def of(pose: Array) -> ObjectPose:
-        """Take a pose (4, 4) apart."""
+        """Return the parameters of a pose (4, 4)."""
         axis = pose[:3, 2]
         lean = float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2]))
         towards = float(np.arctan2(axis[1], axis[0])) if lean > 1e-12 else 0.0
@@ -51,7 +51,7 @@ class ObjectPose:
 
 
 def moved(scene: Scene, poses: Mapping[str, ObjectPose]) -> Scene:
-    """Return the scene with tasks moved to other poses."""
+    """Return the scene with some of its tasks at other poses: task → pose."""
     for name, pose in poses.items():
         scene = scene.with_task(Task(name, scene.task(name).arms, pose.matrix()))
     return scene

@@ -1,4 +1,4 @@
-"""The link that was made last, and where the camera stood."""
+"""The link to the page that was made last."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ __all__ = ["Camera", "PageLink"]
 
 
 Camera = tuple[float, ...]
-"""Where the camera stands and the point it looks at (m): six numbers."""
+"""Position of the camera and the point it looks at: six numbers (m)."""
 
 
 @dataclass(frozen=True)
 class PageLink:
-    """A link to the page as it was.
+    """A link that opens the page as it was.
 
     Attributes:
         address: the whole address.
-        values: what it contains, but for the camera; nothing once it was looked at from elsewhere.
+        values: `State.link_values` when it was made; empty once the camera has moved.
         camera: the camera it contains.
     """
 

@@ -1,4 +1,4 @@
-"""Changes of what is shown of plans: which of them, which task, which step of a climb, what is played."""
+"""Changes of what is shown of plans: which plan, task or step of a climb, and the playback."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ __all__ = [
 
 
 def show_results(state: State, results: PlanResults) -> State:
-    """Take what a planner found, and show the first task of its first plan."""
+    """Store the results of a planner, and show the first task of its first plan."""
     return show_step(replace(state, plan_results=results, step=None, pick=None), 0)
 
 
 def more_listed(state: State, plans: tuple[PlanResult, ...], more: bool) -> State:
-    """Take further plans of the list, and show the first of them."""
+    """Add further plans to the list, and show the first of them."""
     after = replace(state, plan_results=state.plan_results.extended(plans, more=more))
     return choose_plan(after, len(state.plan_results.plans)) if plans else after
 
 
 def change_plan_results(state: State, change: Callable[[PlanResults], PlanResults]) -> State:
-    """Change what is chosen or shown of plans, if that is all that changes."""
+    """Change the plan results and nothing else."""
     results = change(state.plan_results)
     return state if results is state.plan_results else replace(state, plan_results=results)
 
 
 def choose_plan(state: State, index: int) -> State:
-    """Show another plan of the list, at the same task."""
+    """Show another plan of the list by its index, at the same task."""
     step = state.step or 0
     return show_step(replace(state, plan_results=state.plan_results.at_plan(index)), step)
 
 
 def show_step(state: State, step: int) -> State:
-    """Show a task of the plan: the object turned by δᵢ and the grasp on its map."""
+    """Show a task of the plan by its index: the object turned by δᵢ and the grasp on its map."""
     return show_position(state, step)
 
 
 def show_position(state: State, position: float) -> State:
-    """Show the plan at a position of the playback: the task nearest to it, the arms maybe between two."""
+    """Show the plan at a position of the playback (see `PlanResults`) and the task nearest to it."""
     if state.plan is None:
         return state
     results = state.plan_results.at_position(position)
@@ -76,7 +76,7 @@ def show_position(state: State, position: float) -> State:
 
 
 def show_frame(state: State, frame: int) -> State:
-    """Show a step of the hill climbing: the hands on the maps as they were computed."""
+    """Show a step of the hill climbing by its index: the hands on the maps at δ = 0."""
     climb = state.plan_results.climb
     if climb is None:
         return state
@@ -95,17 +95,17 @@ def show_frame(state: State, frame: int) -> State:
 
 
 def play_arms(state: State) -> State:
-    """Start or stop playing the plan."""
+    """Start or pause the playback of the plan."""
     return _shown(replace(state, plan_results=state.plan_results.play_arms()))
 
 
 def play_climb(state: State) -> State:
-    """Start or stop the replay of the hill climbing."""
+    """Start or pause the replay of the hill climbing."""
     return _shown(replace(state, plan_results=state.plan_results.play_climb()))
 
 
 def played(state: State, seconds: float) -> State:
-    """Let what is played go on; it stops where the person has moved on to something else."""
+    """Advance what is played by a time (s); pause it if something else is shown by now."""
     playing = state.plan_results.playing
     if not playing:
         return state

@@ -1,4 +1,4 @@
-"""What the planners found, and which part of it one browser shows: plan, task, step of a climb, playback."""
+"""The results of planners, and which part one browser shows: plan, step of a climb, playback."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ Playing = Literal["", "arms", "climb"]
 """What is being played."""
 
 FIRST_SEED = 39
-"""Seed of hill climbing at first: one whose hands start on each other where two hold the shipped log.
+"""Default seed of hill climbing: with it, the hands of two robots on the shipped log overlap at first.
 
-Most start apart already, and then there is nothing to replay.
+With most seeds they start apart, so that there is nothing to replay.
 """
 
-SECONDS_A_TASK = 2.0
-"""How long the arms take from one task to the next when they are played."""
+SECONDS_PER_TASK = 2.0
+"""Duration (s) of the playback from one task to the next."""
 
-STEPS_A_SECOND = 10.0
-"""How fast a climb is replayed."""
+STEPS_PER_SECOND = 10.0
+"""Speed of the replay of a climb."""
 
 LONGEST_REPLAY = 12.0
-"""How long (s) the replay of a long climb takes: it then skips steps."""
+"""Longest duration (s) of the replay of a climb; with more steps it skips some."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlanResult:
-    """A plan and what is needed to show it, besides the maps it was made from.
+    """A plan and what is needed to show it, except its maps.
 
     Attributes:
         plan: the plan.
@@ -66,8 +66,8 @@ class Refusal:
     """Why there is no plan.
 
     Attributes:
-        text: in words.
-        conflict: which tasks exclude each other, where that is the reason.
+        text: the error message.
+        conflict: which tasks exclude each other, if that is the reason.
     """
 
     text: str
@@ -76,15 +76,15 @@ class Refusal:
 
 @dataclass(frozen=True, eq=False)
 class ClimbReplay:
-    """A hill climbing to replay, and what the complete search finds on the same maps.
+    """A hill climbing to replay, and the plan of the complete search on the same maps.
 
     Attributes:
         task: the task.
         arms: names of its arms.
         seed: of the random choices.
         steps: every position of the hands; at least one.
-        found: the plan it ended in, None where it found none.
-        exact: the best plan, None where there is none.
+        found: the plan of the hill climbing, None where it failed.
+        exact: the plan of the complete search, None where there is none.
     """
 
     task: str
@@ -96,8 +96,8 @@ class ClimbReplay:
 
     @property
     def speed(self) -> float:
-        """Steps a second of the replay."""
-        return max(STEPS_A_SECOND, len(self.steps) / LONGEST_REPLAY)
+        """Steps per second of the replay."""
+        return max(STEPS_PER_SECOND, len(self.steps) / LONGEST_REPLAY)
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class PlanFileReport:
     Attributes:
         name: of the file.
         checks: how many statements were checked.
-        failures: those that do not hold, in words.
+        failures: a text for each that does not hold.
     """
 
     name: str
@@ -123,15 +123,15 @@ class PlanResults:
         sequence_method, hands_method: the methods chosen.
         seed: of hill climbing.
         plans: the plans listed so far, best first.
-        index: of the one that is shown.
-        more: whether the list may go on.
+        index: of the plan that is shown.
+        more: whether there may be further plans.
         kind: which planner was run last.
-        maps: (task, arm) → the maps it used, at δ = 0, also where it found nothing.
-        refusal: why it found nothing.
-        climb: the climbing, if the plan came from it.
-        frame: which of its steps is shown.
-        slide: how far the maps are slid over each other: 0 as computed, 1 by each task's δ.
-        position: where the playback is: k at task k, and between.
+        maps: (task, arm) → map at δ = 0, of those it used, also where there is no plan.
+        refusal: why there is no plan.
+        climb: the hill climbing, if that was the method.
+        frame: index of its step that is shown.
+        slide: share of each task's δ by which its map is shifted, 0 to 1.
+        position: of the playback: k at task k, fractions between two tasks.
         playing: what is being played.
         opened: the report on the file that was opened last.
     """
@@ -152,7 +152,7 @@ class PlanResults:
     playing: Playing = ""
     opened: PlanFileReport | None = None
 
-    # -- what follows from it ---------------------------------------------------------------
+    # -- derived values ---------------------------------------------------------------------
 
     @property
     def plan(self) -> PlanResult | None:
@@ -171,7 +171,7 @@ class PlanResults:
 
     @property
     def transition(self) -> tuple[int, float]:
-        """The task that the playback comes from, and the share of the way to the next, eased at both ends."""
+        """Index of the task that the playback comes from, and the share of the way to the next, eased."""
         start = min(int(self.position), max(self.last - 1, 0))
         share = self.position - start
         return start, share * share * (3 - 2 * share)
@@ -183,7 +183,7 @@ class PlanResults:
 
     @property
     def input_values(self) -> tuple[object, ...]:
-        """Everything that widgets show and can change."""
+        """All values that widgets show and can change."""
         return (
             self.sequence_method, self.hands_method, self.seed, self.index, self.plans, self.frame,
             self.slide, self.position, self.climb,
@@ -192,7 +192,7 @@ class PlanResults:
     # -- changes ----------------------------------------------------------------------------
 
     def cleared(self) -> PlanResults:
-        """Drop what was found; what was chosen stays."""
+        """Drop the results; methods, seed and slide are kept."""
         return PlanResults(self.sequence_method, self.hands_method, self.seed, slide=self.slide)
 
     def found(
@@ -204,22 +204,22 @@ class PlanResults:
         more: bool,
         climb: ClimbReplay | None = None,
     ) -> PlanResults:
-        """Take the first plans of a list, one at least."""
+        """Store the first plans of a planner, at least one."""
         return replace(self.cleared(), kind=kind, plans=plans, maps=maps, more=more, climb=climb, slide=1.0)
 
     def refused(
         self, kind: PlanKind, refusal: Refusal, maps: Maps, climb: ClimbReplay | None = None
     ) -> PlanResults:
-        """Take that there is no plan."""
+        """Store that a planner has no plan."""
         results = replace(self.cleared(), kind=kind, refusal=refusal, maps=maps, climb=climb)
         return replace(results, frame=len(climb.steps) - 1) if climb else results
 
     def extended(self, plans: tuple[PlanResult, ...], *, more: bool) -> PlanResults:
-        """Take further plans of the list."""
+        """Add further plans to the list."""
         return replace(self, plans=(*self.plans, *plans), more=more)
 
     def at_plan(self, index: int) -> PlanResults:
-        """Show another plan of the list."""
+        """Show another plan of the list by its index."""
         return replace(self, index=int(np.clip(index, 0, len(self.plans) - 1))) if self.plans else self
 
     def at_position(self, position: float) -> PlanResults:
@@ -228,33 +228,33 @@ class PlanResults:
         return replace(self, position=position, frame=None)
 
     def at_frame(self, frame: int) -> PlanResults:
-        """Show a step of the climb."""
+        """Show a step of the climb by its index."""
         if self.climb is None:
             return self
         return replace(self, frame=int(np.clip(frame, 0, len(self.climb.steps) - 1)))
 
     def play_arms(self) -> PlanResults:
-        """Start or stop playing the plan; from the end it starts anew."""
+        """Start or pause the playback of the plan; at its end it restarts."""
         if self.playing == "arms" or not self.last:
             return self.paused()
         position = 0.0 if self.position >= self.last else self.position
         return replace(self, playing="arms", position=position, frame=None)
 
     def play_climb(self) -> PlanResults:
-        """Start or stop the replay of the climb; from the end it starts anew."""
+        """Start or pause the replay of the climb; at its end it restarts."""
         if self.playing == "climb" or self.climb is None:
             return self.paused()
         over = self.frame is None or self.frame >= len(self.climb.steps) - 1
         return replace(self, playing="climb", frame=0 if over else self.frame)
 
     def paused(self) -> PlanResults:
-        """Play nothing."""
+        """Pause the playback."""
         return replace(self, playing="") if self.playing else self
 
     def advanced(self, seconds: float) -> PlanResults:
-        """Let the playback go on; at the end it stops."""
+        """Advance the playback by a time (s); at its end it pauses."""
         if self.playing == "arms":
-            results = self.at_position(self.position + seconds / SECONDS_A_TASK)
+            results = self.at_position(self.position + seconds / SECONDS_PER_TASK)
             return results if results.position < results.last else results.paused()
         if self.playing == "climb" and self.climb is not None:
             steps = max(1, round(seconds * self.climb.speed))

@@ -1,4 +1,4 @@
-"""What the page computes unasked, the results of that, and the computation under way."""
+"""What a state needs computed, the results, and the computation under way."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ __all__ = [
 ]
 
 MapKey = tuple[str, str, bytes]
-"""Content of all that a map depends on: hash of the scene, name of the arm, the object's pose."""
+"""All that a map depends on: hash of the scene without tasks, name of the arm, bytes of the object's pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class MapRequest:
-    """Compute a map; equal requests have equal maps, whatever other tasks the scene has.
+    """A map to compute; requests are equal if their tasks have the same name and their maps the same key.
 
     Attributes:
         scene: the scene as loaded.
@@ -53,19 +53,19 @@ class MapRequest:
 
     @cached_property
     def key(self) -> MapKey:
-        """All that the map depends on: neither the task's name nor the scene's other tasks."""
+        """The key of the map, without the task's name and the scene's other tasks."""
         return self.scene.map_sha256, self.arm, self.T_world_object.tobytes()
 
     def __eq__(self, other: object) -> bool:
-        """Whether the map and its task are the same."""
+        """Return whether the other is a request for the same map and task name."""
         return isinstance(other, MapRequest) and (self.task, self.key) == (other.task, other.key)
 
     def __hash__(self) -> int:
-        """Return a number that equal requests share."""
+        """Return a hash that is equal for equal requests."""
         return hash((self.task, self.key))
 
-    def differs_in_pose(self, other: object) -> bool:
-        """Return whether the other one is for the same map, but for the object's pose."""
+    def differs_only_in_pose(self, other: object) -> bool:
+        """Return whether the other is for the same scene, arm and task, at any pose."""
         return isinstance(other, MapRequest) and (self.task, *self.key[:2]) == (other.task, *other.key[:2])
 
     def moved_task(self) -> Task:
@@ -79,14 +79,20 @@ class MapRequest:
 
 @dataclass(frozen=True, eq=False)
 class MapResult:
-    """A computed map, and the obstacles that the object is inside of at that pose (one phrase each)."""
+    """A computed map.
+
+    Attributes:
+        request: what it answers.
+        map: the map.
+        contacts: a phrase for each obstacle that the object is inside of at that pose.
+    """
 
     request: MapRequest
     map: FeasibilityMap
     contacts: tuple[str, ...] = ()
 
     def renamed(self, request: MapRequest) -> MapResult:
-        """Return it as the answer to a request with the same key, with the names of its scene and task."""
+        """Return it as the answer to a request with the same key, with that scene's and task's names."""
         if request is self.request:
             return self
         names = (request.scene.name, request.task)
@@ -101,45 +107,51 @@ Maps = dict[tuple[str, str], MapResult]
 
 @dataclass(frozen=True)
 class CompareRequest:
-    """Compute the map of the turned object from scratch, to compare it with the shifted one.
+    """A map of the turned object to compute from scratch and to compare with the shifted one.
 
     Attributes:
         map: the map that is shifted.
-        delta: by how much (rad).
+        delta: turn (rad) of the object.
     """
 
     map: MapRequest
     delta: float
 
-    def differs_in_pose(self, other: object) -> bool:
-        """Return whether the other one only turns the object further."""
+    def differs_only_in_pose(self, other: object) -> bool:
+        """Return whether the other is for the same map, at any turn."""
         return isinstance(other, CompareRequest) and self.map == other.map
 
 
 @dataclass(frozen=True)
 class ExplainRequest:
-    """Compute the result of every candidate of a cell.
+    """A cell whose candidates are all to be checked.
 
     Attributes:
         map: the map.
-        cell: a cell of it, before it is shifted.
+        cell: a cell of it, unshifted.
     """
 
     map: MapRequest
     cell: Cell
 
-    def differs_in_pose(self, other: object) -> bool:
-        """Return False: the candidates of another cell are of no use."""
+    def differs_only_in_pose(self, other: object) -> bool:
+        """Return False: the candidates of another cell are not shown meanwhile."""
         return False
 
 
 Request = MapRequest | CompareRequest | ExplainRequest
-"""What follows from the state and is computed unasked."""
+"""What a state may need computed; it is started without an action of a person."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A map computed from scratch, over the grid of the shifted one, and how many cells differ."""
+    """The result of a comparison.
+
+    Attributes:
+        request: what it answers.
+        map: the map computed from scratch, over the grid of the shifted one.
+        differing: how many cells, of both rolls, have another reason in the two maps.
+    """
 
     request: CompareRequest
     map: FeasibilityMap
@@ -148,7 +160,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class ExplainResult:
-    """The results of the candidates of a cell."""
+    """The candidates of a cell with their results."""
 
     request: ExplainRequest
     explanation: Explanation
@@ -159,12 +171,12 @@ class Busy:
     """A computation under way.
 
     Attributes:
-        job_id: number of its job; the last messages of an earlier one do not count.
+        job_id: number of its job; messages of any other job are ignored.
         label: what is computed.
-        request: what it answers, None for what a person asked for.
-        share: how much of it is done.
-        late: whether it takes so long that the page says so and newer requests interrupt it.
-        compiling: whether code that it needs had to be compiled, which may happen in several pieces.
+        request: what it answers, None for what a person started.
+        share: how much of it is done, 0 to 1.
+        late: whether it takes so long that the page shows it and newer requests interrupt it.
+        compiling: whether code has to be compiled for it.
     """
 
     job_id: int
@@ -177,9 +189,9 @@ class Busy:
     def goes_before(self, request: Request) -> bool:
         """Return whether a request waits for this computation instead of taking its place.
 
-        A quick map is finished even if the object has moved on meanwhile. If every movement
-        interrupted it, none would arrive until the drag ends.
+        A map that computes quickly is finished even if the object has been moved since; if every
+        movement interrupted it, no map would be shown until a drag ends.
         """
         if self.request is None or self.request == request:
             return True
-        return not self.late and self.request.differs_in_pose(request)
+        return not self.late and self.request.differs_only_in_pose(request)

@@ -1,6 +1,6 @@
-"""What one browser shows, as one immutable value, and what follows from it.
+"""The state of one browser as one immutable value, and what is derived from it.
 
-The object stands at ``T_world_object = base · Rz(delta)``: the base pose is what a map is computed for,
+The object is at ``T_world_object = base · Rz(delta)``: the base pose is what a map is computed for,
 and δ, the turn about the object's own axis, only shifts that map (equation 3). The changes are functions
 from state to state, in `app.state.changes`, `app.state.job_changes`, `app.state.plan_changes` and
 `app.state.undo`.
@@ -35,7 +35,13 @@ __all__ = ["Pick", "State"]
 
 @dataclass(frozen=True)
 class Pick:
-    """A grasp that was picked, in the object's frame: h (m), θ (rad), and the roll unless open."""
+    """A picked grasp in the object's frame.
+
+    Attributes:
+        h: height (m).
+        theta: angle θ (rad).
+        roll: index of the roll; None for the one that `MapViewState.roll` shows.
+    """
 
     h: float
     theta: float
@@ -47,24 +53,24 @@ class State:
     """One browser's scene, object pose, map, pick and plan.
 
     Attributes:
-        scene: the scene as loaded, with the object that was put into it.
-        scene_name: what it was chosen by.
-        task, arm: the names chosen.
-        object_choice: the object that was put into the scene in place of its own.
+        scene: the scene with the chosen object, hands and tasks, at the poses of its file.
+        scene_name: its option in the menu.
+        task, arm: names of those chosen.
+        object_choice: the object that replaces the scene's own; None for its own.
         uploaded_object: the object that was uploaded last.
         uploaded_scene: the scene that was uploaded last.
-        poses: task → base pose, of the tasks that were moved.
-        pose_when_chosen: that of the chosen task when it was chosen; None where it had not been moved.
+        poses: task → base pose of the object, of the tasks that were moved.
+        pose_when_chosen: the entry of `poses` for the chosen task when it was chosen, if there was one.
         delta: turn (rad) of the object about its axis.
-        result: the newest map, maybe of an earlier request.
-        pick: the grasp picked.
-        map_view: how the map is looked at, and what was computed for that.
-        plan_results: what the planners found, and which part of it is shown.
-        step: index of the plan's task that is shown; None once the person has moved on.
+        result: the newest map, which may be of an earlier pose.
+        pick: the picked grasp.
+        map_view: how the map is shown, and what was computed for it.
+        plan_results: the results of planners, and which part is shown.
+        step: index of the plan's task that is shown; None once something else is shown.
         busy: the computation under way.
-        refused: the request that was cancelled or failed: not computed again unasked.
-        problem: one line about what went wrong last.
-        display: switches of the page.
+        refused: the request that was cancelled or failed and is not restarted by itself.
+        problem: one line about the last error.
+        display: display options of the page.
         link: the link that was made last.
         history: what can be undone and redone.
     """
@@ -99,7 +105,7 @@ class State:
 
     @property
     def input_values(self) -> tuple[object, ...]:
-        """Everything that a widget or the gizmo shows and can change."""
+        """All values that a widget or the gizmo shows and can change."""
         return (
             self.scene, self.scene_name, self.task, self.arm, self.base, self.delta, self.pick, self.step,
             self.display, self.object_choice, self.uploaded_object, self.uploaded_scene,
@@ -109,7 +115,7 @@ class State:
 
     @property
     def link_values(self) -> tuple[object, ...]:
-        """Everything that a link contains, but for the camera."""
+        """All values that a link contains, except the camera."""
         return (
             self.scene, self.scene_name, self.object_choice, self.task, self.arm, self.poses, self.delta,
             self.map_view.roll, self.pick, self.map_view.color_by, self.display,
@@ -119,97 +125,97 @@ class State:
 
     @property
     def object_option(self) -> str:
-        """The option that the object was chosen by."""
+        """The object's option in the menu."""
         return self.object_choice.option if self.object_choice else OWN
 
     @property
     def shown_upload(self) -> Scene | None:
-        """The uploaded scene, if that is the one shown, whatever object was put into it."""
+        """The uploaded scene as it was read, if it is the one shown."""
         uploaded = self.uploaded_scene
         return uploaded.scene if uploaded and uploaded.option == self.scene_name else None
 
     @cached_property
     def base(self) -> ObjectPose:
-        """The object's base pose."""
+        """The object's base pose, without δ."""
         return self.request.pose or ObjectPose.of(self.request.T_world_object)
 
     @cached_property
     def T_world_object(self) -> Array:
-        """Where the object stands (4, 4)."""
+        """Pose (4, 4) of the object, turned by δ."""
         return self.request.T_world_object @ rotation_z(self.delta)
 
     def moved_scene(self) -> Scene:
-        """Return the scene with all tasks where they were moved to."""
+        """Return the scene with all tasks at the poses they were moved to."""
         return moved(self.scene, self.poses)
 
     # -- what is computed -------------------------------------------------------------------
 
     @cached_property
     def request(self) -> MapRequest:
-        """The map that belongs to the task, arm and base pose."""
+        """The request for the map of the chosen task and arm at the base pose."""
         return MapRequest(self.scene, self.arm, self.task, self.poses.get(self.task))
 
     @property
     def is_current(self) -> bool:
-        """Whether the map shown is the one for the object's pose."""
+        """Whether the newest map is the one for the object's pose."""
         return self.result is not None and self.result.request == self.request
 
     @property
     def missing_request(self) -> Request | None:
-        """The first request whose result is missing."""
+        """The first request whose result is missing, None if there is none."""
         if not self.is_current:
             return self.request
         return self.map_view.missing_request(self.request, self.delta, self.base_cell)
 
     @property
     def pending_request(self) -> Request | None:
-        """The same, unless it was cancelled or failed: then nothing is computed unasked."""
+        """The missing request, unless it was cancelled or failed."""
         return None if self.missing_request == self.refused else self.missing_request
 
     @property
     def next_request(self) -> Request | None:
-        """The request to begin now; None while another computation goes first, such as a planner."""
+        """The pending request to start now; None while another computation goes first, such as a planner."""
         pending = self.pending_request
         return None if pending is None or (self.busy and self.busy.goes_before(pending)) else pending
 
     @property
     def is_obsolete(self) -> bool:
-        """Whether a request is being computed whose result is no longer needed."""
+        """Whether the request being computed is no longer needed."""
         return bool(self.busy and self.busy.request) and self.pending_request is None
 
     @property
     def is_stopped(self) -> bool:
-        """Whether a result is missing that is not computed unless it is asked for again."""
+        """Whether a result is missing and nothing is computed until a person restarts it."""
         return self.busy is None and self.missing_request is not None
 
     @property
     def is_waiting(self) -> bool:
-        """Whether something is being computed that takes long enough to say so."""
+        """Whether the page shows a computation as running."""
         return self.busy is not None and (self.busy.request is None or self.busy.late or self.result is None)
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the map shown is the one for the object's pose, or will be in a moment."""
+        """Whether the newest map is for the object's pose, or a quick computation will replace it."""
         if self.is_current:
             return True
-        follows = self.result is not None and self.result.request.differs_in_pose(self.request)
+        follows = self.result is not None and self.result.request.differs_only_in_pose(self.request)
         return follows and self.busy is not None and not self.is_waiting
 
     # -- the map and the picked grasp -------------------------------------------------------
 
     @cached_property
     def map(self) -> FeasibilityMap | None:
-        """The map over the object as it is turned; it may be of an earlier pose."""
+        """The newest map, shifted by δ."""
         return self.result.map.shift(self.delta) if self.result else None
 
     @property
     def contacts(self) -> tuple[str, ...]:
-        """The obstacles that the object is inside of, one phrase each."""
+        """A phrase for each obstacle that the object is inside of."""
         return self.result.contacts if self.result and self.is_current else ()
 
     @cached_property
     def cell(self) -> Cell | None:
-        """The cell of `map` that holds the pick."""
+        """The cell of `map` that contains the picked grasp."""
         if self.pick is None or self.map is None:
             return None
         row, column = self.map.manifold.cell(self.pick.h, self.pick.theta)
@@ -220,7 +226,7 @@ class State:
 
     @cached_property
     def base_cell(self) -> Cell | None:
-        """The same cell of the map before it is shifted: it has the same tool pose."""
+        """The cell of the unshifted map with the same tool pose as `cell`."""
         if self.cell is None or self.result is None:
             return None
         grid = self.result.map.manifold
@@ -229,14 +235,15 @@ class State:
     @property
     def explanation(self) -> Explanation | None:
         """The results of all candidates of the picked cell, once they are computed."""
-        found = self.map_view.explained
-        if found is None or not self.is_current or self.base_cell is None:
+        explained = self.map_view.explained
+        if explained is None or not self.is_current or self.base_cell is None:
             return None
-        return found.explanation if found.request == ExplainRequest(self.request, self.base_cell) else None
+        request = ExplainRequest(self.request, self.base_cell)
+        return explained.explanation if explained.request == request else None
 
     @property
     def candidate(self) -> int | None:
-        """Index of the candidate shown: the one chosen, else the map's witness or what came closest."""
+        """Index of the candidate shown: the one chosen, else the map's witness, else the best."""
         if self.explanation is None or not self.explanation.candidates:
             return None
         if self.map_view.candidate is not None:
@@ -257,7 +264,7 @@ class State:
 
     @property
     def plan(self) -> PlanResult | None:
-        """The plan that is shown, or was until the person moved on."""
+        """The plan that is chosen, also while something else is shown."""
         return self.plan_results.plan
 
     @cached_property
@@ -267,14 +274,14 @@ class State:
 
     @cached_property
     def climb_step(self) -> ClimbStep | None:
-        """The step of the hill climbing that is shown, if nothing else is."""
+        """The step of the hill climbing that is shown, None while something else is."""
         climb, frame = self.plan_results.climb, self.plan_results.frame
         if climb is None or frame is None or self.task != climb.task or self.delta or self.pick:
             return None
         return climb.steps[frame]
 
     def can_plan(self, kind: PlanKind) -> bool:
-        """Return whether the scene has tasks for a planner."""
+        """Return whether the scene has tasks for a kind of planner."""
         tasks = self.scene.tasks.values()
         if kind == "sequential":
             return any(task.arms == (self.arm,) for task in tasks)
@@ -284,6 +291,6 @@ class State:
 
     @property
     def bimanual_task(self) -> str:
-        """Name of the task for several arms that is planned: the chosen one, or the first."""
+        """Name of the task for several arms to plan: the chosen one if it is such a task, else the first."""
         names = [task.name for task in self.scene.tasks.values() if len(task.arms) > 1]
         return self.task if self.task in names or not names else names[0]

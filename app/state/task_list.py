@@ -16,7 +16,7 @@ __all__ = ["TaskList"]
 
 
 class TaskList(NamedTuple):
-    """The tasks of a scene and where their object was moved to; a change returns a new one.
+    """The tasks of a scene and the poses they were moved to; a change returns a new one.
 
     Attributes:
         scene: the scene.
@@ -34,26 +34,25 @@ class TaskList(NamedTuple):
         pose = self.poses.get(self.task)
         return pose.matrix() if pose else self.scene.task(self.task).T_world_object
 
-    def added(self, pose: Array, back: ObjectPose | None) -> TaskList:
+    def added(self, pose: Array, previous: ObjectPose | None) -> TaskList:
         """Add a task at an object pose (4, 4), after the chosen one and with its arms.
 
         Args:
-            pose: that of the new task.
-            back: where the object of the chosen task was moved to before it was moved to the new pose;
-                None for where the scene has it.
+            pose: base pose of the object in the new task.
+            previous: the pose that the chosen task returns to; None for that of the scene.
         """
         names = list(self.scene.tasks)
         number = next(n for n in range(len(names) + 1, 10**9) if f"task {n}" not in names)
         task = Task(f"task {number}", self.scene.task(self.task).arms, pose)
         tasks = list(self.scene.tasks.values())
         tasks.insert(names.index(self.task) + 1, task)
-        poses = {name: known for name, known in self.poses.items() if name != self.task}
-        if back:
-            poses[self.task] = back
+        poses = {name: moved for name, moved in self.poses.items() if name != self.task}
+        if previous:
+            poses[self.task] = previous
         return TaskList(self.scene.with_tasks(tasks), poses, task.name)
 
     def removed(self) -> TaskList:
-        """Remove the chosen task and choose its neighbour.
+        """Remove the chosen task and choose the one before it.
 
         Raises:
             InputError: it is the only one.
@@ -67,7 +66,7 @@ class TaskList(NamedTuple):
         return TaskList(scene, poses, (names[:at] + names[at + 1 :])[max(at - 1, 0)])
 
     def shifted(self, by: int) -> TaskList:
-        """Move the chosen task by so many places; the ends stop it."""
+        """Move the chosen task by a number of positions in the list, at most to its ends."""
         tasks = list(self.scene.tasks.values())
         at = next(k for k, task in enumerate(tasks) if task.name == self.task)
         to = min(max(at + by, 0), len(tasks) - 1)
@@ -77,10 +76,10 @@ class TaskList(NamedTuple):
         return self._replace(scene=self.scene.with_tasks(tasks))
 
     def renamed(self, name: str) -> TaskList:
-        """Call the chosen task something else.
+        """Rename the chosen task.
 
         Raises:
-            InputError: the name is taken or no name.
+            InputError: the name is taken or invalid.
         """
         name = name.strip()
         if name == self.task:
@@ -89,8 +88,8 @@ class TaskList(NamedTuple):
             Task(name, task.arms, task.T_world_object) if task.name == self.task else task
             for task in self.scene.tasks.values()
         ]
-        poses = {name if known == self.task else known: pose for known, pose in self.poses.items()}
+        poses = {name if old == self.task else old: pose for old, pose in self.poses.items()}
         try:
             return TaskList(self.scene.with_tasks(tasks), poses, name)
-        except SceneError as error:  # which file the tasks came from does not matter here
+        except SceneError as error:  # without the name of the scene's file
             raise InputError("tasks", error.field, name, error.expected) from None

@@ -1,8 +1,7 @@
-"""Recording every choice of a person in the history, and going back and forth in it.
+"""Undo and redo of what a person chooses, uploads included.
 
-Only what is chosen goes back, uploads with it: a scene or an object can be chosen wherever it is shown.
-What was computed stays where it still fits, and comes from the cache, or is computed again, where it does
-not.
+Results are not part of the history, except plans: a result that still fits the restored state is kept,
+any other comes from the cache or is computed again.
 """
 
 from __future__ import annotations
@@ -17,18 +16,18 @@ from .state import State
 __all__ = ["PLANS_KEPT", "redo", "remember", "undo"]
 
 PLANS_KEPT = 6
-"""Results of planners that the history keeps: a map may take 4 MB. Earlier steps come back without plan."""
+"""How many results of planners the history keeps, as a map may take 4 MB; older steps lose theirs."""
 
 
 def remember(before: State, after: State, origin: str, time: float) -> State:
-    """Return the state after a change, with the change in its history.
+    """Return the state after a change, with the change recorded in its history.
 
     Args:
         before: the state that was changed.
         after: the changed one.
-        origin: "inputs", "gizmo" or "scrub" where the change may be part of a drag; "play" where
-            nobody chose anything.
-        time: when (s) it was changed, from any beginning.
+        origin: "inputs", "gizmo" or "scrub" if the change may be part of a drag; "play" for the playback,
+            which is not recorded.
+        time: of the change (s), by a monotonic clock.
     """
     if after.history is not before.history:  # the change was an undo or a redo
         return after
@@ -43,18 +42,18 @@ def remember(before: State, after: State, origin: str, time: float) -> State:
 
 def undo(state: State) -> State:
     """Return to the state before the last step."""
-    found = state.history.undone(_without_results(state))
-    return _restored(state, *found) if found else state
+    step = state.history.undone(_without_results(state))
+    return _restored(state, *step) if step else state
 
 
 def redo(state: State) -> State:
-    """Take back an undo."""
-    found = state.history.redone(_without_results(state))
-    return _restored(state, *found) if found else state
+    """Return to the state before the last undo."""
+    step = state.history.redone(_without_results(state))
+    return _restored(state, *step) if step else state
 
 
 def _changed_values(before: State, after: State, origin: str) -> frozenset[object]:
-    """Name the values that changed: gizmo and scrubbers change several at once, widgets one or two."""
+    """Return names for the changed values; gizmo and scrubbers count as one, as they change several."""
     if origin in ("gizmo", "scrub"):
         return frozenset([origin])
     pairs = zip(before.input_values, after.input_values, strict=True)
@@ -62,7 +61,7 @@ def _changed_values(before: State, after: State, origin: str) -> frozenset[objec
 
 
 def _without_results(state: State) -> State:
-    """Leave out what is computed; a plan cannot be made again at once, so it stays."""
+    """Return a state without computed results; plans are kept, since planning again takes time."""
     map_view = state.map_view.without_results()
     return replace(
         state, history=History(), map_view=map_view, result=None, refused=None, busy=None, problem=""
@@ -70,7 +69,7 @@ def _without_results(state: State) -> State:
 
 
 def _with_few_plans(past: tuple[State, ...]) -> tuple[State, ...]:
-    """Drop the plans of the earliest steps, so that not every map that was ever planned with is kept."""
+    """Return the steps with plans only in the latest `PLANS_KEPT`, to limit memory."""
     kept: set[frozenset[FeasibilityMap]] = set()
     steps: list[State] = []
     for state in reversed(past):
@@ -84,7 +83,7 @@ def _with_few_plans(past: tuple[State, ...]) -> tuple[State, ...]:
 
 
 def _restored(present: State, restored: State, history: History[State]) -> State:
-    """Return a state of the past with its history, and with the results of the present that still fit it."""
+    """Return a state of the history with the present results that still fit it."""
     result = present.result if present.scene is restored.scene else None
     if restored.plan and restored.shown_task:
         result = restored.plan_results.maps.get((restored.task, restored.arm), result)

@@ -1,4 +1,4 @@
-"""A scene that a person uploaded."""
+"""An uploaded scene."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["UploadedScene"]
 
 @dataclass(frozen=True, eq=False)
 class UploadedScene:
-    """A scene that was uploaded.
+    """An uploaded scene and its option in the menu.
 
     Attributes:
         option: its name in the menu of the page.

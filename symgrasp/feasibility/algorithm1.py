@@ -37,7 +37,7 @@ def create_map_reference(
         arm: the arm.
         task: the task; it need not be one of the scene's.
         manifold: the grid.
-        progress: told the finished share after every row; may raise `Cancelled`.
+        progress: called with the finished share after every row; may raise `Cancelled`.
 
     Raises:
         UrdfError: the arm has no closed-form inverse kinematics.

@@ -79,7 +79,7 @@ class MapMaker:
             task: the task or its name; the scene's first if None. It need not be one of the scene's.
             cell: (roll, row, column).
             manifold: another grid than the scene's.
-            progress: told the finished share; may raise `Cancelled`.
+            progress: called with the finished share; may raise `Cancelled`.
         """
         the_arm, the_task = self._chosen(arm, task)
         if the_arm.name not in self._solvers:
@@ -125,7 +125,7 @@ def create_map(
             the same, and so are the reasons up to JOINT_LIMITS; the engine's witnesses have the
             largest clearance that it found, the reference's are the first.
         manifold: another grid than the scene's.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Raises:
         SceneError: there is no such arm or task.
@@ -156,7 +156,7 @@ def explain(
         roll: turn (rad) of the hand about its approach: 0 or π.
         task: name of the task; the scene's first if None.
         arm: name of the arm; the task's first if None.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Returns:
         The candidates, best first, and the reason that the map has for the cell. Printed, it is a

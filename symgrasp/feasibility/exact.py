@@ -100,7 +100,7 @@ class ExactEngine:
         Args:
             task: the task; it need not be one of the scene's.
             manifold: another grid than the engine's, with the same heights.
-            progress: told the finished share; may raise `Cancelled`.
+            progress: called with the finished share; may raise `Cancelled`.
 
         Raises:
             ValueError: the grid has other heights.

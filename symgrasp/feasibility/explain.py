@@ -179,7 +179,7 @@ def explain_cell(
         task: the task.
         manifold: the grid.
         cell: the cell.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
     """
     tools = manifold.tool_poses(task.T_world_object, arm.hand.finger_depth)
     h = float(manifold.h[cell.row])

@@ -33,7 +33,7 @@ def check_plan(content: str | bytes, source: str, progress: Progress | None = No
     Args:
         content: of the file.
         source: its name, for errors.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Raises:
         PlanError: the content is not a plan.

@@ -75,7 +75,7 @@ def verify(plan: Plan | str | Path, progress: Progress | None = None) -> Report:
 
     Args:
         plan: the plan, or the path of its file.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Returns:
         What was checked and what does not hold; true where all of it holds.

@@ -94,7 +94,7 @@ def hill_climb(
         bodies_free: asked once the prints are apart; if it says no, the search restarts.
         seed: of the random choices; the same seed gives the same placement.
         limits: how long to search.
-        progress: told the share of restarts used; may raise `Cancelled`.
+        progress: called with the share of restarts used; may raise `Cancelled`.
         count: what to count; the cells that handprints share if None.
         trace: receives every step in turn, whether anything is found or not.
 

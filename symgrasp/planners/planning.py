@@ -62,7 +62,7 @@ def plan_sequential(
         method: ``best`` is the grasp with the largest margin in its worst task, ``first`` is
             Algorithm 2 as printed, ``regrasp`` the fewest grasps that serve the whole sequence,
             with the object set down in between.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Raises:
         ConflictError: no grasp serves all tasks; says which exclude each other.
@@ -130,7 +130,7 @@ def plan_bimanual(
             Algorithm 3.
         seed: of the random choices of the hill climbing.
         limits: how long to climb.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
         trace: receives every position of the hill climbing, whether it finds something or not.
 
     Raises:
@@ -176,7 +176,7 @@ def plan_handover(
     Args:
         scene: the scene.
         maps: (task, arm) → map; computed where missing.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Raises:
         NoPlanError: no grasps exist on this grid.

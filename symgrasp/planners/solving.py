@@ -111,7 +111,7 @@ def holdings(
     Args:
         world: a world of the scene.
         visits: the tasks in order, with the maps of all their arms.
-        progress: told the finished share; may raise `Cancelled`.
+        progress: called with the finished share; may raise `Cancelled`.
         turned: turn (rad, whole cells) of the object in the first task.
 
     Yields:
@@ -189,7 +189,7 @@ def climb(
         visit: the task, with the maps of all its arms.
         seed: of the random choices.
         limits: how long to search.
-        progress: told the share of restarts used; may raise `Cancelled`.
+        progress: called with the share of restarts used; may raise `Cancelled`.
         trace: receives every step of the search.
 
     Returns:

@@ -26,7 +26,7 @@ def cache() -> SharedCache:
 
 
 def test_only_so_many_maps_are_kept(monkeypatch):
-    monkeypatch.setattr(cache_module, "MAPS_KEPT", 3)
+    monkeypatch.setattr(cache_module, "MAX_MAPS", 3)
     cache = SharedCache("bottle_on_table")
     base = small_map("bottle_on_table", "pick", "panda")
     states = [
@@ -38,7 +38,7 @@ def test_only_so_many_maps_are_kept(monkeypatch):
 
 
 def test_a_drag_pushes_out_its_own_maps_only(monkeypatch):
-    monkeypatch.setattr(cache_module, "POSES_KEPT", 2)
+    monkeypatch.setattr(cache_module, "MAX_POSES", 2)
     cache, base = SharedCache("bottle_on_table"), small_map("bottle_on_table", "pick", "panda")
     bottle, can = (State.of(load_small(name), name) for name in ("bottle_on_table", "soda_can"))
     drag = [changes.moved(bottle, x=x).request for x in (0.1, 0.2, 0.3, 0.4)]

@@ -14,7 +14,7 @@ def test_the_first_map_is_there_before_anybody_asks(monkeypatch, tmp_path, conte
     cache = SharedCache(str(write_scene(tmp_path, content)))
     request = State.of(cache.scene(cache.first), cache.first).request
     assert cache.map(request) is None
-    monkeypatch.setattr(warm_up, "PATIENCE", -1.0)
+    monkeypatch.setattr(warm_up, "TIME_LIMIT", -1.0)
     monkeypatch.setattr(MapMaker, "map", lambda self, arm, task, progress: progress(0.5))
     warm_up.compute_first_map(cache)  # takes too long: the page opens without it
     assert cache.map(request) is None

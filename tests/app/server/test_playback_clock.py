@@ -6,7 +6,7 @@ import pytest
 
 from app.server.playback_clock import INTERVAL, PlaybackClock
 from app.state import changes, plan_changes
-from app.state.plan_results import SECONDS_A_TASK
+from app.state.plan_results import SECONDS_PER_TASK
 from tests.app.state.test_state import with_plan
 
 
@@ -29,9 +29,9 @@ def test_a_play_goes_on_by_the_time_that_has_passed(clock):
     assert clock.wait(state, 10.0 + INTERVAL / 2) == pytest.approx(INTERVAL / 2)
     assert clock.advanced(state, 10.0 + INTERVAL / 2) is state
     state = clock.advanced(state, 10.5)
-    assert state.plan_results.position == pytest.approx(0.5 / SECONDS_A_TASK)
+    assert state.plan_results.position == pytest.approx(0.5 / SECONDS_PER_TASK)
     state = clock.advanced(state, 10.5 + INTERVAL)
-    assert state.plan_results.position == pytest.approx((0.5 + INTERVAL) / SECONDS_A_TASK)
+    assert state.plan_results.position == pytest.approx((0.5 + INTERVAL) / SECONDS_PER_TASK)
 
 
 def test_a_play_that_has_ended_begins_anew_where_play_is_pressed(clock):
@@ -45,7 +45,7 @@ def test_a_play_that_has_ended_begins_anew_where_play_is_pressed(clock):
     assert state.plan_results.position == 0.0
     state = clock.advanced(state, 300.0)
     assert state.plan_results.position == 0.0
-    assert clock.advanced(state, 301.0).plan_results.position == pytest.approx(1.0 / SECONDS_A_TASK)
+    assert clock.advanced(state, 301.0).plan_results.position == pytest.approx(1.0 / SECONDS_PER_TASK)
 
 
 def test_a_play_stops_where_the_person_has_moved_on(clock):

@@ -20,7 +20,7 @@ from app.files.plan_formats import PLAN_LIMIT
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
 from app.render.playback import playback_frame
 from app.render.prints import shown_prints
-from app.server.plan_actions import opened as plan_opened
+from app.server.plan_actions import show_opened_plan
 from app.state import changes, job_changes, plan_changes
 from app.state.plan_results import PlanResults
 from app.state.state import State
@@ -221,7 +221,7 @@ def test_a_plan_of_one_task_has_nothing_to_play():
 
 
 def test_all_solutions_are_listed_part_by_part_each_once(plans, monkeypatch):
-    monkeypatch.setattr(plan_service, "LISTED", 3)
+    monkeypatch.setattr(plan_service, "PLANS_PER_BATCH", 3)
     scene = load_small("pick_pour_place", heights=24)
     request, service = PlanRequest(scene, "sequential", "best", "panda"), MapService()
     maps, _ = service.maps(request.maps, {}, quiet)
@@ -315,7 +315,7 @@ def test_a_plan_from_a_file_brings_its_scene(plans, name, kind):
     found = plans.open(plan.to_json().encode(), "a.json", quiet)
     assert found.report.failures == ()
     assert found.report.checks > 10
-    state = plan_opened(opened("soda_can"), found, planned(name, kind).maps)
+    state = show_opened_plan(opened("soda_can"), found, planned(name, kind).maps)
     assert (state.scene_name, state.scene.name) == ("a.json (upload)", name)
     assert state.plan.plan == plan
     assert state.is_current
@@ -330,7 +330,7 @@ def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans)
     assert found.plan is None
     assert any("10.0" in failure or "0.01" in failure for failure in found.report.failures)
     before = with_plan("soda_can", "sequential")
-    state = plan_opened(before, found, {})
+    state = show_opened_plan(before, found, {})
     assert state.scene is before.scene
     assert state.plan is before.plan
     assert state.plan_results.opened is found.report
