@@ -12,7 +12,8 @@ test: $(VENV)/dev.stamp  ## install, then run every check and test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest -m 'not browser' $(ARGS)
+	$(BIN)/pytest -m browser $(ARGS)
 
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \

@@ -1,4 +1,4 @@
-"""Scenes that many tests share, loaded once, and how tests are shared among processes."""
+"""Scenes that many tests share, loaded once; and compiling before the tests begin in several processes."""
 
 from __future__ import annotations
 
@@ -25,9 +25,6 @@ settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 ROOT = Path(__file__).parent.parent
 
-LONGEST = ("tests/e2e", "tests/app/server", "tests/planners", "tests/plan", "tests/test_packaging.py")
-"""Folders and files whose tests take longest."""
-
 SHIPPED = list(shipped_scenes())
 
 
@@ -42,22 +39,6 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.cache.get(key, "") != compiled:
         subprocess.run([sys.executable, "-m", "tests.compile_all"], cwd=ROOT, check=True)
         config.cache.set(key, compiled)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests of a folder in one process, the longest first.
-
-    They share servers, maps and plans; and two browsers at once would only wait for each other.
-    """
-
-    def group(item: pytest.Item) -> str:
-        file = item.path.relative_to(ROOT)
-        return str(file.parent if len(file.parts) > 2 else file)
-
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(group(item)))
-    items.sort(key=lambda i: LONGEST.index(group(i)) if group(i) in LONGEST else len(LONGEST))
 
 
 @cache

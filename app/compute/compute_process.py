@@ -130,7 +130,8 @@ class ComputeProcess:
     def _results(self, requests: Sequence[MapRequest]) -> Maps:
         """Return the maps that the last call computed, as the answers to requests."""
         by_key = {(request.task, request.arm): request for request in requests}
-        pairs = ((c, by_key.get((c.map.task, c.map.arm))) for c in self._computed)
+        computed, self._computed = self._computed, []
+        pairs = ((c, by_key.get((c.map.task, c.map.arm))) for c in computed)
         return {(r.task, r.arm): MapResult(r, c.map, c.contacts) for c, r in pairs if r}
 
     def _call(self, method: str, progress: Progress, *args: object, maps: Sequence[MapRequest] = ()) -> Any:

@@ -32,7 +32,7 @@ from symgrasp.scene.scene import Scene
 from ..files.plan_formats import PLAN_LIMIT
 from ..files.scene_files import refuse_foreign_files
 from ..scene3d.visual_meshes import check_visuals
-from ..state.object_pose import ObjectPose, moved
+from ..state.object_pose import ObjectPose, with_poses
 from ..state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
 from ..state.requests import MapRequest, Maps
 from ..state.uploaded_scene import UploadedScene
@@ -160,7 +160,7 @@ class PlanService:
             SceneError: the scene has nothing for that planner.
         """
         self.close()
-        scene = moved(request.scene, request.poses)
+        scene = with_poses(request.scene, request.poses)
         results, progress = self._maps.maps(request.maps, cached, progress)
         maps = {key: result.map for key, result in results.items()}
         try:

@@ -179,8 +179,9 @@ class Actions:
             return
         camera, fov = camera_of(self._client), self._client.camera.fov
 
-        def run(_: Progress) -> None:
+        def run(progress: Progress) -> None:
             html = snapshot_html(state, camera, fov)
+            progress(1.0)  # a cancelled view is not sent
             self._session.send(_file_name(state.scene.name, ".html"), html.encode())
 
         self._session.submit("Drawing the 3D view", run, lambda state, _: state)

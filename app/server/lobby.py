@@ -51,7 +51,7 @@ class Lobby:
 
     Args:
         cache: what all sessions share.
-        is_here: called with a client id; returns whether that browser is still connected.
+        is_connected: called with a client id; returns whether that browser is still connected.
     """
 
     def __init__(self, cache: SharedCache, is_connected: Callable[[int], bool]) -> None:
@@ -60,11 +60,6 @@ class Lobby:
         self._lock = threading.Condition()
         self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
         self._sessions: dict[int, Session] = {}
-
-    @property
-    def session_count(self) -> int:
-        """How many sessions are open."""
-        return len(self._sessions)
 
     def wait_until_empty(self, timeout: float | None = None) -> bool:
         """Wait, for so long (s) at most, until there is no session; return whether there is none."""

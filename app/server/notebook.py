@@ -20,7 +20,7 @@ from ..state.requests import MapRequest, MapResult
 from ..state.state import State
 from .snapshot import snapshot_html
 
-__all__ = ["map_html", "plan_html"]
+__all__ = ["map_document", "plan_document"]
 
 ASPECT = 1.6
 """Ratio of width to height that the camera is placed for."""
@@ -29,7 +29,7 @@ HEIGHT = 400
 """Height (px) of the view of each task of a plan."""
 
 
-def map_html(m: FeasibilityMap, scene: Scene) -> str:
+def map_document(m: FeasibilityMap, scene: Scene) -> str:
     """Return the HTML document of a map on its object, with the arm at home.
 
     Args:
@@ -43,7 +43,7 @@ def map_html(m: FeasibilityMap, scene: Scene) -> str:
     return _drawn(replace(state, result=MapResult(state.request, m)))
 
 
-def plan_html(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap]) -> str:
+def plan_document(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap]) -> str:
     """Return the HTML document of every task of a plan: the turned object and the arms that hold it.
 
     Args:

@@ -24,6 +24,8 @@ from ..panels.layout import Layout
 from ..scene3d.scene_view import SceneView
 from ..state import changes, job_changes
 from ..state.page_link import Camera
+from ..state.plan_changes import change_plan_results
+from ..state.plan_results import PlanResults
 from ..state.requests import CompareRequest, ExplainRequest, MapRequest, Request
 from ..state.state import State
 from ..state.undo import remember
@@ -255,8 +257,15 @@ class Session:
 
     def _play(self) -> None:
         """Advance the playback; the lock is held."""
-        if self.state is not None:
-            self._commit(self._playback.advanced(self.state, time.monotonic()), "play")
+        if self.state is None:
+            return
+        try:
+            state = self._playback.advanced(self.state, time.monotonic())
+        except Exception as error:  # a playback that breaks must not end the drawing
+            log.exception("the playback broke")
+            paused = change_plan_results(self.state, PlanResults.paused)
+            state = job_changes.failed(paused, f"the playback broke: {type(error).__name__}: {error}")
+        self._commit(state, "play")
 
     def _draw(self, state: State, *, write_inputs: bool, move_gizmo: bool) -> None:
         try:

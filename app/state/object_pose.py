@@ -11,7 +11,7 @@ from symgrasp.poses import Array, axis_frame, rotation_z, spin
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
-__all__ = ["ObjectPose", "moved"]
+__all__ = ["ObjectPose", "with_poses"]
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ObjectPose:
         return axis_frame(pose) @ rotation_z(self.spin)
 
 
-def moved(scene: Scene, poses: Mapping[str, ObjectPose]) -> Scene:
+def with_poses(scene: Scene, poses: Mapping[str, ObjectPose]) -> Scene:
     """Return the scene with some of its tasks at other poses: task → pose."""
     for name, pose in poses.items():
         scene = scene.with_task(Task(name, scene.task(name).arms, pose.matrix()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.explain import Explanation
@@ -12,7 +13,7 @@ from symgrasp.poses import Array
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
-from .object_pose import ObjectPose, moved
+from .object_pose import ObjectPose, with_poses
 
 __all__ = [
     "Busy",
@@ -46,6 +47,10 @@ class MapRequest:
     task: str
     pose: ObjectPose | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
+        return self.__dict__.copy()
+
     @cached_property
     def T_world_object(self) -> Array:
         """The base pose (4, 4)."""
@@ -74,7 +79,7 @@ class MapRequest:
 
     def moved_scene(self) -> Scene:
         """Return the scene with the task moved to the pose."""
-        return moved(self.scene, {self.task: self.pose} if self.pose else {})
+        return with_poses(self.scene, {self.task: self.pose} if self.pose else {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +98,6 @@ class MapResult:
 
     def renamed(self, request: MapRequest) -> MapResult:
         """Return it as the answer to a request with the same key, with that scene's and task's names."""
-        if request is self.request:
-            return self
         names = (request.scene.name, request.task)
         same = names == (self.map.scene, self.map.task)
         named = self.map if same else replace(self.map, scene=names[0], task=names[1])

@@ -24,7 +24,7 @@ from .display import Display
 from .history import History
 from .map_view_state import MapViewState
 from .object_choice import OWN, ObjectChoice
-from .object_pose import ObjectPose, moved
+from .object_pose import ObjectPose, with_poses
 from .page_link import PageLink
 from .plan_results import PlanKind, PlanResult, PlanResults
 from .requests import Busy, ExplainRequest, MapRequest, MapResult, Request
@@ -146,7 +146,7 @@ class State:
 
     def moved_scene(self) -> Scene:
         """Return the scene with all tasks at the poses they were moved to."""
-        return moved(self.scene, self.poses)
+        return with_poses(self.scene, self.poses)
 
     # -- what is computed -------------------------------------------------------------------
 

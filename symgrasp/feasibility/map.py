@@ -79,6 +79,10 @@ class FeasibilityMap:
     depth: Array
     shown_in: Scene | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
+        return self.__dict__.copy()
+
     def __post_init__(self) -> None:
         for name in _ARRAYS:
             array = np.array(getattr(self, name))
@@ -208,7 +212,7 @@ class FeasibilityMap:
             print(f"{name}: no 3D view, because the map does not know its scene")
             return
         try:
-            document = page.page_module("server.notebook").map_html(self, self.shown_in)
+            document = page.page_module("server.notebook").map_document(self, self.shown_in)
         except (ImportError, SymgraspError) as error:
             print(f"{name}: no 3D view: {error}")
         else:

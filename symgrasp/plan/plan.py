@@ -161,7 +161,7 @@ class Plan(_Part):
                 page.show_picture(png, f"{self.scene.name}, {task.name} with {hold.arm}")
         name = f"{self.scene.name}, {self.kind} plan"
         try:
-            document = page.page_module("server.notebook").plan_html(self, scene, maps)
+            document = page.page_module("server.notebook").plan_document(self, scene, maps)
         except (ImportError, SymgraspError) as error:
             print(f"{name}: no 3D view: {error}")
         else:

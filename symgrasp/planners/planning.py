@@ -18,7 +18,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan, Planner
 from symgrasp.plan.writing import write_plan
 from symgrasp.planners.bimanual import Climb, ClimbStep
-from symgrasp.planners.solving import Visit, climb, first_grasp, holdings, with_regrasps
+from symgrasp.planners.solving import TaskVisit, climb, first_grasp, holdings, with_regrasps
 from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -238,11 +238,11 @@ def _task_together(scene: Scene, task: str | None) -> Task:
 
 def _visits(
     world: BulletWorld, tasks: Sequence[Task], known: MapsByKey | None, progress: Progress | None
-) -> list[Visit]:
+) -> list[TaskVisit]:
     """Visit every task once, with the maps of all its arms; those that are not known are computed."""
     total = sum(len(task.arms) for task in tasks)
     maker = MapMaker(world)
-    visits: list[Visit] = []
+    visits: list[TaskVisit] = []
     done = 0
     for task in tasks:
         maps: dict[str, FeasibilityMap] = {}
@@ -251,5 +251,5 @@ def _visits(
             given = (known or {}).get((task.name, arm))
             maps[arm] = given or maker.map(arm, task, progress=step)
             done += 1
-        visits.append(Visit(task, maps))
+        visits.append(TaskVisit(task, maps))
     return visits

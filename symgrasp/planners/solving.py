@@ -24,10 +24,10 @@ from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.world import BulletWorld
 
-__all__ = ["Visit", "climb", "first_grasp", "holdings", "with_regrasps"]
+__all__ = ["TaskVisit", "climb", "first_grasp", "holdings", "with_regrasps"]
 
 
-class Visit(NamedTuple):
+class TaskVisit(NamedTuple):
     """One time that the object is in the pose of a task; a regrasp visits a task twice.
 
     Attributes:
@@ -39,7 +39,7 @@ class Visit(NamedTuple):
     maps: Mapping[str, FeasibilityMap]
 
 
-def first_grasp(world: BulletWorld, visits: Sequence[Visit], arm: str) -> list[PlanTask]:
+def first_grasp(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> list[PlanTask]:
     """Find the grasp of Algorithm 2 for a sequence of one arm.
 
     Args:
@@ -62,7 +62,7 @@ def first_grasp(world: BulletWorld, visits: Sequence[Visit], arm: str) -> list[P
     return entries
 
 
-def with_regrasps(world: BulletWorld, visits: Sequence[Visit], arm: str) -> list[PlanTask]:
+def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> list[PlanTask]:
     """Find the fewest grasps for a sequence of one arm, each the best for its tasks.
 
     A regrasp visits the task where the object is set down twice: at the end with the old grasp,
@@ -85,7 +85,7 @@ def with_regrasps(world: BulletWorld, visits: Sequence[Visit], arm: str) -> list
     if segments is None:
         raise ConflictError(find_conflict(maps, resting))
     entries: list[PlanTask] = []
-    entry: list[Visit] = []
+    entry: list[TaskVisit] = []
     for segment in segments:
         leave = [] if segment.set_down is None else [visits[segment.set_down]]
         part = [*entry, *visits[segment.first : segment.last + 1], *leave]
@@ -95,13 +95,13 @@ def with_regrasps(world: BulletWorld, visits: Sequence[Visit], arm: str) -> list
     return entries
 
 
-def _resting(world: BulletWorld, visits: Sequence[Visit]) -> list[int]:
+def _resting(world: BulletWorld, visits: Sequence[TaskVisit]) -> list[int]:
     """Return the visits, as indices, in which the object stands on something."""
     return [k for k, visit in enumerate(visits) if world.object_rests(visit.task.T_world_object)]
 
 
 def holdings(
-    world: BulletWorld, visits: Sequence[Visit], progress: Progress | None, turned: float = 0.0
+    world: BulletWorld, visits: Sequence[TaskVisit], progress: Progress | None, turned: float = 0.0
 ) -> Iterator[tuple[list[PlanTask], Planner]]:
     """Yield grasps for a sequence, best first, with configurations in which nothing collides.
 
@@ -146,7 +146,7 @@ def holdings(
         raise _why_not(world, visits, placements.tried)
 
 
-def _why_not(world: BulletWorld, visits: Sequence[Visit], tried: int) -> NoPlanError:
+def _why_not(world: BulletWorld, visits: Sequence[TaskVisit], tried: int) -> NoPlanError:
     """Return the error that says why a sequence has no grasps.
 
     Args:
@@ -176,7 +176,7 @@ def _why_not(world: BulletWorld, visits: Sequence[Visit], tried: int) -> NoPlanE
 
 def climb(
     world: BulletWorld,
-    visit: Visit,
+    visit: TaskVisit,
     seed: int,
     limits: Climb,
     progress: Progress | None,

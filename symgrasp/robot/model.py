@@ -7,6 +7,7 @@ import io
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yourdfpy
@@ -238,6 +239,10 @@ class RobotModel:
     def has_shape(self, link: str) -> bool:
         """Whether a link has a collision shape."""
         return bool(self._collisions[link])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return a copy of the attributes to pickle: another thread may read a hull meanwhile."""
+        return {**self.__dict__, "_hulls": dict(self._hulls)}
 
     def __eq__(self, other: object) -> bool:
         """Models of the same files are equal, so results cached for one serve the other."""

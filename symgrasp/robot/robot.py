@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -101,6 +102,10 @@ class Arm:
         points = [np.zeros(3), *(frame[:3, 3] for frame in frames), links[self._tool_index][:3, 3]]
         H = np.array([frame[:3, :3] @ joint.axis for frame, joint in zip(frames, joints, strict=True)])
         return H, np.diff(points, axis=0), links[self._tool_index][:3, :3]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
+        return self.__dict__.copy()
 
     @cached_property
     def _tool_index(self) -> int:

@@ -48,6 +48,10 @@ class Scene:
     obstacles: tuple[Obstacle, ...]
     tasks: Mapping[str, Task]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
+        return self.__dict__.copy()
+
     @staticmethod
     def load(scene: str | Path) -> Scene:
         """Load a shipped scene by name, or any scene by path.

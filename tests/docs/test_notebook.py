@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import nbformat
@@ -19,7 +20,8 @@ def executed(tmp_path_factory) -> nbformat.NotebookNode:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(ROOT))
         client = NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(folder)}})
-        client.execute()
+        with ThreadPoolExecutor(1) as thread:  # a browser test may have left an event loop in this one
+            thread.submit(client.execute).result()
     assert not list(folder.iterdir())  # in a notebook nothing is written
     return notebook
 

@@ -35,7 +35,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.browser)
 
 
-@pytest.fixture(scope="session")
+# Of the package, not of the session: an event loop of Playwright runs meanwhile, where others want their own.
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     chromium = shutil.which("chromium")
     if chromium is None:
@@ -48,7 +49,7 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def start_server(browser: Browser) -> Iterator[Callable[[str], str]]:
     """Start servers for scenes, one a scene; gives their addresses."""
     running: dict[str, tuple[subprocess.Popen[str], str]] = {}

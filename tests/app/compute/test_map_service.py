@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,3 +100,11 @@ def test_a_known_map_is_not_computed_again(maps, monkeypatch):
     monkeypatch.setattr(MapMaker, "map", None)
     found, _ = maps.maps([known.request], {("pick", "panda"): known}, quiet)
     assert found == {("pick", "panda"): known}
+
+
+def test_a_map_bears_the_name_of_the_scene_it_was_asked_for(maps):
+    """Also where the world of another scene with the same content is used again."""
+    scene = load_small("soda_can", heights=4, angles=8, redundancy=2)
+    other = replace(scene, file=scene.file.model_copy(update={"name": "other"}))
+    names = [maps.map(State.of(s, "").request, quiet).map.scene for s in (scene, other)]
+    assert names == ["soda_can", "other"]
