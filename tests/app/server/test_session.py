@@ -202,7 +202,7 @@ def test_whoever_has_not_come_through_the_proxy_gets_no_session(server):
     server.wait_until_empty()
     with Stranger(server.port) as stranger:
         assert "Loading" in stranger.wait_for("Loading")
-        assert server.lobby.open == 0
+        assert server.lobby.wait_until_empty(0.0)
         assert [w for w in stranger.widgets.values() if w.get("label")] == []
 
 
@@ -356,7 +356,7 @@ def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(server, monkeypa
             if thread.name.startswith(("jobs", "painter")):
                 thread.join(30)
                 assert not thread.is_alive()
-        assert server.lobby.open == 0
+        assert server.lobby.wait_until_empty(0.0)
 
 
 def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(server, monkeypatch):
