@@ -94,20 +94,22 @@ class Layout:
         ]
         self.panels: tuple[Panel, ...] = (*map_tab, *sequence_tab, *hands_tab, *files_tab, *main)
 
-    def show(self, state: State, *, write_inputs: bool) -> None:
-        """Update the panels to a state.
-
-        Args:
-            state: the state.
-            write_inputs: write the inputs as well; not while a person is moving them.
-        """
+    def show(self, state: State) -> None:
+        """Update the outputs of the panels to a state."""
         if state.display.dark != self._dark:
             self._dark = state.display.dark
             self._theme(dark=state.display.dark)
         for panel in self.panels:
             panel.show(state)
-            if write_inputs:
-                panel.write_inputs(state)
+
+    def write_inputs(self, state: State) -> None:
+        """Update the inputs of the panels to a state; only on viser's event loop.
+
+        viser stores what a person enters in the widget, from where `Panel.on` reads it, both in one
+        step of the event loop: on another thread this could overwrite the value in between.
+        """
+        for panel in self.panels:
+            panel.write_inputs(state)
 
     def _theme(self, *, dark: bool) -> None:
         self.gui.configure_theme(

@@ -97,9 +97,11 @@ class TasksPanel(Panel):
                 "Remove": TaskList.removed,
             }
             self.edit = gui.add_button_group("Chosen task", tuple(edits))
-            self.edit.on_click(
-                lambda _: actions.change(lambda s: changes.change_tasks(s, edits[self.edit.value]))
-            )
+
+            @self.edit.on_click
+            async def _(_: object) -> None:  # at once, while the values are those of this click
+                edit = edits[self.edit.value]
+                actions.change(lambda s: changes.change_tasks(s, edit))
 
     def show(self, state: State) -> None:
         """List the tasks."""

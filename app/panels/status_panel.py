@@ -25,7 +25,10 @@ class StatusPanel(Panel):
         self.progress = gui.add_progress_bar(0.0)
         self.stop = self.button("Cancel", viser.Icon.X, actions.stop_or_retry, color="gray", disabled=True)
         self.steps = gui.add_button_group("", (UNDO, REDO), hint="Also Ctrl+Z and Ctrl+Shift+Z")
-        self.steps.on_click(lambda _: actions.change(undo if self.steps.value == UNDO else redo))
+
+        @self.steps.on_click
+        async def _(_: object) -> None:  # at once, while the value is that of this click
+            actions.change(undo if self.steps.value == UNDO else redo)
 
     def show(self, state: State) -> None:
         """Show what is being computed, and whether it can be cancelled or restarted."""

@@ -67,7 +67,7 @@ class ObjectView:
         self.gizmo = add.add_transform_controls(f"{root}/gizmo", scale=0.16, line_width=3.0, depth_test=False)
 
         @self.gizmo.on_update
-        def _(event: viser.TransformControlsEvent) -> None:
+        async def _(event: viser.TransformControlsEvent) -> None:  # at once, while the pose is this event's
             on_drag(from_position_quat(event.target.position, event.target.wxyz))
 
     def show(self, state: State, *, move_gizmo: bool) -> None:

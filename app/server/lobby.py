@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import secrets
 import threading
@@ -59,6 +60,7 @@ class Lobby:
         self._pool = ProcessPool(cache.folders)
         self._lock = threading.Condition()
         self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._sessions: dict[int, Session] = {}
 
     def wait_until_empty(self, timeout: float | None = None) -> bool:
@@ -66,8 +68,12 @@ class Lobby:
         with self._lock:
             return self._lock.wait_for(lambda: not self._sessions, timeout)
 
-    def connected(self, client: viser.ClientHandle) -> None:
-        """Handle a browser that connected to viser: have it load the picture with a new token."""
+    async def connected(self, client: viser.ClientHandle) -> None:
+        """Handle a browser that connected to viser, whose event loop calls this.
+
+        It is asked to load the picture with a new token.
+        """
+        self._loop = asyncio.get_running_loop()
         token = secrets.token_urlsafe(24)
         client.gui.set_panel_label("symgrasp")
         client.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -114,7 +120,8 @@ class Lobby:
         try:
             placeholder.remove()
             self._pool.prepare()
-            session = Session(client, self._cache, self._pool, visit)
+            assert self._loop  # a client has connected
+            session = Session(client, self._cache, self._pool, visit, self._loop)
         except Exception as error:
             log.exception("a session could not be opened")
             client.gui.reset()

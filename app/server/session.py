@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import logging
 import threading
@@ -56,15 +57,21 @@ class Session:
         cache: what all sessions share.
         pool: starts the process that computes.
         visit: the address it opened, which may say what to show first.
+        loop: viser's event loop.
 
     Attributes:
         state: what is shown; None before the first scene is loaded.
     """
 
     def __init__(
-        self, client: viser.ClientHandle, cache: SharedCache, pool: ProcessPool, visit: Visit
+        self,
+        client: viser.ClientHandle,
+        cache: SharedCache,
+        pool: ProcessPool,
+        visit: Visit,
+        loop: asyncio.AbstractEventLoop,
     ) -> None:
-        self.client, self.cache, self.visit = client, cache, visit
+        self.client, self.cache, self.visit, self._loop = client, cache, visit, loop
         self.state: State | None = None
         self._job_ids = itertools.count(1)
         self._changed = threading.Condition(threading.Lock())
@@ -269,7 +276,9 @@ class Session:
 
     def _draw(self, state: State, *, write_inputs: bool, move_gizmo: bool) -> None:
         try:
-            self.layout.show(state, write_inputs=write_inputs)
+            self.layout.show(state)
+            if write_inputs:
+                asyncio.run_coroutine_threadsafe(self._inputs_written(state), self._loop).result()
             self.scene_view.show(state, move_gizmo=move_gizmo)
         except Exception as error:  # must not end the drawing thread
             log.exception("a picture could not be drawn")
@@ -281,3 +290,6 @@ class Session:
                 self.change(lambda s: job_changes.failed(s, text))
         with self._changed:
             self._writing = False
+
+    async def _inputs_written(self, state: State) -> None:
+        self.layout.write_inputs(state)

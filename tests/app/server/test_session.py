@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import ctypes
 import gc
 import logging
@@ -25,6 +26,7 @@ from app.compute import compute_process, process_pool
 from app.compute.cache import SharedCache
 from app.compute.job_queue import Job, JobQueue
 from app.compute.warm_up import compute_first_map
+from app.panels.object_panel import ObjectPanel
 from app.panels.status_panel import StatusPanel
 from app.scene3d.scene_view import SceneView
 from app.server.actions import Actions
@@ -53,7 +55,7 @@ class Server:
     def wait_until_empty(self) -> None:
         """Wait until every session has been closed, with its threads."""
         for thread in threading.enumerate():
-            if thread.name.startswith(("jobs", "painter")):
+            if thread.name.startswith(("jobs", "draw")):
                 thread.join(30)
         assert self.lobby.wait_until_empty(30)
 
@@ -353,7 +355,7 @@ def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(server, monkeypa
         html = visitor.wait_for("This page could not be opened (RuntimeError: of &lt;this&gt; test)")
         assert "Loading" not in html
         for thread in set(threading.enumerate()) - before:
-            if thread.name.startswith(("jobs", "painter")):
+            if thread.name.startswith(("jobs", "draw")):
                 thread.join(30)
                 assert not thread.is_alive()
         assert server.lobby.wait_until_empty(0.0)
@@ -377,6 +379,23 @@ def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(s
         visitor.wait_for("the picture could not be drawn: RuntimeError: of this test")
         visitor.wait_for_quiet()
         assert [w["value"] for w in visitor.widgets.values() if w.get("label") == "x (cm)"] == [55.0]
+
+
+def test_what_a_person_enters_is_never_overwritten_before_it_is_read(server, monkeypatch):
+    """viser stores an entered value and reads it in one step of its event loop; inputs are written there."""
+    write, loops = ObjectPanel.write_inputs, []
+
+    def recorded(panel, state):
+        loops.append(asyncio.get_running_loop())  # raises on any other thread
+        write(panel, state)
+
+    monkeypatch.setattr(ObjectPanel, "write_inputs", recorded)
+    with server.visit() as visitor:
+        visitor.wait_for(ready)
+        visitor.trigger("Put the object back")
+        visitor.wait_for_quiet()
+    assert loops
+    assert set(loops) == {loops[0]}
 
 
 def test_the_page_says_that_it_waits_for_code_to_be_compiled(server, monkeypatch):
