@@ -8,12 +8,12 @@ BIN := $(VENV)/bin
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
 
-test: $(VENV)/dev.stamp  ## install, then run every check and test
+test: $(VENV)/dev.stamp  ## install, then run every check and test; browsers one by one, as they need all cores
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
 	$(BIN)/pytest -m 'not browser' $(ARGS)
-	$(BIN)/pytest -m browser $(ARGS)
+	$(BIN)/pytest -m browser -n0 $(ARGS)
 
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \

@@ -49,7 +49,7 @@ def candidate_html(state: State) -> str:
         return ""
     where = f"{state.candidate + 1} of {len(explanation.candidates)}"
     return (
-        f'<div class="sg sg-verdict"><b>Candidate {where}</b>: φ = {np.rad2deg(shown_candidate.phi):.1f}°, '
+        f'<div class="sg sg-candidate"><b>Candidate {where}</b>: φ = {np.rad2deg(shown_candidate.phi):.1f}°, '
         f'branch {shown_candidate.branch + 1}<br><i style="background:{shown_candidate.reason.color}"></i>'
         f"{escape(candidate_text(shown_candidate))}</div>"
     )

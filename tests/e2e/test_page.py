@@ -421,7 +421,7 @@ def test_names_from_a_file_are_shown_as_text(open_page, tmp_path, content):
     expect(page.text(f"the {hostile} turns")).to_be_visible()
     page.number("h (cm)", 4)
     page.number("θ (°)", 90)
-    why = page.page.locator(".sg-verdict")
+    why = page.page.locator(".sg-candidate")
     expect(why).to_contain_text(f"{hostile}robot/")
     expect(why).to_contain_text(f"and {hostile}")
     page.tab("Sequence")
