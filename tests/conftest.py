@@ -28,6 +28,14 @@ ROOT = Path(__file__).parent.parent
 SHIPPED = list(shipped_scenes())
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add what `tests/fuzz` tries."""
+    group = parser.getgroup("fuzz", "damaged input, see tests/fuzz")
+    group.addoption("--fuzz-cases", type=int, default=150, help="number of cases of each kind of input")
+    group.addoption("--fuzz-first", type=int, default=0, help="number of the first case")
+    group.addoption("--fuzz-seed", type=int, default=0, help="seed of all cases")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Compile what is not compiled yet, unless the tests run in this process, which does so as it goes."""
     if not config.getoption("numprocesses", None) or config.getoption("collectonly"):

@@ -1,0 +1,1 @@
+"""Commands on input that nobody meant to write; see `test_fuzz`."""
