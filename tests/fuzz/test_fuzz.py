@@ -12,7 +12,7 @@ import random
 import subprocess
 import sys
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -77,11 +77,12 @@ def plan(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 def test_any_input_ends_in_plain_words(
     kind: str, runner: Runner, plan: bytes, tmp_path: Path, pytestconfig: pytest.Config
 ) -> None:
-    first, count = pytestconfig.getoption("fuzz_first"), pytestconfig.getoption("fuzz_cases")
+    option: Callable[[str], Any] = pytestconfig.getoption
+    first, count, seed = option("fuzz_first"), option("fuzz_cases"), option("fuzz_seed")
     faults, statuses = [], {0: 0, 1: 0, 2: 0}
-    most: dict[str, Any] = {"cpu": 0.0, "peak": 0}
+    cpu, peak = 0.0, 0
     for k in range(first, first + count):
-        rng = random.Random(f"{pytestconfig.getoption('fuzz_seed')}/{kind}/{k}")
+        rng = random.Random(f"{seed}/{kind}/{k}")
         case = plans(rng, plan) if kind == "plans" else KINDS[kind](rng)
         folder = tmp_path / str(k)
         run = runner.run(case, folder)
@@ -90,10 +91,8 @@ def test_any_input_ends_in_plain_words(
             for fault in found_faults(run, case, folder)
         ]
         statuses[run.status] = statuses.get(run.status, 0) + 1
-        most = {"cpu": max(most["cpu"], run.cpu), "peak": max(most["peak"], run.peak)}
-    print(
-        f"{kind}: exit statuses {statuses}, at most {most['cpu']:.1f} s of CPU, {most['peak'] / 1e6:.0f} MB"
-    )
+        cpu, peak = max(cpu, run.cpu), max(peak, run.peak)
+    print(f"{kind}: exit statuses {statuses}, at most {cpu:.1f} s of CPU, {peak / 1e6:.0f} MB")
     assert not faults, "\n".join(faults)
     if count > 50:
         assert statuses[0] and statuses[2], f"{statuses}: damage that is always or never noticed tests little"
