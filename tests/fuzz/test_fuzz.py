@@ -12,9 +12,8 @@ import random
 import subprocess
 import sys
 import unicodedata
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -77,8 +76,7 @@ def plan(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 def test_any_input_ends_in_plain_words(
     kind: str, runner: Runner, plan: bytes, tmp_path: Path, pytestconfig: pytest.Config
 ) -> None:
-    option: Callable[[str], Any] = pytestconfig.getoption
-    first, count, seed = option("fuzz_first"), option("fuzz_cases"), option("fuzz_seed")
+    first, count, seed = (whole_option(pytestconfig, f"fuzz_{name}") for name in ("first", "cases", "seed"))
     faults, statuses = [], {0: 0, 1: 0, 2: 0}
     cpu, peak = 0.0, 0
     for k in range(first, first + count):
@@ -96,6 +94,12 @@ def test_any_input_ends_in_plain_words(
     assert not faults, "\n".join(faults)
     if count > 50:
         assert statuses[0] and statuses[2], f"{statuses}: damage that is always or never noticed tests little"
+
+
+def whole_option(config: pytest.Config, name: str) -> int:
+    value = config.getoption(name)
+    assert isinstance(value, int)
+    return value
 
 
 def found_faults(run: Run, case: Case, folder: Path) -> list[str]:
