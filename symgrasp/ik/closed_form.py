@@ -14,14 +14,20 @@ import numpy as np
 from eaik.IK_HP import HPRobot
 
 from symgrasp.errors import UrdfError
+from symgrasp.ik.chain import chain_geometries
 from symgrasp.poses import Array, pose_error
 from symgrasp.robot.robot import Arm
 
 __all__ = ["ClosedFormIK", "Solutions", "Tolerance"]
 
 LOCK_PREFERENCE = (6, 2, 0, 4, 1, 5, 3)
-"""Which of seven joints to lock, first choice first. Locking the last one keeps the arm's whole reach;
-locking the elbow (index 3) would fix its distance."""
+"""Which of seven joints to lock, first choice first among those that leave a chain of the compiled family,
+then among the others. Locking the last one keeps the arm's whole reach; locking the elbow (index 3) would
+fix its distance."""
+
+GENERIC_ANGLE = 0.3
+"""Value (rad) at which locks are tried: the answer is the same at almost any value, but at zero axes may
+happen to be parallel."""
 
 
 @dataclass(frozen=True)
@@ -119,9 +125,9 @@ def _lockable_joint(arm: Arm) -> int | None:
         UrdfError: EAIK knows no closed form, whichever joint is locked.
     """
     choices = [None] if arm.dof == 6 else list(LOCK_PREFERENCE)
-    for joint in choices:
-        # At almost any value the answer is the same; at zero, axes may happen to be parallel.
-        locks = [] if joint is None else [(joint, 0.3)]
+    phi = np.array([GENERIC_ANGLE])
+    for joint in sorted(choices, key=lambda joint: chain_geometries(arm, joint, phi) is None):
+        locks = [] if joint is None else [(joint, GENERIC_ANGLE)]
         if HPRobot(arm.H, arm.P, locks).hasKnownDecomposition():
             return joint
     raise UrdfError(

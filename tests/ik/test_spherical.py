@@ -14,7 +14,7 @@ from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
 from tests.ik.redundancy import solve_at
 
-ARMS = ("panda", "iiwa", "backwards", "six")
+ARMS = ("panda", "iiwa", "backwards", "six", "pr2")
 
 
 def arm_of(scene: Scene, name: str) -> Arm:
@@ -59,6 +59,12 @@ def arms() -> dict[str, Arm]:
             [[0, 0, 0.3], [0, 0, 0], [0.4, 0, 0], [0.35, 0, 0.03], [0, 0, 0], [0, 0, 0], [0.1, 0, 0]],
             R0,
         ),
+        # PR2's arm: EAIK knows it with the third joint locked as well, but pan and lift do not meet.
+        "pr2": synthetic(
+            [z, y, x, y, x, y, x],
+            [[0, 0, 0], [0.1, 0, 0], [0, 0, 0], [0.4, 0, 0], [0, 0, 0], [0.32, 0, 0], [0, 0, 0],
+             [0.18, 0, 0]],
+        ),
     }  # fmt: skip
 
 
@@ -69,6 +75,11 @@ def distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def samples(arm: Arm, count: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, len(arm.lower)))
+
+
+def test_the_lock_is_chosen_so_that_the_compiled_closed_form_applies(arms):
+    assert ClosedFormIK(arms["pr2"], 1).locked == 0  # its first choices fit EAIK alone
+    assert all(isinstance(solver_for(arm, 1), SphericalIK) for arm in arms.values())
 
 
 @pytest.mark.parametrize("name", ARMS)
