@@ -14,8 +14,9 @@ from symgrasp.compiling import njit
 from symgrasp.engine.checks import UNDECIDED, check_arm, check_hand
 from symgrasp.engine.kinematics import place_arm, place_hand
 from symgrasp.engine.search_types import BLOCKED, FEASIBLE, RETREAT_UNDECIDED
-from symgrasp.ik.branches import BRANCHES, STRICT, branches_at
+from symgrasp.ik.branches import BRANCHES, branches_at
 from symgrasp.ik.retreat import RETREAT_TURN
+from symgrasp.ik.vectors import STRICT
 
 __all__ = ["arm_retreats", "copy_row", "moved_along", "tool_clearance", "tool_retreats"]
 

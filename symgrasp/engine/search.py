@@ -34,8 +34,9 @@ from symgrasp.engine.search_types import (
     SearchResult,
 )
 from symgrasp.engine.tree import Tree
-from symgrasp.ik.branches import BRANCHES, STRICT, branches_at
+from symgrasp.ik.branches import BRANCHES, branches_at
 from symgrasp.ik.chain import Chain
+from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
 
 __all__ = [

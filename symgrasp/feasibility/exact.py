@@ -26,7 +26,7 @@ from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.search_recording import FixedBodies, PieceBodies, record_search
-from symgrasp.ik import SphericalIK, solver_for
+from symgrasp.ik import CompiledIK, solver_for
 from symgrasp.ik.retreat import retreat_distances
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.poses import Array, axis_frame, inverse
@@ -67,7 +67,7 @@ class ExactEngine:
         self.world, self.arm, self.manifold = world, arm, manifold
         self._settings = world.scene.settings
         ik = solver_for(arm, self._settings.redundancy)
-        if not isinstance(ik, SphericalIK) or not supports(arm):
+        if not isinstance(ik, CompiledIK) or not supports(arm):
             raise NotImplementedError(f"arm {arm.name}: not of a kind that the exact engine knows")
         self.ik = ik
         radii = manifold.profile.radius(manifold.h)
@@ -90,7 +90,7 @@ class ExactEngine:
         Raises:
             UrdfError: the arm has no closed-form inverse kinematics.
         """
-        return isinstance(solver_for(arm, 1), SphericalIK) and supports(arm)
+        return isinstance(solver_for(arm, 1), CompiledIK) and supports(arm)
 
     def map(
         self, task: Task, manifold: Manifold | None = None, progress: Progress | None = None

@@ -1,10 +1,10 @@
 """Closed-form inverse kinematics: all branches of a pose at sampled redundancy values."""
 
 from symgrasp.ik.closed_form import ClosedFormIK, Solutions
-from symgrasp.ik.spherical import SphericalIK
+from symgrasp.ik.compiled import CompiledIK
 from symgrasp.robot.robot import Arm
 
-__all__ = ["ClosedFormIK", "Solutions", "SphericalIK", "solver_for"]
+__all__ = ["ClosedFormIK", "CompiledIK", "Solutions", "solver_for"]
 
 
 def solver_for(arm: Arm, samples: int) -> ClosedFormIK:
@@ -18,4 +18,4 @@ def solver_for(arm: Arm, samples: int) -> ClosedFormIK:
         UrdfError: no closed form is known for the arm, whichever joint is locked.
     """
     general = ClosedFormIK(arm, samples)
-    return SphericalIK(arm, samples) if SphericalIK.fits(general) else general
+    return CompiledIK(arm, samples) if CompiledIK.fits(general) else general

@@ -1,8 +1,9 @@
-"""The geometry of arms with a spherical triple of joints, as the closed form of `spherical` needs it."""
+"""The geometry of arms of the compiled closed forms, packed for compiled code."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -10,8 +11,10 @@ from symgrasp.poses import Array, rotation_about
 from symgrasp.robot.robot import Arm
 
 __all__ = [
-    "AXES", "CENTRE", "CENTRE_SEEN", "COSINE_TOLERANCE", "MIDDLE", "P0", "PHI", "R0", "TRIPLE", "WRIST",
-    "WRIST_SEEN", "Chain", "ChainGeometry", "chain_geometries",
+    "AXES", "BASE", "BEND", "CENTRE", "CENTRE_SEEN", "COSINE_TOLERANCE", "ELBOW", "FOREARM", "HAND",
+    "MEETING", "MIDDLE", "P0", "PARALLEL_PHI", "PHI", "R0", "SHOULDER", "THREE_PARALLEL", "TRIPLE", "TURN",
+    "WRIST", "WRIST_SEEN", "Chain", "ChainGeometry", "ParallelGeometry", "SphericalGeometry",
+    "chain_geometries",
 ]  # fmt: skip
 
 MEETING_DISTANCE = 1e-8
@@ -23,20 +26,29 @@ PARALLEL = 1e-6
 COSINE_TOLERANCE = 1e-9
 """A joint is known to be outside its limits from its cosine alone where that is off by more than this."""
 
-AXES, R0, P0, CENTRE, WRIST = 0, 18, 27, 30, 33
-CENTRE_SEEN, WRIST_SEEN, MIDDLE, TRIPLE, PHI = 36, 39, 42, 47, 52
-"""Where the parts of a `ChainGeometry` begin in a row of `Chain.geometry`."""
+AXES, R0, P0 = 0, 18, 27
+"""Where the parts that all geometries have begin in a row of `Chain.geometry`."""
+
+CENTRE, WRIST, CENTRE_SEEN, WRIST_SEEN, MIDDLE, TRIPLE, PHI = 30, 33, 36, 39, 42, 47, 52
+"""Where the other parts of a `SphericalGeometry` begin."""
+
+BASE, MEETING, SHOULDER, ELBOW, FOREARM, HAND, BEND, TURN, PARALLEL_PHI = 30, 33, 36, 39, 42, 45, 48, 53, 58
+"""Where the other parts of a `ParallelGeometry` begin."""
+
+SPHERICAL, THREE_PARALLEL = 0, 1
+"""The families of arms whose closed forms are compiled."""
 
 
 class Chain(NamedTuple):
     """The geometry of an arm at K redundancy values, packed into arrays for compiled code.
 
-    The arm has n joints, of which six are free, numbered 1 to 6 as in `symgrasp.ik.spherical`.
+    The arm has n joints, of which six are free, numbered 1 to 6 as in `symgrasp.ik.spherical` or
+    `symgrasp.ik.parallel`.
 
     Attributes:
-        geometry: (K, 53) a `ChainGeometry` in each row.
-        joint: (8,) index of each free joint in the arm, of the locked one (or -1), and whether
-            the arm is read backwards.
+        geometry: (K, m) a `SphericalGeometry` or `ParallelGeometry` in each row.
+        joint: (9,) index of each free joint in the arm, of the locked one (or -1), whether the arm is
+            read backwards, and its family.
         limits: (6, n) lower limit, upper limit, middle of the range, cosine and sine of the middle, and
             the cosine of half the range, less `COSINE_TOLERANCE`.
         forward: (2 n + 5, 3) for forward kinematics: H (n rows), P (n + 1), R0 (3) of the arm, and the
@@ -49,14 +61,16 @@ class Chain(NamedTuple):
     forward: Array
 
 
-class ChainGeometry(NamedTuple):
-    """The geometry of the six free joints at one value φ of the locked joint, in the base frame.
+class SphericalGeometry(NamedTuple):
+    """The geometry of six free joints with a spherical triple, at one value φ of the locked joint.
+
+    Everything is in the base frame at zero.
 
     Attributes:
         backwards: whether the arm is read from the tool to the base.
-        h: (6, 3) unit axes at zero, reversed where the arm is read backwards.
-        R0: (3, 3) orientation of the tool at zero.
-        p0: (3,) position of the tool at zero.
+        h: (6, 3) unit axes, reversed where the arm is read backwards.
+        R0: (3, 3) orientation of the tool.
+        p0: (3,) position of the tool.
         S: (3,) point where the axes of the triple meet.
         W: (3,) point where the axes of the pair meet.
         a: (3,) S relative to a point on the middle joint's axis.
@@ -78,22 +92,104 @@ class ChainGeometry(NamedTuple):
     triple: Array
     phi: float
 
+    @property
+    def family(self) -> int:
+        """`SPHERICAL`."""
+        return SPHERICAL
 
-def chain_geometries(arm: Arm, locked: int | None, phi: Array) -> list[ChainGeometry] | None:
-    """Return the arm's geometry at every redundancy value, or None where it has no spherical triple and pair.
+    def packed(self) -> Array:
+        """Return all parts but the first in one row (53,)."""
+        return np.concatenate([np.ravel(part) for part in self[1:]])
+
+
+class ParallelGeometry(NamedTuple):
+    """The geometry of six free joints of which 2, 3 and 4 are parallel, at one value φ of the locked joint.
+
+    Everything is in the base frame at zero. O2, O3 and O4 are points on the axes of joints 2, 3 and 4 in
+    the plane of W perpendicular to them.
+
+    Attributes:
+        backwards: whether the arm is read from the tool to the base.
+        h: (6, 3) unit axes, reversed where the arm is read backwards.
+        R0: (3, 3) orientation of the tool.
+        p0: (3,) position of the tool.
+        base: (3,) a point on the axis of joint 1.
+        W: (3,) point where the axes of joints 5 and 6 meet.
+        shoulder: (3,) O2.
+        elbow: (3,) O3.
+        forearm: (3,) O4 − O3.
+        hand: (3,) W − O4.
+        bend: (5,) constants of subproblem 3 for joint 3, see `_cosine_constants`.
+        turn: (5,) constants of subproblem 4 for joint 5, see `_cosine_constants`.
+        phi: the value φ (rad).
+    """
+
+    backwards: bool
+    h: Array
+    R0: Array
+    p0: Array
+    base: Array
+    W: Array
+    shoulder: Array
+    elbow: Array
+    forearm: Array
+    hand: Array
+    bend: Array
+    turn: Array
+    phi: float
+
+    @property
+    def family(self) -> int:
+        """`THREE_PARALLEL`."""
+        return THREE_PARALLEL
+
+    def packed(self) -> Array:
+        """Return all parts but the first in one row (59,)."""
+        return np.concatenate([np.ravel(part) for part in self[1:]])
+
+
+ChainGeometry: TypeAlias = SphericalGeometry | ParallelGeometry
+
+
+class _Joints(NamedTuple):
+    """Six free joints in the order of a closed form, at one value of the locked joint.
+
+    Attributes:
+        backwards: whether they are read from the tool to the base.
+        h: (6, 3) unit axes.
+        o: (6, 3) a point on each axis.
+        R0: (3, 3) orientation of the tool.
+        p0: (3,) position of the tool.
+        phi: value of the locked joint (rad).
+    """
+
+    backwards: bool
+    h: Array
+    o: Array
+    R0: Array
+    p0: Array
+    phi: float
+
+
+def chain_geometries(arm: Arm, locked: int | None, phi: Array) -> Sequence[ChainGeometry] | None:
+    """Return the arm's geometry at every redundancy value, or None where no closed form is compiled for it.
 
     Args:
         arm: the arm.
         locked: index of the locked joint; None for a 6-joint arm.
         phi: (K,) values of the locked joint (rad).
     """
-    rows = [_chain_geometry(arm, locked, float(value)) for value in phi]
-    known = [row for row in rows if row is not None]
-    return known if len(known) == len(rows) else None
+    for find in (_spherical, _three_parallel):
+        for backwards in (False, True):
+            rows = [find(_joints(arm, locked, float(value), backwards)) for value in phi]
+            known = [row for row in rows if row is not None]
+            if len(known) == len(rows):
+                return known
+    return None
 
 
-def _chain_geometry(arm: Arm, locked: int | None, phi: float) -> ChainGeometry | None:
-    """Return the arm's geometry with a joint locked at φ; None where it has no triple and pair."""
+def _joints(arm: Arm, locked: int | None, phi: float, backwards: bool) -> _Joints:
+    """Return the free joints of an arm with a joint locked at φ."""
     h, o = arm.H.copy(), np.cumsum(arm.P, axis=0)
     R0, p0, o = arm.R0, o[-1], o[:-1].copy()
     if locked is not None:
@@ -103,17 +199,45 @@ def _chain_geometry(arm: Arm, locked: int | None, phi: float) -> ChainGeometry |
         o[locked + 1 :] = (o[locked + 1 :] - centre) @ turn.T + centre
         R0, p0 = turn @ R0, turn @ (p0 - centre) + centre
         h, o = np.delete(h, locked, axis=0), np.delete(o, locked, axis=0)
-    for backwards in (False, True):
-        axes, points = (-h[::-1], o[::-1]) if backwards else (h, o)
-        S, W = _common_point(axes[:3], points[:3]), _common_point(axes[4:], points[4:])
-        if S is not None and W is not None:
-            a, b = S - points[3], W - points[3]
-            # |R4⁻¹ a − b|² = |t|² as b·R4⁻¹ a = …, and h1ᵀ R2 h3 = h1ᵀ M h3.
-            middle = _cosine_constants(axes[3], a, b) + np.array([0.0, 0.0, -0.5 * (a @ a + b @ b), 0.0, 0.0])
-            triple = _cosine_constants(axes[1], axes[2], axes[0])
-            if middle[1] > PARALLEL * MEETING_DISTANCE and triple[1] > PARALLEL:
-                return ChainGeometry(backwards, axes, R0, p0, S, W, a, b, middle, triple, phi)
-    return None
+    if backwards:
+        h, o = -h[::-1], o[::-1]
+    return _Joints(backwards, h, o, R0, p0, phi)
+
+
+def _spherical(joints: _Joints) -> SphericalGeometry | None:
+    """Return the geometry of joints with a spherical triple and a pair that meet, else None."""
+    backwards, h, o, R0, p0, phi = joints
+    S, W = _common_point(h[:3], o[:3]), _common_point(h[4:], o[4:])
+    if S is None or W is None:
+        return None
+    a, b = S - o[3], W - o[3]
+    # h1ᵀ R2 h3 = h1ᵀ M h3
+    middle, triple = _distance_constants(h[3], a, b), _cosine_constants(h[1], h[2], h[0])
+    if middle[1] <= PARALLEL * MEETING_DISTANCE or triple[1] <= PARALLEL:
+        return None
+    return SphericalGeometry(backwards, h, R0, p0, S, W, a, b, middle, triple, phi)
+
+
+def _three_parallel(joints: _Joints) -> ParallelGeometry | None:
+    """Return the geometry of joints of which 2, 3, 4 are parallel and 5, 6 meet, else None."""
+    backwards, h, o, R0, p0, phi = joints
+    W = _common_point(h[4:], o[4:])
+    aslant = np.linalg.norm(np.cross(h[1], h), axis=1)
+    if W is None or max(aslant[2:4]) > PARALLEL or aslant[0] < PARALLEL:
+        return None
+    O2, O3, O4 = o[1:4] + np.outer((W - o[1:4]) @ h[1], h[1])
+    bend, turn = _distance_constants(h[2], O4 - O3, O2 - O3), _cosine_constants(h[4], h[5], h[1])
+    if bend[1] <= PARALLEL * MEETING_DISTANCE or turn[1] <= PARALLEL:
+        return None
+    return ParallelGeometry(backwards, h, R0, p0, o[0], W, O2, O3, O4 - O3, W - O4, bend, turn, phi)
+
+
+def _distance_constants(k: Array, a: Array, b: Array) -> Array:
+    """Return the constants of subproblem 3, ``−½ |R(k, x) a − b|² = length·cos(x − middle) + constant``.
+
+    See `_cosine_constants`, for ``|R a − b|² = |a|² + |b|² − 2 b·R a``.
+    """
+    return _cosine_constants(k, a, b) + np.array([0.0, 0.0, -0.5 * (a @ a + b @ b), 0.0, 0.0])
 
 
 def _cosine_constants(k: Array, a: Array, b: Array) -> Array:

@@ -8,20 +8,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from eaik.IK_HP import HPRobot
 
 from symgrasp.errors import UrdfError
+from symgrasp.ik.chain import chain_geometries
 from symgrasp.poses import Array, pose_error
 from symgrasp.robot.robot import Arm
 
 __all__ = ["ClosedFormIK", "Solutions", "Tolerance"]
 
 LOCK_PREFERENCE = (6, 2, 0, 4, 1, 5, 3)
-"""Which of seven joints to lock, first choice first. Locking the last one keeps the arm's whole reach;
-locking the elbow (index 3) would fix its distance."""
+"""Which of seven joints to lock, first choice first among those that leave a chain of the compiled family,
+then among the others. Locking the last one keeps the arm's whole reach; locking the elbow (index 3) would
+fix its distance."""
+
+GENERIC_ANGLE = 0.3
+"""Value (rad) at which locks are tried: the answer is the same at almost any value, but at zero axes may
+happen to be parallel."""
+
+OPPOSITE_COSINE = -1.0 + 1e-9
+"""Axes the cosine of whose angle is below this point in opposite directions."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +95,17 @@ class ClosedFormIK:
     def _solvers(self) -> list[HPRobot]:
         """EAIK's solvers, one for each redundancy sample."""
         locks = [[] if self.locked is None else [(self.locked, float(phi))] for phi in self.phi]
-        return [HPRobot(self.arm.H, self.arm.P, lock) for lock in locks]
+        return [HPRobot(self._signs[:, None] * self.arm.H, self.arm.P, lock) for lock in locks]
+
+    @cached_property
+    def _signs(self) -> Array:
+        """Signs (n,) of the joints for EAIK, which loses every pose where axes in a row are opposite."""
+        signs = np.ones(self.arm.dof)
+        free = [j for j in range(self.arm.dof) if j != self.locked]
+        for before, j in pairwise(free):
+            if signs[before] * (self.arm.H[before] @ self.arm.H[j]) < OPPOSITE_COSINE:
+                signs[j] = -1.0
+        return signs
 
     def solve(self, T_base_tool: Array) -> Solutions:
         """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""
@@ -99,7 +119,7 @@ class ClosedFormIK:
         """Return what solvers find for a pose (4, 4), without answers that miss it."""
         target = np.array(T_base_tool, dtype=float)
         target[:3, :3] = target[:3, :3] @ self.arm.R0.T  # EAIK's tool frame is parallel to the base at zero
-        found = [np.reshape(solver.IK(target).Q, (-1, self.arm.dof)) for solver in solvers]
+        found = [self._signs * np.reshape(solver.IK(target).Q, (-1, self.arm.dof)) for solver in solvers]
         counts = [len(q) for q in found]
         q = np.concatenate(found)
         sample = np.repeat(np.arange(len(solvers)), counts)
@@ -119,9 +139,9 @@ def _lockable_joint(arm: Arm) -> int | None:
         UrdfError: EAIK knows no closed form, whichever joint is locked.
     """
     choices = [None] if arm.dof == 6 else list(LOCK_PREFERENCE)
-    for joint in choices:
-        # At almost any value the answer is the same; at zero, axes may happen to be parallel.
-        locks = [] if joint is None else [(joint, 0.3)]
+    phi = np.array([GENERIC_ANGLE])
+    for joint in sorted(choices, key=lambda joint: chain_geometries(arm, joint, phi) is None):
+        locks = [] if joint is None else [(joint, GENERIC_ANGLE)]
         if HPRobot(arm.H, arm.P, locks).hasKnownDecomposition():
             return joint
     raise UrdfError(

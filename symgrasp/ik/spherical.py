@@ -1,9 +1,9 @@
-"""Closed-form inverse kinematics of arms with a spherical triple of joints, compiled by numba.
+"""The closed form of arms with a spherical triple of joints, compiled: Panda, iiwa, PR2, TALOS, TIAGo.
 
-With one joint locked (or with six joints), many arms have three joints whose axes meet in a point S at
-one end, one joint in the middle, and two joints whose axes meet in a point W at the other end: Panda,
-iiwa, PR2, TALOS, TIAGo. Numbered from the end with the triple (an arm with a spherical wrist is read
-backwards, ``G⁻¹ = e6⁻¹ … e1⁻¹``), the displacement of the tool from its pose at zero is
+Six joints, or seven with one locked: the axes of three meet in a point S at one end, one joint is in the
+middle, and the axes of two meet in a point W at the other end. Numbered from the end with the triple (an
+arm with a spherical wrist is read backwards, ``G⁻¹ = e6⁻¹ … e1⁻¹``), the displacement of the tool from its
+pose at zero is
 
     G = e1 e2 e3 · e4 · e5 e6,     ek = rotation by qk about the line (hk, ok),
 
@@ -11,86 +11,136 @@ backwards, ``G⁻¹ = e6⁻¹ … e1⁻¹``), the displacement of the tool from 
     R5⁻¹ (e4⁻¹ S − W) = R6 (G⁻¹ S − W)             the pair: two values
     R1 R2 R3 = R_G R6⁻¹ R5⁻¹ R4⁻¹                  the triple: two values
 
-which are the subproblems 3, 2 and 4 of Paden and Kahan, eight branches in all. Each branch is
-computed by itself, in plain IEEE arithmetic: the answer at a pose and a redundancy value does not
-depend on what else is asked.
+which are the subproblems 3, 2 and 4 of Paden and Kahan, eight branches in all.
 """
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from symgrasp.ik.branches import BRANCHES, solve_range
-from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries
-from symgrasp.ik.closed_form import ClosedFormIK, Solutions, Tolerance
-from symgrasp.poses import Array
-from symgrasp.robot.robot import Arm
+from symgrasp.compiling import njit
+from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, PHI, TRIPLE, WRIST, WRIST_SEEN
+from symgrasp.ik.joints import ROOT_TOLERANCE, nearest_turn, outside, sine, tool_motion, within, write_branch
+from symgrasp.ik.vectors import (
+    STRICT,
+    cross,
+    dot,
+    minus,
+    perpendicular,
+    rotate,
+    subproblem1,
+    times,
+    transposed_times,
+    unit,
+    vec,
+)
 
-__all__ = ["SphericalIK"]
+__all__ = ["spherical_branches"]
 
 
-class SphericalIK(ClosedFormIK):
-    """`ClosedFormIK` for arms with a spherical triple, compiled: the same solutions, much faster.
+@njit(**STRICT)
+def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside):
+    """Solve one pose (4, 4); see `symgrasp.ik.branches.branches_at` for arguments and result."""
+    R, p = tool_motion(g, joint[7], T)
+    a = vec(g, CENTRE_SEEN)
+    t = minus(transposed_times(R, minus(vec(g, CENTRE), p)), vec(g, WRIST))  # G⁻¹ S − W
+    # Subproblem 3: |R4⁻¹ a − b| = |t|. Where possible sines and cosines are computed without their angles:
+    # most branches are dropped at a joint limit before an angle is needed.
+    middle, length, part = vec(g, MIDDLE)
+    sm, cm = g[MIDDLE + 3], g[MIDDLE + 4]
+    c = (-0.5 * dot(t, t) - part) / length
+    s = sine(c)
+    if s < 0.0:
+        return False
+    offset = math.atan2(s, c)
+    for i in range(2):
+        if i == 0:
+            q4, s4, c4 = -(middle + offset), -(sm * c + cm * s), cm * c - sm * s
+        else:
+            q4, s4, c4 = offset - middle, s * cm - c * sm, cm * c + sm * s
+        if inside_only and outside(limits, joint[3], s4, c4):
+            continue
+        q4 = nearest_turn(limits, joint[3], q4)
+        if inside_only and not within(limits, joint[3], q4):
+            continue
+        u = minus(rotate(vec(g, AXES + 9), -s4, c4, a), vec(g, WRIST_SEEN))  # e4⁻¹ S − W
+        _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside)
+    return True
 
-    Args:
-        arm: the arm.
-        samples: number of redundancy samples; a 6-joint arm always has one.
-        tolerance: largest error of a solution.
 
-    Raises:
-        UrdfError: no closed form is known for the arm, whichever joint is locked.
-        ValueError: a closed form is known, but it is not of this family; see `fits`.
-
-    Attributes:
-        chain: the arm's geometry at every redundancy sample, for compiled code.
-    """
-
-    def __init__(self, arm: Arm, samples: int, tolerance: Tolerance | None = None) -> None:
-        super().__init__(arm, samples, tolerance)
-        self.chain = self._pack_chain()
-
-    @staticmethod
-    def fits(ik: ClosedFormIK) -> bool:
-        """Whether an arm has a spherical triple and a pair, with the joint locked that its solver locks."""
-        return chain_geometries(ik.arm, ik.locked, ik.phi) is not None
-
-    def solve(self, T_base_tool: Array) -> Solutions:
-        """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""
-        return self._solve(T_base_tool, 0, len(self.phi))
-
-    def solve_sample(self, T_base_tool: Array, sample: int) -> Solutions:
-        """Return every configuration that reaches a pose (4, 4) at one redundancy sample."""
-        found = self._solve(T_base_tool, sample, sample + 1)
-        return found._replace(sample=np.zeros_like(found.sample))
-
-    def _solve(self, T_base_tool: Array, first: int, last: int) -> Solutions:
-        """Return the solutions of a pose (4, 4) at the redundancy samples from first to before last."""
-        T = np.ascontiguousarray(T_base_tool, dtype=float)
-        # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
-        q = np.empty((last - first, BRANCHES, self.arm.dof))
-        exists, inside = np.empty(q.shape[:-1], dtype=bool), np.empty(q.shape[:-1], dtype=bool)
-        solve_range(*self.chain, T, first, last, q, exists, inside)
-        sample, branch = np.nonzero(exists)
-        return Solutions(q[exists], sample + first, branch, inside[exists])
-
-    def _pack_chain(self) -> Chain:
-        """Pack the arm's geometry at every redundancy sample into arrays."""
-        arm = self.arm
-        rows = chain_geometries(arm, self.locked, self.phi)
-        if rows is None:
-            raise ValueError(f"{arm.name}: no spherical triple and pair of joints that meet")
-        locked = -1 if self.locked is None else self.locked
-        free = [j for j in range(arm.dof) if j != locked]
-        backwards = rows[0].backwards
-        bounded = np.isfinite(arm.lower) & np.isfinite(arm.upper)
-        middle = np.zeros(arm.dof)
-        middle[bounded] = 0.5 * (arm.lower + arm.upper)[bounded]
-        half = np.minimum(np.where(bounded, 0.5 * (arm.upper - arm.lower), np.inf), np.pi)
-        least = np.cos(half) - COSINE_TOLERANCE
-        tolerance = [self.tolerance.position, self.tolerance.rotation, 0.0]
-        return Chain(
-            geometry=np.array([np.concatenate([np.ravel(part) for part in row[1:]]) for row in rows]),
-            joint=np.array([*(free[::-1] if backwards else free), locked, backwards]),
-            limits=np.array([arm.lower, arm.upper, middle, np.cos(middle), np.sin(middle), least]),
-            forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
+@njit(**STRICT)
+def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside):
+    """Subproblem 2: R5⁻¹ u = R6 t gives q5 and q6 for a value of the middle joint."""
+    h4, h5, h6 = vec(g, AXES + 9), vec(g, AXES + 12), vec(g, AXES + 15)
+    c = dot(h5, h6)
+    across = 1.0 - c * c
+    along5, along6 = dot(h5, u), dot(h6, t)
+    alpha = (along5 - c * along6) / across
+    beta = (along6 - c * along5) / across
+    rest = (dot(u, u) - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / across
+    if rest < -ROOT_TOLERANCE:
+        return
+    gamma = math.sqrt(max(rest, 0.0))
+    normal = cross(h5, h6)
+    h3 = vec(g, AXES + 6)
+    side = perpendicular(h3)
+    v3, vside = rotate(h4, -s4, c4, h3), rotate(h4, -s4, c4, side)
+    for j in range(2):
+        out = gamma if j == 0 else -gamma
+        z = (
+            alpha * h5[0] + beta * h6[0] + out * normal[0],
+            alpha * h5[1] + beta * h6[1] + out * normal[1],
+            alpha * h5[2] + beta * h6[2] + out * normal[2],
         )
+        y6, x6 = subproblem1(h6, t, z)
+        s6, c6 = unit(y6, x6)
+        if inside_only and outside(limits, joint[5], s6, c6):
+            continue
+        y5, x5 = subproblem1(h5, z, u)
+        s5, c5 = unit(y5, x5)
+        if inside_only and outside(limits, joint[4], s5, c5):
+            continue
+        q6 = nearest_turn(limits, joint[5], math.atan2(y6, x6))
+        if inside_only and not within(limits, joint[5], q6):
+            continue
+        q5 = nearest_turn(limits, joint[4], math.atan2(y5, x5))
+        if inside_only and not within(limits, joint[4], q5):
+            continue
+        # M = R_G R6⁻¹ R5⁻¹ R4⁻¹, applied to h3 and to a vector perpendicular to it
+        M3 = times(R, rotate(h6, -s6, c6, rotate(h5, -s5, c5, v3)))
+        Mside = times(R, rotate(h6, -s6, c6, rotate(h5, -s5, c5, vside)))
+        _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, 4 * i + 2 * j, inside_only, q, exists, inside)
+
+
+@njit(**STRICT)
+def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside):
+    """Subproblem 4: R1 R2 R3 = M, so h1ᵀ R2 h3 = h1ᵀ M h3, gives q1, q2 and q3; write the branch."""
+    h1, h2, h3 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 6)
+    middle, length, part = vec(g, TRIPLE)
+    sm, cm = g[TRIPLE + 3], g[TRIPLE + 4]
+    c = (dot(h1, M3) - part) / length
+    s = sine(c)
+    if s < 0.0:
+        return
+    for i in range(2):
+        way = s if i == 0 else -s
+        s2, c2 = sm * c + cm * way, cm * c - sm * way
+        if inside_only and outside(limits, joint[1], s2, c2):
+            continue
+        y1, x1 = subproblem1(h1, rotate(h2, s2, c2, h3), M3)
+        s1, c1 = unit(y1, x1)
+        if inside_only and outside(limits, joint[0], s1, c1):
+            continue
+        # q3 from R2⁻¹ R1⁻¹ M with the q1 found: where h1 and h3 align, any q1 will do and q3 compensates.
+        y3, x3 = subproblem1(h3, side, rotate(h2, -s2, c2, rotate(h1, -s1, c1, Mside)))
+        q2 = nearest_turn(limits, joint[1], middle + math.atan2(way, c))
+        if inside_only and not within(limits, joint[1], q2):
+            continue
+        q1 = nearest_turn(limits, joint[0], math.atan2(y1, x1))
+        if inside_only and not within(limits, joint[0], q1):
+            continue
+        q3 = nearest_turn(limits, joint[2], math.atan2(y3, x3))
+        if inside_only and not within(limits, joint[2], q3):
+            continue
+        inside[branch + i] = write_branch(joint, limits, g[PHI], (q1, q2, q3, q4, q5, q6), q[branch + i])
+        exists[branch + i] = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,26 @@ BASES = ("bottle_on_table", "soda_can", "log_iiwa_and_panda", "handover_between_
 MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
 
 
-def random_scene(seed: int) -> dict[str, Any]:
-    """Return a scene with a small grid; robots reach the object mostly, and things are in the way."""
+ARMS = {
+    "three_parallel": [0.0, -1.2, -1.5, -0.4, 1.5, 0.0],
+    "offset_shoulder": [0.0, 0.0, 0.0, 0.9, 0.0, 0.6, 0.0],
+}
+"""URDF in tests/data → a home in which the arm is free."""
+
+
+def random_scene(seed: int, arm: str = "") -> dict[str, Any]:
+    """Return a scene with a small grid; robots reach the object mostly, and things are in the way.
+
+    Args:
+        seed: of everything in it.
+        arm: one of `ARMS`, to be its only robot; by default the robots are those of a shipped scene.
+    """
     rng = np.random.default_rng(seed)
-    content = yaml.safe_load((SCENES_DIR / f"{rng.choice(BASES)}.yaml").read_text())
+    content = yaml.safe_load((SCENES_DIR / f"{rng.choice(BASES[:1] if arm else BASES)}.yaml").read_text())
+    if arm:
+        urdf = Path(__file__).parent.parent / "data" / f"{arm}.urdf"
+        robot = {"urdf": str(urdf), "mount": {"link": "flange"}, "hand": "wsg50", "home": ARMS[arm]}
+        content["robots"] = [{"name": content["robots"][0]["name"], **robot}]
     content["name"], content["description"] = f"random_{seed}", "Drawn at random"
     for robot in content["robots"]:
         base = robot.setdefault("base", {"position": [0, 0, 0]})

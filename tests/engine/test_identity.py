@@ -9,11 +9,12 @@ import pytest
 import yaml
 
 from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import SHIPPED
 from tests.engine.identity import assert_same, assert_true
-from tests.engine.random_scenes import random_scene
+from tests.engine.random_scenes import ARMS, random_scene
 
 SEEDS = 320
 AT_ONCE = 20
@@ -45,12 +46,22 @@ def test_random_scenes_have_the_same_maps(first, tmp_path_factory):
             raise AssertionError(f"{content['name']}, saved as {path}: {error}") from error
 
 
+@pytest.mark.parametrize("arm", ARMS)
+def test_other_arms_have_the_same_maps(arm):
+    """One whose three parallel joints make its closed form, and one whose first joint is locked."""
+    feasible = sum(check(random_scene(seed, arm)) for seed in range(AT_ONCE))
+    assert feasible > 50
+
+
 def check(content):
     scene = Scene.from_content(content)
-    task = scene.task()
+    task, feasible = scene.task(), 0
     with BulletWorld(scene) as world:
         maker = MapMaker(world)
         for arm in task.arms:
+            assert ExactEngine.knows(scene.arm(arm))
             exact = maker.map(arm, task)
             assert_same(exact, maker.map(arm, task, method="reference"))
             assert_true(world, scene, scene.arm(arm), exact)
+            feasible += np.count_nonzero(exact.feasible)
+        return feasible

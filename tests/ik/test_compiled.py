@@ -7,14 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from symgrasp.ik import ClosedFormIK, SphericalIK, solver_for
+from symgrasp.ik import ClosedFormIK, CompiledIK, solver_for
 from symgrasp.poses import from_position_quat, pose_error, rotation_about
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
 from tests.ik.redundancy import solve_at
 
-ARMS = ("panda", "iiwa", "backwards", "six")
+ARMS = ("panda", "iiwa", "backwards", "six", "pr2", "ur5", "ur5_backwards", "skew", "seven")
 
 
 def arm_of(scene: Scene, name: str) -> Arm:
@@ -42,6 +42,10 @@ def synthetic(H, P, R0=None) -> Arm:
 @pytest.fixture(scope="module")
 def arms() -> dict[str, Arm]:
     scene = load_small("log_iiwa_and_panda")
+    ur5 = np.array([
+        [0, 0, 0.089], [0, 0.136, 0], [0.425, -0.12, 0], [0.392, 0, 0], [0, 0.093, 0], [0, 0, -0.095],
+        [0, 0.082, 0],
+    ])  # fmt: skip
     R0 = rotation_about(np.array([0.6, 0.0, 0.8]), 1.1)
     x, y, z = np.eye(3)
     return {
@@ -59,6 +63,21 @@ def arms() -> dict[str, Arm]:
             [[0, 0, 0.3], [0, 0, 0], [0.4, 0, 0], [0.35, 0, 0.03], [0, 0, 0], [0, 0, 0], [0.1, 0, 0]],
             R0,
         ),
+        # PR2's arm: EAIK knows it with the third joint locked as well, but pan and lift do not meet.
+        "pr2": synthetic(
+            [z, y, x, y, x, y, x],
+            [[0, 0, 0], [0.1, 0, 0], [0, 0, 0], [0.4, 0, 0], [0, 0, 0], [0.32, 0, 0], [0, 0, 0],
+             [0.18, 0, 0]],
+        ),
+        # Three parallel axes, then two that meet; the same from its other end.
+        "ur5": synthetic([z, y, y, y, -z, y], ur5, R0),
+        "ur5_backwards": synthetic([-y, z, -y, -y, -y, -z], -ur5[::-1], R0),
+        # A leaning base, an elbow that turns the other way, a wrist whose axes are not perpendicular.
+        "skew": synthetic([z + 0.3 * y, y, -y, y, x + 0.3 * z, z + 0.4 * y], [
+            [0, 0, 0.2], [0, 0.1, 0], [0.4, 0.1, 0], [0.3, 0, 0.1], [0, 0.1, 0], [0, 0, 0], [0.1, 0, 0]
+        ]),
+        # A UR5 on a turntable: its first joint is locked.
+        "seven": synthetic([z, z + 0.3 * x, y, y, y, -z, y], [[0.1, 0, 0.2], *ur5], R0),
     }  # fmt: skip
 
 
@@ -71,10 +90,15 @@ def samples(arm: Arm, count: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, len(arm.lower)))
 
 
+def test_the_lock_is_chosen_so_that_the_compiled_closed_form_applies(arms):
+    assert ClosedFormIK(arms["pr2"], 1).locked == 0  # its first choices fit EAIK alone
+    assert all(isinstance(solver_for(arms[name], 1), CompiledIK) for name in ARMS)
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_same_branches_as_eaik(name, arms):
     arm = arms[name]
-    general, ik = ClosedFormIK(arm, 4), SphericalIK(arm, 4)
+    general, ik = ClosedFormIK(arm, 4), CompiledIK(arm, 4)
     assert ik.locked == general.locked
     np.testing.assert_array_equal(ik.phi, general.phi)
     total = 0
@@ -94,7 +118,7 @@ def test_same_branches_as_eaik(name, arms):
 def test_recall(name, arms):
     """The branches at q's own locked value contain q; an elbow all but straight blurs its neighbours."""
     arm = arms[name]
-    ik = SphericalIK(arm, 1)
+    ik = CompiledIK(arm, 1)
     gaps = []
     for q in samples(arm, 3000, 1):
         phi = 0.0 if ik.locked is None else float(q[ik.locked])
@@ -106,7 +130,7 @@ def test_recall(name, arms):
 @pytest.mark.parametrize("name", ARMS)
 def test_every_solution_reaches_the_pose(name, arms):
     arm = arms[name]
-    ik = SphericalIK(arm, 8)
+    ik = CompiledIK(arm, 8)
     poses = arm.tool_pose(samples(arm, 400, 2))
     found = [ik.solve(T) for T in poses]
     q, inside = np.concatenate([s.q for s in found]), np.concatenate([s.inside for s in found])
@@ -122,7 +146,7 @@ def test_every_solution_reaches_the_pose(name, arms):
 def test_an_answer_does_not_depend_on_what_else_is_asked(name, arms):
     """Bit for bit: at all samples, at one, and of poses in another order."""
     arm = arms[name]
-    ik = SphericalIK(arm, 5)
+    ik = CompiledIK(arm, 5)
     poses = arm.tool_pose(samples(arm, 60, 3))
     every = [ik.solve(T) for T in poses]
     for k in np.random.default_rng(4).permutation(len(poses)):
@@ -138,7 +162,7 @@ def test_an_answer_does_not_depend_on_what_else_is_asked(name, arms):
 
 @pytest.mark.parametrize("name", ["panda", "iiwa"])
 def test_out_of_reach(name, arms):
-    ik = SphericalIK(arms[name], 8)
+    ik = CompiledIK(arms[name], 8)
     general = ClosedFormIK(arms[name], 8)
     rng = np.random.default_rng(5)
     empty = 0
@@ -153,7 +177,7 @@ def test_out_of_reach(name, arms):
 def test_aligned_axes_of_the_triple(arms):
     """With the shoulder straight, joints 1 and 3 share their work; some split of it is found."""
     arm = arms["panda"]
-    ik = SphericalIK(arm, 1)
+    ik = CompiledIK(arm, 1)
     for q in samples(arm, 100, 6):
         q[1] = 0.0
         T = arm.tool_pose(q)
@@ -164,13 +188,13 @@ def test_aligned_axes_of_the_triple(arms):
 
 
 def test_solver_for_takes_the_compiled_one_where_it_can(arms):
-    assert isinstance(solver_for(arms["panda"], 2), SphericalIK)
+    assert isinstance(solver_for(arms["panda"], 2), CompiledIK)
     _, y, z = np.eye(3)
-    # Three parallel axes, as a UR5 has them: a closed form, but of another family.
+    # Three parallel axes as a UR5 has them, but the last two do not meet: a closed form that is not compiled.
     parallel = synthetic(
         [z, y, y, y, z, y],
-        [[0, 0, 0.09], [0, 0.1, 0], [0.42, 0, 0], [0.39, 0, 0], [0, 0.1, 0], [0, 0, -0.09], [0, 0.08, 0]],
+        [[0, 0, 0.09], [0, 0.1, 0], [0.42, 0, 0], [0.39, 0, 0], [0, 0.1, 0], [0.05, 0, -0.09], [0, 0.08, 0]],
     )
     assert type(solver_for(parallel, 2)) is ClosedFormIK
     with pytest.raises(ValueError, match="no spherical triple"):
-        SphericalIK(parallel, 2)
+        CompiledIK(parallel, 2)

@@ -1,0 +1,80 @@
+"""The compiled closed forms as a solver: the same solutions as EAIK's, much faster."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from symgrasp.ik.branches import BRANCHES, solve_range
+from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries
+from symgrasp.ik.closed_form import ClosedFormIK, Solutions, Tolerance
+from symgrasp.poses import Array
+from symgrasp.robot.robot import Arm
+
+__all__ = ["CompiledIK"]
+
+
+class CompiledIK(ClosedFormIK):
+    """`ClosedFormIK` for arms whose closed form is compiled: the same solutions, much faster.
+
+    Args:
+        arm: the arm.
+        samples: number of redundancy samples; a 6-joint arm always has one.
+        tolerance: largest error of a solution.
+
+    Raises:
+        UrdfError: no closed form is known for the arm, whichever joint is locked.
+        ValueError: a closed form is known, but it is of neither compiled family; see `fits`.
+
+    Attributes:
+        chain: the arm's geometry at every redundancy sample, for compiled code.
+    """
+
+    def __init__(self, arm: Arm, samples: int, tolerance: Tolerance | None = None) -> None:
+        super().__init__(arm, samples, tolerance)
+        self.chain = self._pack_chain()
+
+    @staticmethod
+    def fits(ik: ClosedFormIK) -> bool:
+        """Whether a closed form is compiled for an arm, with the joint locked that its solver locks."""
+        return chain_geometries(ik.arm, ik.locked, ik.phi) is not None
+
+    def solve(self, T_base_tool: Array) -> Solutions:
+        """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""
+        return self._solve(T_base_tool, 0, len(self.phi))
+
+    def solve_sample(self, T_base_tool: Array, sample: int) -> Solutions:
+        """Return every configuration that reaches a pose (4, 4) at one redundancy sample."""
+        found = self._solve(T_base_tool, sample, sample + 1)
+        return found._replace(sample=np.zeros_like(found.sample))
+
+    def _solve(self, T_base_tool: Array, first: int, last: int) -> Solutions:
+        """Return the solutions of a pose (4, 4) at the redundancy samples from first to before last."""
+        T = np.ascontiguousarray(T_base_tool, dtype=float)
+        # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
+        q = np.empty((last - first, BRANCHES, self.arm.dof))
+        exists, inside = np.empty(q.shape[:-1], dtype=bool), np.empty(q.shape[:-1], dtype=bool)
+        solve_range(*self.chain, T, first, last, q, exists, inside)
+        sample, branch = np.nonzero(exists)
+        return Solutions(q[exists], sample + first, branch, inside[exists])
+
+    def _pack_chain(self) -> Chain:
+        """Pack the arm's geometry at every redundancy sample into arrays."""
+        arm = self.arm
+        rows = chain_geometries(arm, self.locked, self.phi)
+        if rows is None:
+            raise ValueError(f"{arm.name}: no spherical triple and pair of joints, nor three parallel joints")
+        locked = -1 if self.locked is None else self.locked
+        free = [j for j in range(arm.dof) if j != locked]
+        backwards = rows[0].backwards
+        bounded = np.isfinite(arm.lower) & np.isfinite(arm.upper)
+        middle = np.zeros(arm.dof)
+        middle[bounded] = 0.5 * (arm.lower[bounded] + arm.upper[bounded])
+        half = np.minimum(np.where(bounded, 0.5 * (arm.upper - arm.lower), np.inf), np.pi)
+        least = np.cos(half) - COSINE_TOLERANCE
+        tolerance = [self.tolerance.position, self.tolerance.rotation, 0.0]
+        return Chain(
+            geometry=np.array([row.packed() for row in rows]),
+            joint=np.array([*(free[::-1] if backwards else free), locked, backwards, rows[0].family]),
+            limits=np.array([arm.lower, arm.upper, middle, np.cos(middle), np.sin(middle), least]),
+            forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
+        )

@@ -1,0 +1,124 @@
+"""What the closed forms share in compiled code: the motion asked for, joint limits, writing and checking."""
+
+from __future__ import annotations
+
+import math
+
+from symgrasp.compiling import njit
+from symgrasp.ik.chain import P0, R0
+from symgrasp.ik.vectors import STRICT, column, dot, minus, plus, rotate, row, transposed_times, vec
+
+__all__ = [
+    "ROOT_TOLERANCE",
+    "misses",
+    "nearest_turn",
+    "outside",
+    "sine",
+    "tool_motion",
+    "within",
+    "write_branch",
+]
+
+ROOT_TOLERANCE = 1e-12
+"""A radicand (dimensionless, or m²) above minus this counts as zero: at the limit of the reach two
+branches coincide, and rounding decides on which side of zero it falls."""
+
+
+@njit(**STRICT)
+def tool_motion(g, backwards, T):
+    """Return the displacement G of the tool as nested tuples (rotation, position), or G⁻¹ if backwards."""
+    p0 = vec(g, P0)
+    # G = T T0⁻¹: rotation T R0ᵀ, position p − R p0.
+    R = (
+        (_row3(T, 0, g, 0), _row3(T, 0, g, 1), _row3(T, 0, g, 2)),
+        (_row3(T, 1, g, 0), _row3(T, 1, g, 1), _row3(T, 1, g, 2)),
+        (_row3(T, 2, g, 0), _row3(T, 2, g, 1), _row3(T, 2, g, 2)),
+    )
+    p = (
+        T[0, 3] - (R[0][0] * p0[0] + R[0][1] * p0[1] + R[0][2] * p0[2]),
+        T[1, 3] - (R[1][0] * p0[0] + R[1][1] * p0[1] + R[1][2] * p0[2]),
+        T[2, 3] - (R[2][0] * p0[0] + R[2][1] * p0[1] + R[2][2] * p0[2]),
+    )
+    if backwards:
+        back = transposed_times(R, p)
+        p = (-back[0], -back[1], -back[2])
+        R = (
+            (R[0][0], R[1][0], R[2][0]),
+            (R[0][1], R[1][1], R[2][1]),
+            (R[0][2], R[1][2], R[2][2]),
+        )
+    return R, p
+
+
+@njit(**STRICT)
+def _row3(T, i, g, j):
+    """Return entry (i, j) of the rotation T R0ᵀ."""
+    return T[i, 0] * g[R0 + 3 * j] + T[i, 1] * g[R0 + 3 * j + 1] + T[i, 2] * g[R0 + 3 * j + 2]
+
+
+@njit(**STRICT)
+def nearest_turn(limits, joint, value):
+    """Add the full turns to a joint value that bring it nearest to the middle of its limits."""
+    return value + 2.0 * math.pi * math.floor((limits[2, joint] - value) / (2.0 * math.pi) + 0.5)
+
+
+@njit(**STRICT)
+def within(limits, joint, value):
+    """Whether a joint value is inside its limits."""
+    return limits[0, joint] <= value <= limits[1, joint]
+
+
+@njit(**STRICT)
+def outside(limits, joint, s, c):
+    """Whether an angle of this sine and cosine is outside the limits of a joint, with any full turns added.
+
+    It is inside when the value nearest to the middle of the range is within half the range of it.
+    """
+    return c * limits[3, joint] + s * limits[4, joint] < limits[5, joint]
+
+
+@njit(**STRICT)
+def sine(cosine):
+    """Return the sine of the arc cosine, which is not negative, or -1 where there is none."""
+    rest = 1.0 - cosine * cosine
+    return math.sqrt(max(rest, 0.0)) if rest >= -ROOT_TOLERANCE else -1.0
+
+
+@njit(**STRICT)
+def misses(forward, q, T):
+    """Whether the tool pose at joint values q differs from T by more than the tolerances."""
+    n = q.shape[0]
+    x, y, p = column(forward, 2 * n + 1, 0), column(forward, 2 * n + 1, 1), (0.0, 0.0, 0.0)
+    for j in range(n - 1, -1, -1):
+        axis, s, c = row(forward, j), math.sin(q[j]), math.cos(q[j])
+        x, y = rotate(axis, s, c, x), rotate(axis, s, c, y)
+        p = rotate(axis, s, c, plus(p, row(forward, n + j + 1)))
+    d = minus(plus(p, row(forward, n)), column(T, 0, 3))
+    dx, dy = minus(x, column(T, 0, 0)), minus(y, column(T, 0, 1))
+    # For rotations an angle apart, a column differs by at most that angle, and two columns together (root
+    # sum of squares) by about that angle at least.
+    turn = math.sqrt(dot(dx, dx) + dot(dy, dy))
+    return not (math.sqrt(dot(d, d)) <= forward[2 * n + 4, 0] and turn <= forward[2 * n + 4, 1])
+
+
+@njit(**STRICT)
+def write_branch(joint, limits, phi, values, row):
+    """Write joint values into a row of the arm's configurations.
+
+    Args:
+        joint, limits: the arm, see `symgrasp.ik.chain.Chain`.
+        phi: value of the locked joint (rad).
+        values: the six free joints' values, in the order of the closed form.
+        row: (n,) receives them in the arm's order.
+
+    Returns:
+        Whether all of them are inside the limits.
+    """
+    for k in range(6):
+        row[joint[k]] = values[k]
+    if joint[6] >= 0:
+        row[joint[6]] = nearest_turn(limits, joint[6], phi)
+    fits = True
+    for k in range(row.shape[0]):
+        fits = fits and within(limits, k, row[k])
+    return fits
