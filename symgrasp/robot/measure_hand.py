@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 from scipy.spatial import ConvexHull
 
-from symgrasp.errors import UrdfError
+from symgrasp.errors import UrdfError, printable
 from symgrasp.files import resolve
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, from_rotation, inverse, quat_wxyz, rpy
@@ -111,6 +111,7 @@ def hand_yaml(hand: Hand) -> str:
         f"# objects may reach {mm['finger_depth']} behind the tool frame; the palm is {mm['palm_depth']}"
         f" behind it, {mm['palm_width']} wide there",
     ]
+    summary = [printable(line) for line in summary]  # a line break would end the comment
     if hand.urdf is not None:
         summary.append("# a hand of its own: the robot also needs mount: {link: LINK, pose: {…}}")
     content = {
