@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -103,3 +104,20 @@ def test_changed_sources_are_compiled_anew(tmp_path):
         done = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": ""}, capture_output=True, check=True)
         outputs.append(done.stdout.decode())
     assert outputs == ["compiling\n14\n", "14\n", "compiling\n21\n"]
+
+
+def test_without_a_place_for_the_cache_it_compiles_without_and_says_so_once(tmp_path):
+    (tmp_path / "file").touch()
+    program = (
+        "from symgrasp.compiling import njit\n"
+        "one = njit(cache=True)(lambda x: x + 1)\n"
+        "two = njit(cache=True)(lambda x: x + 2)\n"
+        "print(one(1) + two(1))\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "file")}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "5\n"
+    (line,) = done.stderr.splitlines()
+    assert str(tmp_path / "file") in line
+    assert "cannot be kept" in line

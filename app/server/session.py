@@ -307,7 +307,7 @@ class Session:
 
 
 def _problem(error: Exception) -> str:
-    """Return one line for the page about an error; where it comes from goes to the log if it is unexpected."""
+    """Return one line for the page about an error; where an unexpected one comes from goes to the log."""
     if isinstance(error, SymgraspError):
         return str(error)
     log.error("an action failed", exc_info=error)

@@ -63,7 +63,8 @@ def draw_map(
         mappable = ScalarMappable(Normalize(0, high), ListedColormap(list(colors / 255)))
         figure.colorbar(mappable, ax=list(axes), label=coloured.scale.label)
     patches = [
-        Patch(color=color, label=f"{_plain(label)} ({count})") for color, label, count in coloured.swatches
+        Patch(color=color, label=f"{_plain(label, LONGEST_LABEL)} ({count})")
+        for color, label, count in coloured.swatches
     ]
     figure.legend(handles=patches, loc="outside right center", frameon=False)
     figure.suptitle(_plain(title))
@@ -95,7 +96,13 @@ def draw_openings(
         held = np.where(reason[k] == Reason.FEASIBLE, 1e3 * openings[k], np.nan)
         # Hands often open equally far; the thinner line lies on the thicker one.
         width = 3 * (len(names) - k)
-        wide.plot(held, 100 * h, linewidth=width, color=line.get_color(), label=f"{_plain(name)} holds")
+        wide.plot(
+            held,
+            100 * h,
+            linewidth=width,
+            color=line.get_color(),
+            label=f"{_plain(name, LONGEST_LABEL)} holds",
+        )
     wide.set(xlabel="opening (mm)", ylabel="h (cm)", xlim=(0, None))
     wide.legend(frameon=False)
     strips.imshow(
@@ -109,7 +116,7 @@ def draw_openings(
     )
     for k in range(1, len(names)):
         strips.axvline(k - 0.5, color="white", linewidth=3)
-    strips.set_xticks(range(len(names)), [_plain(name) for name in names], rotation=90)
+    strips.set_xticks(range(len(names)), [_plain(name, LONGEST_LABEL) for name in names], rotation=90)
     seen = [r for r in reversed(Reason) if (reason == r).any()]
     labels = {Reason.FEASIBLE: "fits"}
     patches = [Patch(color=r.color, label=labels.get(r, r.label)) for r in seen]
@@ -159,9 +166,13 @@ LONGEST_NAME = 80
 """Most characters of a text that holds a name: more would leave no room for the picture."""
 
 
-def _plain(text: str) -> str:
+LONGEST_LABEL = 30
+"""Most characters of a label beside the picture."""
+
+
+def _plain(text: str, most: int = LONGEST_NAME) -> str:
     """Return a text as Matplotlib shows it as it is: no formula, one line of bearable length."""
-    return shortened(printable(text), LONGEST_NAME).replace("$", r"\$")
+    return shortened(printable(text), most).replace("$", r"\$")
 
 
 def to_png(figure: Figure) -> bytes:
