@@ -70,9 +70,9 @@ with write_atomically(Path(sys.argv[1])) as file, temporary_folder() as folder:
 def start(tmp_path) -> Callable[[str], subprocess.Popen[str]]:
     def start(how: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-c", KILLED, str(tmp_path / "plan.json"), how]
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        pipe = subprocess.PIPE
         environment = {**os.environ, "TMPDIR": str(tmp_path)}
-        process = subprocess.Popen(command, env=environment, text=True, **pipes)
+        process = subprocess.Popen(command, env=environment, text=True, stdin=pipe, stdout=pipe)
         assert process.stdout
         assert process.stdout.readline() == "both\n"
         return process

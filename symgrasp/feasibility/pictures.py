@@ -116,7 +116,7 @@ def draw_openings(
     )
     for k in range(1, len(names)):
         strips.axvline(k - 0.5, color="white", linewidth=3)
-    strips.set_xticks(range(len(names)), [_plain(name, LONGEST_LABEL) for name in names], rotation=90)
+    strips.set_xticks(range(len(names)), [_plain(name, LONGEST_LABEL // 2) for name in names], rotation=90)
     seen = [r for r in reversed(Reason) if (reason == r).any()]
     labels = {Reason.FEASIBLE: "fits"}
     patches = [Patch(color=r.color, label=labels.get(r, r.label)) for r in seen]
