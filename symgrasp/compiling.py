@@ -76,27 +76,50 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def compile_later(function: Callable[..., Any]) -> Any:
         before = _config.CACHE_DIR
         _config.CACHE_DIR = _cache_dir(before)
-        cached = options.get("cache", False) and _is_writable(_config.CACHE_DIR)
+        folder = _config.CACHE_DIR
+        settings: dict[str, Any] = {**options, "cache": options.get("cache", False) and _is_writable(folder)}
         try:
-            return numba.njit(**{**options, "cache": cached})(function)
+            compiled: Any = numba.njit(**settings)(function)
         finally:
             _config.CACHE_DIR = before
+        if settings["cache"]:
+            compiled._cache.save_overload = _saving(compiled._cache.save_overload, folder)
+        return compiled
 
     return compile_later
 
 
 @cache
 def _is_writable(folder: str) -> bool:
-    """Whether files can be written in a folder, which is made; if not, a warning says so once."""
+    """Whether files can be written in a folder, which is made; if not, a warning says so."""
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
-        if multiprocessing.parent_process() is None:
-            text = "what is compiled cannot be kept in %s (%s), so every start compiles it anew"
-            log.warning(text, folder, error.strerror)
+        _warn_uncached(folder, error.strerror)
         return False
     return True
+
+
+def _saving(save: Callable[..., None], folder: str) -> Callable[..., None]:
+    """Return numba's function that writes what was compiled, which may fail now: disks may be full."""
+
+    def save_if_possible(*overload: Any) -> None:
+        try:
+            save(*overload)
+        except OSError as error:
+            _warn_uncached(folder, error.strerror)
+
+    return save_if_possible
+
+
+@cache
+def _warn_uncached(folder: str, reason: str) -> None:
+    """Warn once, and not in the processes of the page too, that what is compiled is not kept."""
+    if multiprocessing.parent_process() is None:
+        log.warning(
+            "what is compiled cannot be kept in %s (%s): every start compiles it anew", folder, reason
+        )
 
 
 @cache

@@ -181,9 +181,10 @@ class RobotModel:
         """
         if j.type == "continuous":
             return -np.inf, np.inf
-        if not _has_limits(j):
+        limit = j.limit
+        if limit is None or limit.lower is None or limit.upper is None:
             raise UrdfError(self.path, f"joint {j.name}: limit", None, "a lower and an upper limit")
-        lower, upper = float(j.limit.lower), float(j.limit.upper)
+        lower, upper = float(limit.lower), float(limit.upper)
         if not -LARGEST_LIMIT <= lower <= upper <= LARGEST_LIMIT:
             raise UrdfError(self.path, f"joint {j.name}: limit", [lower, upper], "lower <= upper")
         return lower, upper

@@ -84,7 +84,7 @@ def linkage_hand(signs: dict[str, int], chained: bool, offset: float, root: floa
 
 
 JOINTS = ("crank_l", "bar_l", "finger_l", "crank_r", "bar_r", "finger_r")
-STRAIGHT = dict.fromkeys(JOINTS, 1)
+STRAIGHT: dict[str, int] = dict.fromkeys(JOINTS, 1)
 
 
 class Placed:
@@ -206,7 +206,7 @@ def test_fingers_no_longer_than_the_palm_leave_no_hand(tmp_path):
 
 
 def test_a_mimic_joint_without_limits_moves_within_those_it_follows(tmp_path):
-    signs = {**STRAIGHT, "crank_r": -1}
+    signs: dict[str, int] = {**STRAIGHT, "crank_r": -1}
     path = tmp_path / "linkage.urdf"
     path.write_text(linkage_hand(signs, True, 0.3))
     joints = {joint.name: joint for joint in RobotModel(path).joints}
