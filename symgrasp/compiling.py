@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import logging
+import multiprocessing
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -30,6 +33,8 @@ COMPILING_MESSAGE = "compiling what this needs, once on this machine; it takes u
 # By default OpenMP threads spin while they wait for each other. Where another program, such as a browser,
 # occupies a core, spinning makes a map take three times as long; otherwise it gains next to nothing.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
+log = logging.getLogger(__name__)
 
 _config: Any = config  # numba sets its attributes at import time, where type checkers do not see them
 
@@ -65,17 +70,56 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     numba's own cache checks only the file that a function stands in. Compiled functions contain copies
     of those that they call, so after a change in one file, callers in other files would run old code.
+    Where the folder of the cache cannot be written, nothing is cached.
     """
 
     def compile_later(function: Callable[..., Any]) -> Any:
         before = _config.CACHE_DIR
         _config.CACHE_DIR = _cache_dir(before)
+        folder = _config.CACHE_DIR
+        settings: dict[str, Any] = {**options, "cache": options.get("cache", False) and _is_writable(folder)}
         try:
-            return numba.njit(**options)(function)
+            compiled: Any = numba.njit(**settings)(function)
         finally:
             _config.CACHE_DIR = before
+        if settings["cache"]:
+            compiled._cache.save_overload = _saving(compiled._cache.save_overload, folder)
+        return compiled
 
     return compile_later
+
+
+@cache
+def _is_writable(folder: str) -> bool:
+    """Whether files can be written in a folder, which is made; if not, a warning says so."""
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        _warn_uncached(folder, error.strerror)
+        return False
+    return True
+
+
+def _saving(save: Callable[..., None], folder: str) -> Callable[..., None]:
+    """Return numba's function that writes what was compiled, which may fail now: disks may be full."""
+
+    def save_if_possible(*overload: Any) -> None:
+        try:
+            save(*overload)
+        except OSError as error:
+            _warn_uncached(folder, error.strerror)
+
+    return save_if_possible
+
+
+@cache
+def _warn_uncached(folder: str, reason: str) -> None:
+    """Warn once, and not in the processes of the page too, that what is compiled is not kept."""
+    if multiprocessing.parent_process() is None:
+        log.warning(
+            "what is compiled cannot be kept in %s (%s): every start compiles it anew", folder, reason
+        )
 
 
 @cache

@@ -1,7 +1,8 @@
 """All exceptions that this library raises on purpose.
 
 The text of an input error is one line with the source of the bad value, the field, the value and what was
-expected, so the command line and the page can show it unchanged.
+expected, so the command line and the page can show it unchanged. What files and people call things goes
+through `printable` before it is shown, because names may hold anything.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from difflib import get_close_matches
 from reprlib import Repr
 
 __all__ = [
+    "LONGEST",
     "Cancelled",
     "InputError",
     "MapError",
@@ -22,8 +24,12 @@ __all__ = [
     "SymgraspError",
     "UrdfError",
     "one_of",
+    "printable",
+    "shortened",
 ]
 
+LONGEST = 280
+"""Most characters of an input error's text."""
 
 _SHORT = Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 4, 120, 120
@@ -53,8 +59,7 @@ class InputError(SymgraspError, ValueError):
             shown = _SHORT.repr(value)
         except ValueError:  # an integer of thousands of digits
             shown = f"a very large {type(value).__name__}"
-        line = f"{self.source}: {field}: {shown}: expected {expected}"
-        super().__init__(" ".join(line.split()))
+        super().__init__(_line(self.source, field, shown, f"expected {expected}"))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arguments, because the default would pickle only the text."""
@@ -104,3 +109,27 @@ def one_of(choices: Iterable[str], wrong: object = None) -> str:
     similar = get_close_matches(str(wrong), names, n=1)
     hint = f" (did you mean {similar[0]!r}?)" if similar else ""
     return "one of " + ", ".join(repr(n) for n in names) + hint
+
+
+def printable(text: str) -> str:
+    """Return a text with everything that is not to be seen as an escape: no control takes effect anywhere.
+
+    Such are line breaks, the escape sequences of terminals, and marks that reverse the direction of writing.
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text of at most ``most`` characters: a longer one without its middle."""
+    if len(text) <= most:
+        return text
+    tail = (most - 1) // 2
+    return text[: most - 1 - tail] + "…" + text[len(text) - tail :]
+
+
+def _line(*parts: str) -> str:
+    """Join parts to a line of at most `LONGEST` characters, for which the longest parts are shortened."""
+    parts = tuple(printable(" ".join(part.split())) for part in parts)
+    room = LONGEST - len(": ") * (len(parts) - 1)
+    most = next(n for n in range(room, 0, -1) if sum(min(len(part), n) for part in parts) <= room)
+    return ": ".join(shortened(part, most) for part in parts)

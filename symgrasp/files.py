@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
+import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
 import yaml
 
-__all__ = ["SCENES_DIR", "file_sha256", "package_dir", "parse_yaml", "resolve", "write_atomically"]
+__all__ = [
+    "SCENES_DIR",
+    "file_sha256",
+    "package_dir",
+    "parse_yaml",
+    "resolve",
+    "temporary_folder",
+    "write_atomically",
+]
 
 _PACKAGE = Path(__file__).resolve().parent
+
+TEMPORARY = ".symgrasp-tmp-"
+"""How the names of temporary files and folders begin."""
+
+ABANDONED_AGE = 60.0
+"""Temporary files younger than this (s) may not be locked yet by the process that makes them."""
 
 SCENES = "static_scenes"
 """Name of the folder of the shipped scenes, and of the package in ``package://static_scenes/…``."""
@@ -130,22 +147,81 @@ def _nodes(value: Any, known: dict[int, int]) -> int:
 
 @contextmanager
 def write_atomically(path: Path) -> Iterator[IO[bytes]]:
-    """Open a temporary file that replaces ``path`` when the ``with`` block ends without an exception."""
+    """Open a temporary file that replaces ``path`` when the ``with`` block ends without an exception.
+
+    Raises:
+        OSError: it cannot be written; the error names ``path``.
+    """
     path = Path(path).resolve()  # replace the file that a symbolic link points to
-    if path.exists() and not path.is_file():  # a device or a pipe cannot be replaced
-        with path.open("wb") as file:
-            yield file
-        return
-    mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
-        with os.fdopen(handle, "wb") as file:
-            yield file
-        Path(temporary).chmod(mode)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        if path.exists() and not path.is_file():  # a device or a pipe cannot be replaced
+            with path.open("wb") as file:
+                yield file
+            return
+        mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
+        with _temporary(path.parent, _make_file) as temporary:
+            with temporary.open("wb") as file:
+                yield file
+            temporary.chmod(mode)
+            temporary.replace(path)
+    except BrokenPipeError:  # of a pipe whose reader has gone
         raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Make an empty folder, which is removed when the ``with`` block ends."""
+    with _temporary(
+        Path(tempfile.gettempdir()), lambda folder: tempfile.mkdtemp("", TEMPORARY, folder)
+    ) as path:
+        yield path
+
+
+@contextmanager
+def _temporary(folder: Path, make: Callable[[Path], str]) -> Iterator[Path]:
+    """Make a temporary file or folder in a folder, and remove it at the end if it is still there.
+
+    It is locked meanwhile: what a killed process left behind has no lock any more, and is removed first.
+    """
+    for left in folder.glob(f"{TEMPORARY}*"):
+        with suppress(OSError):  # another user's, or one in use
+            if time.time() - left.stat().st_mtime > ABANDONED_AGE:
+                with _open(left) as handle:
+                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    _remove(left)
+    path = Path(make(folder))
+    try:
+        with _open(path) as handle:
+            with suppress(OSError):  # of a file system that knows no locks
+                fcntl.flock(handle, fcntl.LOCK_EX)
+            yield path
+    finally:
+        _remove(path)
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[int]:
+    """Open a file or folder, to lock it."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _make_file(folder: Path) -> str:
+    handle, name = tempfile.mkstemp("", TEMPORARY, folder)
+    os.close(handle)
+    return name
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _umask() -> int:

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from numba import njit
 
 import symgrasp
@@ -103,3 +105,29 @@ def test_changed_sources_are_compiled_anew(tmp_path):
         done = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": ""}, capture_output=True, check=True)
         outputs.append(done.stdout.decode())
     assert outputs == ["compiling\n14\n", "14\n", "compiling\n21\n"]
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_without_a_place_for_the_cache_it_compiles_without_and_says_so_once(full, tmp_path):
+    """The folder cannot be made, or the disk is full as soon as something is compiled."""
+    (tmp_path / "file").touch()
+    program = (
+        "import errno\n"
+        "from numba.core import caching\n"
+        "from symgrasp.compiling import njit\n"
+        "def save(*_): raise OSError(errno.ENOSPC, 'No space left on device')\n"
+        + ("caching.IndexDataCacheFile.save = save\n" if full else "")
+        + "def one(x): return x + 1\n"
+        "def two(x): return x + 2\n"
+        "print(njit(cache=True)(one)(1) + njit(cache=True)(two)(1))\n"
+    )
+    (tmp_path / "program.py").write_text(program)
+    place = tmp_path / ("folder" if full else "file")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(place)}
+    command = [sys.executable, str(tmp_path / "program.py")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "5\n"
+    (line,) = done.stderr.splitlines()
+    assert str(place) in line
+    assert "cannot be kept" in line
+    assert ("No space left" in line) == full

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 
 from symgrasp.feasibility.explain import CandidateResult, Explanation
@@ -11,6 +9,7 @@ from symgrasp.reason import Reason
 
 from ..render.palette import REASONS
 from ..state.state import State
+from .escaping import escape
 from .map import picture_html, to_png
 
 __all__ = ["candidate_html", "candidate_text", "candidates_html", "reason_grid"]

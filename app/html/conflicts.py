@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from html import escape
-
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.planners.conflicts import Conflict, Exclusion
 from symgrasp.reason import Reason
 
 from ..state.plan_results import PlanFileReport, Refusal
+from .escaping import escape
 from .map import h_axis
 
 __all__ = ["failure_html", "plan_file_html", "regrasp_count"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ..render.prints import hand_color, shown_prints
 from ..state.map_view_state import RollChoice
 from ..state.plan_results import ClimbReplay, PlanResult, PlanResults
 from ..state.state import State
+from .escaping import escape
 from .map import map_html
 from .readout import count_text
 from .solutions import worst_margin_texts

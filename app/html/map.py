@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
-from html import escape
 
 import numpy as np
 from PIL import Image
@@ -23,6 +22,7 @@ from ..render.marks import Mark
 from ..render.palette import OVERLAP, PRINTS, faded
 from ..render.prints import hand_color, print_index
 from ..state.map_view_state import RollChoice
+from .escaping import escape
 
 __all__ = [
     "COLUMNS",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from html import escape
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from ..render.deviation import deviation_limit
 from ..render.palette import DIVERGING, PRINTS
 from ..render.prints import hand_color
 from ..state.state import State
+from .escaping import escape
 
 __all__ = ["holds_html", "profile_html", "symmetry_html"]
 

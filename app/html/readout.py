@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 
 from symgrasp.object.manifold import ROLLS
 
 from ..state.state import State
+from .escaping import escape
 
 __all__ = [
     "bimanual_html",

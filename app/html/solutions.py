@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 
 from ..state.plan_results import PlanResult
 from ..state.state import State
+from .escaping import escape
 from .stack import margin_texts
 
 __all__ = ["solutions_html", "worst_margin_texts"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from html import escape
 from itertools import groupby
 
 import numpy as np
@@ -19,6 +18,7 @@ from ..render.palette import INK, REASONS, rgb
 from ..render.weak_cache import cached_with_first
 from ..state.requests import MapResult
 from ..state.state import State
+from .escaping import escape
 from .map import THETA_AXIS, circle, h_axis, sample_columns, to_png
 
 __all__ = ["margin_texts", "shared_columns", "stack_html"]

@@ -146,21 +146,18 @@ class Actions:
 
     def save_map(self, kind: str) -> None:
         """Send the map that is shown as a picture, in a format of `app.render.map_picture.FORMATS`."""
-        state = self._session.state
-        if state is None:
-            return
-        try:
-            content = map_picture(state, kind)
-        except SymgraspError as error:
-            self._fail(error)
-            return
-        self._session.send(picture_name(state, kind), content)
+        self._session.attempt(
+            lambda state: self._session.send(picture_name(state, kind), map_picture(state, kind))
+        )
 
     def save_scene(self) -> None:
         """Send the scene with all changes to the browser as a YAML file."""
-        if state := self._session.state:
+
+        def save(state: State) -> None:
             scene = state.moved_scene()
             self._session.send(_file_name(scene.name, ".yaml"), scene_yaml(scene).encode())
+
+        self._session.attempt(save)
 
     def make_link(self) -> None:
         """Make a link that opens the page as it is."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from html import escape
 
+from symgrasp.errors import printable
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan
 from symgrasp.scene.parts import Task
@@ -55,7 +56,7 @@ def plan_document(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], Feasi
     results = PlanResults().found(plan.kind, (plan_result(plan, scene),), map_results, more=False)
     state = show_results(State.of(scene, scene.name), results)
     views = [
-        f"<h3>{escape(task.name)}</h3>"
+        f"<h3>{escape(printable(task.name))}</h3>"
         f'<iframe srcdoc="{escape(_drawn(show_step(state, step)))}" width="100%" height="{HEIGHT}"></iframe>'
         for step, task in enumerate(plan.tasks)
     ]

@@ -69,12 +69,15 @@ class PlanActions:
 
     def download(self, format_name: str) -> None:
         """Send the plan to the browser in one of `FORMATS`."""
-        state = self._session.state
-        if state and state.plan:
-            plan = state.plan.plan
-            ending, write = FORMATS[format_name]
-            name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
-            self._session.send(name + ending, write(plan).encode())
+
+        def send(state: State) -> None:
+            if state.plan:
+                plan = state.plan.plan
+                ending, write = FORMATS[format_name]
+                name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
+                self._session.send(name + ending, write(plan).encode())
+
+        self._session.attempt(send)
 
 
 def show_opened_plan(state: State, opened: OpenedPlan, maps: Maps) -> State:

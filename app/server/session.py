@@ -13,7 +13,7 @@ from typing import Any
 
 import viser
 
-from symgrasp.errors import SymgraspError
+from symgrasp.errors import LONGEST, SymgraspError, printable, shortened
 from symgrasp.progress import Progress
 
 from ..compute.cache import SharedCache
@@ -130,9 +130,20 @@ class Session:
                 return
             try:
                 state = change(self.state)
-            except SymgraspError as error:
-                state = job_changes.failed(self.state, str(error))
+            except Exception as error:  # must not end the event loop's callback unseen
+                state = job_changes.failed(self.state, _problem(error))
             self._commit(state, origin)
+
+    def attempt(self, action: Callable[[State], None]) -> None:
+        """Run an action that leaves the state as it is; see `SessionApi`."""
+        state = self.state
+        if state is None:
+            return
+        try:
+            action(state)
+        except Exception as error:  # of whatever writes files
+            problem = _problem(error)
+            self.change(lambda state: job_changes.failed(state, problem))
 
     def submit(self, label: str, run: Run, show: Callable[[State, Any], State]) -> None:
         """Run a job in place of the one under way; see `SessionApi`."""
@@ -293,3 +304,11 @@ class Session:
 
     async def _inputs_written(self, state: State) -> None:
         self.layout.write_inputs(state)
+
+
+def _problem(error: Exception) -> str:
+    """Return one line for the page about an error; where an unexpected one comes from goes to the log."""
+    if isinstance(error, SymgraspError):
+        return str(error)
+    log.error("an action failed", exc_info=error)
+    return shortened(printable(f"unexpected {type(error).__name__}: {error}"), LONGEST)

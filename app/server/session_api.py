@@ -24,8 +24,15 @@ class SessionApi(Protocol):
         """Apply a change to the state.
 
         Args:
-            change: returns the new state, or raises a `SymgraspError`, which is shown.
+            change: returns the new state, or raises an exception, which is shown.
             origin: what changed it: widgets of that origin are not written back.
+        """
+
+    def attempt(self, action: Callable[[State], None]) -> None:
+        """Run an action that leaves the state as it is; ignored before the first scene is loaded.
+
+        Args:
+            action: does it with the state that is shown, or raises an exception, which is shown.
         """
 
     def submit(self, label: str, run: Callable[[Progress], Any], show: Callable[[State, Any], State]) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from symgrasp.errors import InputError, MeshError, one_of
+from symgrasp.files import temporary_folder
 from symgrasp.object.library import library_objects, load_object
 from symgrasp.object.measure.measurement import Measurement, measure_mesh
 from symgrasp.object.measure.mesh_io import LARGEST, MESH_ENDINGS, SMALLEST
@@ -95,8 +95,8 @@ def from_mesh(name: str, content: bytes, scale: float) -> ObjectChoice:
     if file.suffix.lower() not in MESH_ENDINGS:
         raise MeshError(name, "ending", file.suffix, one_of(MESH_ENDINGS, file.suffix.lower()))
     # In an empty folder, since a mesh may refer to files beside it.
-    with tempfile.TemporaryDirectory(prefix="symgrasp-") as folder:
-        path = Path(folder, "mesh" + file.suffix.lower())
+    with temporary_folder() as folder:
+        path = folder / f"mesh{file.suffix.lower()}"
         path.write_bytes(content)
         try:
             measurement = measure_mesh(path, scale=scale)

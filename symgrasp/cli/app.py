@@ -6,6 +6,7 @@ import argparse
 import logging
 
 from symgrasp.cli.shared import Commands, add_command, add_scene
+from symgrasp.errors import printable
 
 __all__ = ["add_parser", "run"]
 
@@ -22,6 +23,15 @@ def run(args: argparse.Namespace) -> int:
     """Serve the page until interrupted; return the exit status."""
     from symgrasp.page import page_module
 
-    logging.basicConfig(level=logging.WARNING, format="symgrasp: %(message)s")
+    handler = logging.StreamHandler()
+    handler.setFormatter(_PlainFormatter("symgrasp: %(message)s"))
+    logging.basicConfig(level=logging.WARNING, handlers=[handler])
     page_module("server.serve").serve(args.scene, host=args.host, port=args.port)
     return 0
+
+
+class _PlainFormatter(logging.Formatter):
+    """Formats records like its base class, and shows what names in them could do to a terminal as escapes."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return "\n".join(map(printable, super().format(record).split("\n")))

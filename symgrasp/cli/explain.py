@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from symgrasp.cli.shared import Commands, add_command, add_scene, add_task_and_arm, chosen, progress_of
+from symgrasp.cli.shared import Commands, add_command, add_scene, add_task_and_arm, chosen, progress_of, say
 
 __all__ = ["add_parser", "run"]
 
@@ -37,17 +37,17 @@ def run(args: argparse.Namespace) -> int:
         cell = (args.roll // 180, row, column)
         found = MapMaker(world).explain(arm.name, task, cell, progress=progress)
     h, theta = 100 * scene.manifold.h[row], math.degrees(scene.manifold.theta[column])
-    print(
+    say(
         f"{scene.name}: {task.name} with {arm.name}, the cell at "
         f"h = {h:.1f} cm, θ = {theta:.1f}°, roll {args.roll}°: {found.reason.label}"
     )
     if found.reason < Reason.UNREACHABLE:
-        print("no candidates: the hand rules the cell out, whatever the arm does")
+        say("no candidates: the hand rules the cell out, whatever the arm does")
         return 0
     counts = [f"{count} {reason.label}" for reason, count in found.counts().items()]
     text = f"{len(found.candidates)} candidates: {', '.join(counts)}" if counts else "no candidates"
-    print(f"{text}; {found.unreachable} of {len(found.phi)} redundancy samples have none")
+    say(f"{text}; {found.unreachable} of {len(found.phi)} redundancy samples have none")
     for result in found.candidates:
         phi = math.degrees(result.phi)
-        print(f"  φ {phi:7.1f}°  branch {result.branch}  {result.reason.label:18}  {result.why}")
+        say(f"  φ {phi:7.1f}°  branch {result.branch}  {result.reason.label:18}  {result.why}")
     return 0

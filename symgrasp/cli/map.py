@@ -15,6 +15,7 @@ from symgrasp.cli.shared import (
     check_out,
     chosen,
     progress_of,
+    say,
     write_out,
 )
 from symgrasp.errors import InputError, one_of
@@ -48,9 +49,9 @@ def run(args: argparse.Namespace) -> int:
     with progress_of(f"map of {task.name}") as progress:
         the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress)
     cells = the_map.reason.size
-    print(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
+    say(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
     for reason, count in the_map.counts().items():
-        print(f"  {reason.label:20} {count:6}  {100 * count / cells:5.1f} %")
+        say(f"  {reason.label:20} {count:6}  {100 * count / cells:5.1f} %")
     if args.out:
         write_out(args.out, _content(the_map, args.out.suffix))
     return 0

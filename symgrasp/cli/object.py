@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from symgrasp.cli.shared import Commands, add_command, add_out, check_out, write_out
+from symgrasp.cli.shared import Commands, add_command, add_out, check_out, say, write_out
 from symgrasp.errors import InputError
 
 __all__ = ["add_parser", "run"]
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
 
     report = describe_object(args.object, args.scale)
     for line in report.lines():
-        print(line)
+        say(line)
     pictures = [(args.out, report.plot), (args.fit, lambda: plot_openings(report.profile, HANDS))]
     for out, draw in pictures:
         if out:

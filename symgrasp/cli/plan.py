@@ -17,6 +17,7 @@ from symgrasp.cli.shared import (
     check_out,
     checked_scene,
     progress_of,
+    say,
     whole,
 )
 from symgrasp.errors import InputError, one_of
@@ -65,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out:
         plan.save(args.out)
         _print_holds(plan)
-        print(f"written to {args.out}")
+        say(f"written to {args.out}")
     return 0
 
 
@@ -106,7 +107,7 @@ def _listed(args: argparse.Namespace, scene: Scene, progress: Progress | None) -
         maps = sequential_maps(scene, args.arm, progress)
         plans = sequential_plans(scene, args.arm, maps)
         grasps = common_grasps(list(maps.values()))  # in the order of the plans
-        notes = (f"\n      {intervals_in_words(grasp, list(maps.values()))}" for grasp in grasps)
+        notes = (intervals_in_words(grasp, list(maps.values())) for grasp in grasps)
     elif args.kind == "bimanual":
         plans = bimanual_plans(scene, args.task, progress=progress)
     else:
@@ -116,7 +117,9 @@ def _listed(args: argparse.Namespace, scene: Scene, progress: Progress | None) -
         for count, plan in enumerate(islice(plans, max(args.list or 0, args.number)), start=1):
             note = next(notes)
             if count <= (args.list or 0):
-                print(f"{count:4}  {plan_in_words(plan)}{note}")
+                say(f"{count:4}  {plan_in_words(plan)}")
+                if note:
+                    say(f"      {note}")
             if count == args.number:
                 chosen = plan
     if chosen is None:
@@ -129,6 +132,6 @@ def _print_holds(plan: Plan) -> None:
     from symgrasp.plan.listing import place_in_words
 
     for task in plan.tasks:
-        print(f"{task.name}: turn the object by {math.degrees(task.delta):.1f}°")
+        say(f"{task.name}: turn the object by {math.degrees(task.delta):.1f}°")
         for hold in task.holds:
-            print(f"  {hold.arm} holds at {place_in_words(hold.grasp)}, {1e3 * hold.clearance:.1f} mm clear")
+            say(f"  {hold.arm} holds at {place_in_words(hold.grasp)}, {1e3 * hold.clearance:.1f} mm clear")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from symgrasp.cli.shared import Commands, add_command
+from symgrasp.cli.shared import Commands, add_command, say
 
 __all__ = ["add_parser", "run"]
 
@@ -21,5 +21,5 @@ def run(args: argparse.Namespace) -> int:
     scenes = list_scenes()
     width = max(map(len, scenes))
     for name, description in scenes.items():
-        print(f"{name:{width}}  {description}")
+        say(f"{name:{width}}  {description}")
     return 0

@@ -7,13 +7,14 @@ viser) inside the functions that need them, so that ``--help`` and wrong options
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from symgrasp.errors import InputError
+from symgrasp.errors import InputError, printable, shortened
 
 if TYPE_CHECKING:
     from symgrasp.robot.robot import Arm
@@ -31,12 +32,17 @@ __all__ = [
     "checked_scene",
     "chosen",
     "progress_of",
+    "say",
+    "warn",
     "whole",
     "write_out",
 ]
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """What `argparse.ArgumentParser.add_subparsers` returns."""
+
+LONGEST_LINE = 300
+"""Most characters of a message."""
 
 DEFAULT_SCENE = "bottle_on_table"
 
@@ -56,6 +62,7 @@ def add_command(
         The command's own parser, for its options.
     """
     command = commands.add_parser(name, help=text, description=text)
+    command.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
     command.set_defaults(run=run)
     return command
 
@@ -101,7 +108,7 @@ def check_out(out: Path | None) -> None:
     """Check, before anything is computed, that a file can be written if one is asked for.
 
     Raises:
-        InputError: its folder does not exist, or it is a folder itself.
+        InputError: its folder does not exist or cannot be written, or it is a folder itself.
     """
     if out is None:
         return
@@ -109,6 +116,18 @@ def check_out(out: Path | None) -> None:
         raise InputError("command line", "--out", str(out), f"a file in an existing folder, not {out.parent}")
     if out.is_dir():
         raise InputError("command line", "--out", str(out), "a file, not a folder")
+    if not os.access(out if out.exists() and not out.is_file() else out.parent, os.W_OK):
+        raise InputError("command line", "--out", str(out), "a file that can be written")
+
+
+def say(text: str) -> None:
+    """Print a line; what names in it could do to a terminal is escaped."""
+    print(printable(text))
+
+
+def warn(text: str) -> None:
+    """Print a line of at most `LONGEST_LINE` characters about the command itself on stderr."""
+    print(shortened(f"symgrasp: {printable(text)}", LONGEST_LINE), file=sys.stderr, flush=True)
 
 
 def write_out(out: Path, content: bytes) -> None:
@@ -117,7 +136,7 @@ def write_out(out: Path, content: bytes) -> None:
 
     with write_atomically(out) as file:
         file.write(content)
-    print(f"written to {out}")
+    say(f"written to {out}")
 
 
 def checked_scene(name: str) -> Scene:
@@ -162,9 +181,11 @@ def progress_of(what: str) -> Iterator[Callable[[float], None] | None]:
     """
     from symgrasp.compiling import COMPILING_MESSAGE, notify_on_compile
 
+    label = shortened(printable(what), 60)
+
     def show(share: float) -> None:
         end = "\n" if share >= 1 else ""
-        print(f"\r{what}: {100 * share:3.0f} %", end=end, file=sys.stderr, flush=True)
+        print(f"\r{label}: {100 * share:3.0f} %", end=end, file=sys.stderr, flush=True)
 
-    with notify_on_compile(lambda: print(f"symgrasp: {COMPILING_MESSAGE} …", file=sys.stderr, flush=True)):
+    with notify_on_compile(lambda: warn(f"{COMPILING_MESSAGE} …")):
         yield show if sys.stderr.isatty() else None

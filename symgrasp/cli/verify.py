@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from symgrasp.cli.shared import Commands, add_command, add_plan, progress_of
+from symgrasp.cli.shared import Commands, add_command, add_plan, progress_of, say
 
 __all__ = ["add_parser", "run"]
 
@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
     with progress_of(f"verifying {args.plan.name}") as progress:
         report = verify(plan, progress)
     for failure in report.failures:
-        print(failure)
+        say(failure)
     result = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
-    print(f"{report.checks} statements checked: {result}")
+    say(f"{report.checks} statements checked: {result}")
     return 0 if report.holds else 1

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symgrasp.errors import printable, shortened
 from symgrasp.feasibility.color_by import ColoredMap
 from symgrasp.object.measure.measurement import Measurement
 from symgrasp.poses import Array
@@ -53,16 +55,19 @@ def draw_map(
             panel.imshow(cells, origin="lower", aspect="auto", extent=extent, interpolation="none")
         for h, theta in marks:
             panel.plot(np.rad2deg(theta), 100 * h, "o", ms=7, mew=2, mfc="none", mec="#e6007e", clip_on=False)
-        panel.set(xlabel="θ (°)", title=name, xticks=np.arange(-180, 181, 60))
+        panel.set(xlabel="θ (°)", title=_plain(name), xticks=np.arange(-180, 181, 60))
         panel.set(xlim=(-180, 180), ylim=(bottom, top))
     axes[0].set_ylabel("h (cm)")
     if coloured.scale:
         _, high, colors = coloured.scale
         mappable = ScalarMappable(Normalize(0, high), ListedColormap(list(colors / 255)))
         figure.colorbar(mappable, ax=list(axes), label=coloured.scale.label)
-    patches = [Patch(color=color, label=f"{label} ({count})") for color, label, count in coloured.swatches]
+    patches = [
+        Patch(color=color, label=f"{_plain(label, LONGEST_LABEL)} ({count})")
+        for color, label, count in coloured.swatches
+    ]
     figure.legend(handles=patches, loc="outside right center", frameon=False)
-    figure.suptitle(title)
+    figure.suptitle(_plain(title))
     return figure
 
 
@@ -91,7 +96,13 @@ def draw_openings(
         held = np.where(reason[k] == Reason.FEASIBLE, 1e3 * openings[k], np.nan)
         # Hands often open equally far; the thinner line lies on the thicker one.
         width = 3 * (len(names) - k)
-        wide.plot(held, 100 * h, linewidth=width, color=line.get_color(), label=f"{name} holds")
+        wide.plot(
+            held,
+            100 * h,
+            linewidth=width,
+            color=line.get_color(),
+            label=f"{_plain(name, LONGEST_LABEL)} holds",
+        )
     wide.set(xlabel="opening (mm)", ylabel="h (cm)", xlim=(0, None))
     wide.legend(frameon=False)
     strips.imshow(
@@ -105,7 +116,7 @@ def draw_openings(
     )
     for k in range(1, len(names)):
         strips.axvline(k - 0.5, color="white", linewidth=3)
-    strips.set_xticks(range(len(names)), names, rotation=90)
+    strips.set_xticks(range(len(names)), [_plain(name, LONGEST_LABEL // 2) for name in names], rotation=90)
     seen = [r for r in reversed(Reason) if (reason == r).any()]
     labels = {Reason.FEASIBLE: "fits"}
     patches = [Patch(color=r.color, label=labels.get(r, r.label)) for r in seen]
@@ -147,22 +158,40 @@ def draw_object(points: Array, measurement: Measurement | None, title: str) -> F
     outline.plot(r, h, marker=".", color="#3b3b3b")
     outline.plot(-r, h, color="#3b3b3b")
     outline.set(xlabel="r (mm)", ylabel="h (cm)")
-    figure.suptitle(title)
+    figure.suptitle(_plain(title))
     return figure
+
+
+LONGEST_NAME = 80
+"""Most characters of a text that holds a name: more would leave no room for the picture."""
+
+
+LONGEST_LABEL = 30
+"""Most characters of a label beside the picture."""
+
+
+def _plain(text: str, most: int = LONGEST_NAME) -> str:
+    """Return a text as Matplotlib shows it as it is: no formula, one line of bearable length."""
+    return shortened(printable(text), most).replace("$", r"\$")
 
 
 def to_png(figure: Figure) -> bytes:
     """Render a figure as PNG."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=120)
-    return buffer.getvalue()
+    return _rendered(figure, "png", dpi=120)
 
 
 def to_svg(figure: Figure) -> bytes:
     """Render a figure as SVG, the same bytes every time."""
     from matplotlib import rc_context
 
-    buffer = io.BytesIO()
     with rc_context({"svg.hashsalt": "symgrasp", "image.composite_image": False}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
+        return _rendered(figure, "svg", metadata={"Date": None})
+
+
+def _rendered(figure: Figure, kind: str, **options: Any) -> bytes:
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        # Names may have letters that the font has not: their place stays empty.
+        warnings.filterwarnings("ignore", r"Glyph \d+", UserWarning)
+        figure.savefig(buffer, format=kind, **options)
     return buffer.getvalue()

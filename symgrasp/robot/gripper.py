@@ -14,6 +14,7 @@ from symgrasp.robot.handprint import hull_edges, slab_corners
 from symgrasp.robot.model import RobotModel
 
 __all__ = [
+    "PAD_HALF_HEIGHT",
     "FingerMotion",
     "Gripper",
     "HandStructure",

@@ -10,12 +10,19 @@ import numpy as np
 import yaml
 from scipy.spatial import ConvexHull
 
-from symgrasp.errors import UrdfError
+from symgrasp.errors import UrdfError, printable
 from symgrasp.files import resolve
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, from_rotation, inverse, quat_wxyz, rpy
 from symgrasp.robot.assembly import Frame
-from symgrasp.robot.gripper import Gripper, find_gripper, find_hand_structure, links_with_shapes, snap_to_axis
+from symgrasp.robot.gripper import (
+    PAD_HALF_HEIGHT,
+    Gripper,
+    find_gripper,
+    find_hand_structure,
+    links_with_shapes,
+    snap_to_axis,
+)
 from symgrasp.robot.hand import Hand, JointTable
 from symgrasp.robot.handprint import hull_edges, slab_corners
 from symgrasp.robot.model import RobotModel
@@ -38,8 +45,14 @@ CUT_THICKNESS = 1e-6
 """Thickness (m) of the slab that stands for a cut by a plane."""
 
 WIDE_SHARE = 0.8
-"""Objects may reach as deep as the open fingers keep this share of their opening; further back, where
-they are closer together, the roots of the fingers begin."""
+"""Objects may reach as deep as the open fingers keep this share of their opening: further back, pads that
+tilt as they open stand too close together."""
+
+ROOT_STEP = 5e-4
+"""What stands further in than the pads by this (m, both sides together) belongs to a root of a finger."""
+
+POSES = 9
+"""Number of finger configurations from closed to open in which the roots are looked for."""
 
 TABLE_ERROR = 2.5e-4
 """Largest error (m) of the opening that a joint table may cause."""
@@ -98,6 +111,7 @@ def hand_yaml(hand: Hand) -> str:
         f"# objects may reach {mm['finger_depth']} behind the tool frame; the palm is {mm['palm_depth']}"
         f" behind it, {mm['palm_width']} wide there",
     ]
+    summary = [printable(line) for line in summary]  # a line break would end the comment
     if hand.urdf is not None:
         summary.append("# a hand of its own: the robot also needs mount: {link: LINK, pose: {…}}")
     content = {
@@ -186,19 +200,47 @@ def _width_at_middle(corners: Array) -> float:
 
 
 def _finger_depth(gripper: Gripper, T_base_tool: Array, palm: float) -> float:
-    """Return how deep (m) an object may reach: to the palm, or to where the open fingers narrow.
+    """Return how deep (m) an object may reach: to the palm, the roots of the fingers, or where they narrow.
 
     Args:
         gripper: the fingers.
         T_base_tool: pose (4, 4) of the tool frame in the base.
         palm: distance (m) of the palm's foremost point behind the tool frame.
+
+    Raises:
+        UrdfError: no depth is left.
     """
     fingers = [link for side in gripper.sides for link in side]
     length = -min(float(p[:, 2].min()) for p in gripper.motion.hulls(fingers, 1.0, T_base_tool))
-    deepest = max(0.0, min(palm - PALM_CLEARANCE, length))
-    wide = WIDE_SHARE * gripper.gap(1.0, T_base_tool, 0.0)
-    depths = np.linspace(deepest, 0.0, SAMPLES)
-    return next((float(d) for d in depths if gripper.gap(1.0, T_base_tool, d) >= wide), 0.0)
+    deepest = min(palm - PALM_CLEARANCE, length)
+    depth = _free_depth(gripper, T_base_tool, deepest) if deepest > 0 else 0.0
+    if round(depth, 4) <= 0:
+        where, expected = (
+            gripper.motion.model.path,
+            "fingers that stand apart from their pads back to the palm",
+        )
+        raise UrdfError(where, "hand: finger depth (mm)", round(1e3 * depth, 1), expected)
+    return depth
+
+
+def _free_depth(gripper: Gripper, T_base_tool: Array, deepest: float) -> float:
+    """Return how far (m) behind the tool frame, at most ``deepest``, the pads stand apart without roots.
+
+    A root stands further in than the pads. Pads of fingers that turn are tilted when the hand is open, and
+    narrow evenly towards the palm, so it is their extension backwards that roots are told from.
+    """
+    depths = np.linspace(0.0, deepest, SAMPLES)
+    free = np.ones(SAMPLES, dtype=bool)
+    for t in np.linspace(0.0, 1.0, POSES):
+        gaps = np.array([gripper.gap(t, T_base_tool, depth) for depth in depths])
+        if gaps[0] < 0:  # not as far open as to touch
+            continue
+        ahead, behind = (gripper.gap(t, T_base_tool, z) for z in (-PAD_HALF_HEIGHT, PAD_HALF_HEIGHT))
+        narrowing = min(ahead - gaps[0], gaps[0] - behind) / PAD_HALF_HEIGHT
+        free &= gaps >= gaps[0] - narrowing * depths - ROOT_STEP
+        if t == 1.0:
+            free &= gaps >= WIDE_SHARE * gaps[0]
+    return float(deepest if free.all() else depths[free.argmin() - 1])
 
 
 def _openings(gripper: Gripper, T_base_tool: Array, depth: float) -> tuple[Array, Array]:

@@ -108,7 +108,7 @@ class RobotModel:
         """
         links = [root]
         joints: list[Joint] = []
-        index = {name: i for i, name in enumerate(self.joint_names)}
+        by_name = {j.name: j for j in urdf.robot.joints}
         remaining = list(urdf.robot.joints)
         while remaining:
             ready = [j for j in remaining if j.parent in links]
@@ -118,12 +118,12 @@ class RobotModel:
                 if j.type != "fixed" and j.type not in MOVING:
                     raise UrdfError(self.path, f"joint {j.name}", j.type, one_of((*MOVING, "fixed")))
                 links.append(j.child)
-                joints.append(self._joint(j, index, links))
+                joints.append(self._joint(j, by_name, links))
             remaining = [j for j in remaining if j not in ready]
         return tuple(joints), tuple(links)
 
-    def _joint(self, j: yourdfpy.Joint, index: Mapping[str, int], links: list[str]) -> Joint:
-        """Convert a joint of the URDF; ``index`` maps the joints that take a value to their positions.
+    def _joint(self, j: yourdfpy.Joint, by_name: Mapping[str, yourdfpy.Joint], links: list[str]) -> Joint:
+        """Convert a joint of the URDF; ``by_name`` holds all of them.
 
         Raises:
             UrdfError: its axis, limits or mimic reference are unusable.
@@ -137,24 +137,57 @@ class RobotModel:
             if length < 1e-9:
                 raise UrdfError(self.path, f"joint {j.name}: axis", axis.tolist(), "a direction")
             axis = axis / length
-            if j.mimic is not None:
-                if j.mimic.joint not in index:
-                    raise UrdfError(self.path, f"joint {j.name}: mimic", j.mimic.joint, one_of(index))
-                source = index[j.mimic.joint]
-                ratio = 1.0 if j.mimic.multiplier is None else float(j.mimic.multiplier)
-                offset = 0.0 if j.mimic.offset is None else float(j.mimic.offset)
-            else:
-                source = index[j.name]
-            if j.type != "continuous":
-                if j.limit is None or j.limit.lower is None or j.limit.upper is None:
-                    raise UrdfError(self.path, f"joint {j.name}: limit", None, "a lower and an upper limit")
-                lower, upper = float(j.limit.lower), float(j.limit.upper)
-                if not -LARGEST_LIMIT <= lower <= upper <= LARGEST_LIMIT:
-                    raise UrdfError(self.path, f"joint {j.name}: limit", [lower, upper], "lower <= upper")
+            followed, ratio, offset = self._followed(j, by_name)
+            source = self.joint_names.index(followed.name)
+            if j.mimic is None or j.type == "continuous" or _has_limits(j):
+                lower, upper = self._limits(j)
+            else:  # as far as the joint that it mimics takes it
+                ends = [ratio * end + offset if ratio else offset for end in self._limits(followed)]
+                lower, upper = min(ends), max(ends)
         return Joint(
             j.name, j.type, links.index(j.parent), links.index(j.child), origin, axis, lower, upper,
             source, ratio, offset,
         )  # fmt: skip
+
+    def _followed(
+        self, j: yourdfpy.Joint, by_name: Mapping[str, yourdfpy.Joint]
+    ) -> tuple[yourdfpy.Joint, float, float]:
+        """Return the joint that a joint follows in the end, itself unless it mimics, with ratio and offset.
+
+        Raises:
+            UrdfError: it mimics a joint that takes no value, or itself in a circle.
+        """
+        ratio, offset, at, seen = 1.0, 0.0, j, [j.name]
+        while at.mimic is not None:
+            where, name = f"joint {at.name}: mimic", at.mimic.joint
+            target = by_name.get(name)
+            if target is None or target.type not in MOVING:
+                raise UrdfError(self.path, where, name, one_of(self.joint_names, name))
+            if name in seen:
+                raise UrdfError(self.path, where, name, "a joint that does not mimic this one in turn")
+            seen.append(name)
+            offset += ratio * (0.0 if at.mimic.offset is None else float(at.mimic.offset))
+            ratio *= 1.0 if at.mimic.multiplier is None else float(at.mimic.multiplier)
+            at = target
+        if not (np.isfinite(ratio) and np.isfinite(offset)):
+            raise UrdfError(self.path, f"joint {j.name}: mimic", [ratio, offset], "finite numbers")
+        return at, ratio, offset
+
+    def _limits(self, j: yourdfpy.Joint) -> tuple[float, float]:
+        """Return the limits of a joint of the URDF, infinite for a continuous one.
+
+        Raises:
+            UrdfError: they are missing, or not in order.
+        """
+        if j.type == "continuous":
+            return -np.inf, np.inf
+        limit = j.limit
+        if limit is None or limit.lower is None or limit.upper is None:
+            raise UrdfError(self.path, f"joint {j.name}: limit", None, "a lower and an upper limit")
+        lower, upper = float(limit.lower), float(limit.upper)
+        if not -LARGEST_LIMIT <= lower <= upper <= LARGEST_LIMIT:
+            raise UrdfError(self.path, f"joint {j.name}: limit", [lower, upper], "lower <= upper")
+        return lower, upper
 
     @property
     def root(self) -> str:
@@ -252,8 +285,11 @@ class RobotModel:
         return hash(self.sha256)
 
     def collision_urdf(self) -> bytes:
-        """Return the URDF without visual shapes, and with a mass for every link, as PyBullet demands."""
+        """Return the URDF without visual shapes, and with what PyBullet demands: masses and joint limits."""
         root = ET.fromstring(self.urdf)
+        for joint in root.iter("joint"):
+            if joint.find("mimic") is not None and joint.find("limit") is None:
+                ET.SubElement(joint, "limit", lower="0", upper="0", effort="0", velocity="0")  # not heeded
         for link in root.iter("link"):
             for visual in link.findall("visual"):
                 link.remove(visual)
@@ -263,6 +299,10 @@ class RobotModel:
                 moments = {"ixx": "1", "ixy": "0", "ixz": "0", "iyy": "1", "iyz": "0", "izz": "1"}
                 ET.SubElement(inertial, "inertia", moments)
         return ET.tostring(root)
+
+
+def _has_limits(j: yourdfpy.Joint) -> bool:
+    return j.limit is not None and j.limit.lower is not None and j.limit.upper is not None
 
 
 def _root_link(urdf: yourdfpy.URDF) -> str:

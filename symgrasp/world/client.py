@@ -5,12 +5,12 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from symgrasp.errors import UrdfError
+from symgrasp.files import temporary_folder
 from symgrasp.poses import Array, from_position_quat, quat_wxyz, wxyz_to_xyzw, xyzw_to_wxyz
 from symgrasp.robot.model import RobotModel
 
@@ -64,12 +64,12 @@ def load_urdf(client: int, model: RobotModel, pose: Array) -> int:
     Raises:
         UrdfError: PyBullet cannot load it, or a link that has shapes has none there.
     """
-    with tempfile.NamedTemporaryFile(suffix=".urdf") as file:
-        file.write(model.collision_urdf())
-        file.flush()
+    with temporary_folder() as folder:
+        file = folder / "robot.urdf"
+        file.write_bytes(model.collision_urdf())
         try:
             body = pybullet.loadURDF(
-                file.name,
+                str(file),
                 basePosition=pose[:3, 3].tolist(),
                 baseOrientation=xyzw(pose),
                 useFixedBase=True,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import json
 import os
 import pty
@@ -191,3 +192,72 @@ def test_progress_on_a_terminal_and_cancel_with_ctrl_c(content, tmp_path):
     assert b"cancelled" in seen
     assert b"Traceback" not in seen
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_fault_of_the_program_is_one_line_and_status_70(capsys, monkeypatch):
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("of\nthis" + 1000 * " and that")
+
+    monkeypatch.setattr("symgrasp.scene.shipped.list_scenes", broken)
+    assert main(["scenes"]) == 70
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(r"symgrasp: unexpected ZeroDivisionError: of\nthis and that")
+    assert line.endswith("symgrasp --debug prints where")
+    assert len(line) <= 300
+    for arguments in (["--debug", "scenes"], ["scenes", "--debug"]):
+        assert main(arguments) == 70
+        traceback = capsys.readouterr().err
+        assert traceback.startswith("Traceback")
+        assert traceback.rstrip().endswith(line)
+
+
+def test_help_lists_the_exit_statuses(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "exit status: 0 done; 1 no plan exists" in text
+    assert "70 a fault of this program" in text
+    assert "--debug" in text
+
+
+def test_a_full_disk_names_the_file(small, tmp_path, capsys, monkeypatch):
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "replace", full)
+    out = tmp_path / "map.json"
+    assert main(["map", str(small), "--out", str(out)]) == 2
+    assert capsys.readouterr().err == f"symgrasp: {out}: No space left on device\n"
+    assert list(tmp_path.iterdir()) == [small]
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_computed(small, capsys, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    out = small.parent / "map.json"
+    assert main(["map", str(small), "--out", str(out)]) == 2
+    captured = capsys.readouterr()
+    assert (
+        captured.err == f"symgrasp: command line: --out: {str(out)!r}: expected a file that can be written\n"
+    )
+    assert captured.out == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_output_that_cannot_be_written(tmp_path):
+    with Path("/dev/full").open("w") as nowhere:
+        command = [sys.executable, "-m", "symgrasp", "scenes"]
+        done = subprocess.run(command, stdout=nowhere, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "symgrasp: output: No space left on device\n")
+
+
+def test_long_values_are_shortened_in_the_middle(tmp_path, capsys):
+    folder = tmp_path / ("deep" * 60)
+    folder.mkdir()
+    path = folder / ("s" * 200 + ".yaml")
+    path.write_text("schema_version: 1\nname: " + "n" * 5000)
+    assert main(["map", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert len(line) <= 300
+    assert line.startswith("symgrasp: " + str(path)[:20])
+    assert "…" in line
+    assert "expected" in line

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 import subprocess
 import sys
+from functools import partial
 
 import pytest
 
 from app.server.serve import serve
 from app.server.viser_server import any_port
 from symgrasp.errors import InputError
+from tests.app.wire import Wire
 
 
 def test_a_busy_port_is_an_error_that_names_it():
@@ -45,3 +48,29 @@ def test_an_unknown_scene_ends_the_command_with_one_line():
     (line,) = done.stderr.splitlines()
     assert "no_scene" in line
     assert "bottle_on_table" in line
+
+
+@pytest.mark.parametrize("what", ["idle", "computing", "not reading"])
+def test_ctrl_c_with_browsers_connected_is_quiet(what):
+    port = any_port()
+    command = [sys.executable, "-m", "app", "soda_can", "--port", str(port)]
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    pipe = subprocess.PIPE
+    server = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, preexec_fn=heed)
+    try:
+        assert server.stdout
+        server.stdout.readline()
+        with Wire(port) as one, Wire(port) as other:
+            one.wait_for("Ready.")
+            other.wait_for("Ready.")
+            if what == "computing":
+                one.trigger("Plan one grasp for all tasks")
+                other.trigger("Save the 3D view (HTML)")
+            elif what == "not reading":
+                for k in range(30):
+                    one.set("x (cm)", 50 + 0.1 * k)
+            server.send_signal(signal.SIGINT)
+            out, errors = server.communicate(timeout=60)
+        assert (server.returncode, out, errors) == (0, "\nsymgrasp: stopped\n", "")
+    finally:
+        server.kill()

@@ -361,6 +361,34 @@ def test_a_page_that_cannot_be_built_says_so_and_leaves_nothing(server, monkeypa
         assert server.lobby.wait_until_empty(0.0)
 
 
+@pytest.mark.parametrize(
+    ("broken", "command"),
+    [
+        ("app.server.actions.scene_yaml", "Save the scene (YAML)"),
+        ("app.server.actions.Link.of", "Make a link"),
+        ("app.server.actions.snapshot_html", "Save the 3D view (HTML)"),
+        ("app.state.changes.clear_pick", "Let go of the grasp"),
+    ],
+)
+def test_what_breaks_in_an_unexpected_way_is_said_on_the_page_and_traced_in_the_log(
+    server, monkeypatch, caplog, broken, command
+):
+    def breaks(*_: object, **__: object) -> None:
+        raise RuntimeError("of\x1b this <test>")
+
+    with server.visit() as visitor:
+        visitor.wait_for(ready)
+        monkeypatch.setattr(broken, breaks)
+        visitor.trigger(command)
+        html = visitor.wait_for("unexpected RuntimeError: of")
+        assert r"of\x1b this &lt;test&gt;" in html
+        assert "Traceback" not in html
+        visitor.set("Rotation (°)", 20.0)  # and all goes on
+        visitor.wait_for(ready)
+    (record,) = [r for r in caplog.records if r.exc_info]
+    assert isinstance(record.exc_info[1], RuntimeError)
+
+
 def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(server, monkeypatch):
     show, broke = StatusPanel.show, threading.Event()
 
