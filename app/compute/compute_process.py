@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import shutil
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from symgrasp.errors import Cancelled, NoPlanError
@@ -13,7 +16,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 
-from ..state.object_choice import ObjectChoice
+from ..state.object_choice import ObjectChoice, scratch_prefix
 from ..state.plan_results import PlanResult
 from ..state.requests import (
     CompareRequest,
@@ -82,7 +85,7 @@ class ComputeProcess:
         """End the process; the next call starts another."""
         process, self._process = self._process, None
         if process:
-            process.end()
+            _end(process)
 
     def map(self, request: MapRequest, progress: Progress) -> MapResult:
         """Compute a map."""
@@ -175,7 +178,7 @@ class ComputeProcess:
             raise
         except (EOFError, OSError) as error:
             self._process = None
-            how = process.end(grace=1.0)  # a pipe may end a little before its process does
+            how = _end(process, grace=1.0)  # a pipe may end a little before its process does
             text = f"the process that computes ended unexpectedly ({how or 'it hung up'})"
             if how == "SIGABRT":  # so libraries end that cannot raise an exception
                 text += f", perhaps because it needs {TOO_MUCH_MEMORY}"
@@ -243,3 +246,11 @@ class ComputeProcess:
         request = self._requests.get((computed.map.task, computed.map.arm))
         if request:
             self._keep(MapResult(request, computed.map, computed.contacts))
+
+
+def _end(process: WorkerProcess, grace: float = 0.0) -> str:
+    """End a process as `WorkerProcess.end`, and remove the temporary folders that it could not."""
+    how = process.end(grace)
+    for folder in Path(tempfile.gettempdir()).glob(f"{scratch_prefix(process.pid)}*"):
+        shutil.rmtree(folder, ignore_errors=True)
+    return how

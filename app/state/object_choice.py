@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ __all__ = [
     "from_library",
     "from_mesh",
     "object_options",
+    "scratch_prefix",
 ]
 
 OWN = "the scene's own"
@@ -68,6 +70,11 @@ def from_library(choice: str) -> ObjectChoice:
     return ObjectChoice(choice, *load_object(choice))
 
 
+def scratch_prefix(pid: int) -> str:
+    """Return how the names of the temporary folders of a process begin; who kills it has to remove them."""
+    return f"symgrasp-{pid}-"
+
+
 def check_size(name: str, content: bytes) -> None:
     """Check the size of a mesh file.
 
@@ -95,7 +102,7 @@ def from_mesh(name: str, content: bytes, scale: float) -> ObjectChoice:
     if file.suffix.lower() not in MESH_ENDINGS:
         raise MeshError(name, "ending", file.suffix, one_of(MESH_ENDINGS, file.suffix.lower()))
     # In an empty folder, since a mesh may refer to files beside it.
-    with tempfile.TemporaryDirectory(prefix="symgrasp-") as folder:
+    with tempfile.TemporaryDirectory(prefix=scratch_prefix(os.getpid())) as folder:
         path = Path(folder, "mesh" + file.suffix.lower())
         path.write_bytes(content)
         try:

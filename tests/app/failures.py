@@ -13,6 +13,7 @@ import numpy as np
 from app.compute.limits import MEMORY_LIMIT
 from app.compute.process_main import REPORT_INTERVAL, serve
 from app.compute.upload_service import UploadService
+from app.state import object_choice
 from symgrasp.errors import MeshError
 from symgrasp.feasibility.create import MapMaker
 
@@ -59,11 +60,15 @@ def serve_parsers(pipe: Connection, folders: tuple[Path, ...]) -> None:
     """Do to the parser of meshes what the name of a file says; read anything else as ever."""
     measure = UploadService.measure
 
+    def endless(*_: object, **__: object) -> None:
+        while True:
+            pass
+
     def misbehave(service: UploadService, name: str, content: bytes, scale: float, progress: Any) -> Any:
+        if name == "hangs.stl":
+            setattr(object_choice, "measure_mesh", endless)  # noqa: B010
+        pipe.poll(2 * REPORT_INTERVAL)  # so that no report is left out
         progress(0.5)
-        if name == "hangs":
-            while True:
-                pass
         if name == "eats":
             try:
                 np.zeros(MEMORY_LIMIT, dtype=np.uint8)

@@ -7,6 +7,8 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 from subprocess import PIPE
 
 import numpy as np
@@ -180,7 +182,7 @@ def misbehaving(cache, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("hangs", r"^hangs takes longer to read than 0 s$"),
+        ("hangs.stl", r"^hangs\.stl takes longer to read than 1 s$"),
         ("eats", r"^eats needs more memory than a session may use \(4 GB\)$"),
         ("aborts", r"ended unexpectedly \(SIGABRT\), perhaps because it needs more memory .* \(4 GB\)$"),
     ],
@@ -188,13 +190,18 @@ def misbehaving(cache, monkeypatch):
 def test_a_parser_that_misbehaves_is_reported_and_the_next_file_is_read(
     misbehaving, name, message, monkeypatch
 ):
+    pids: set[int] = set()
+
     def impatient(share: float) -> None:
         if share == 0.5:  # it has begun
-            monkeypatch.setattr(compute_process, "READING_TIMEOUT", 0.0)
+            pids.add(pid_of(misbehaving))
+            monkeypatch.setattr(compute_process, "READING_TIMEOUT", 1.0)
 
     with pytest.raises(ProcessDied, match=message):
         misbehaving.measure(name, b"", 1.0, impatient)
     assert misbehaving.pid is None
+    (pid,) = pids
+    assert not list(Path(tempfile.gettempdir()).glob(f"*{pid}*"))
     monkeypatch.setattr(compute_process, "READING_TIMEOUT", 60.0)
     assert misbehaving.measure("a.stl", stl(), 1.0, quiet).name == "a"
 

@@ -84,8 +84,9 @@ def test_the_server_parses_no_upload_itself(visitor, actions, content, no_parser
     )
     actions.upload_object("can.stl", stl(), 1.0)
     visitor.wait_for(lambda html: shows(visitor, "can.stl (upload)") and ready(html))
-    plan = planned("pick_pour_place", "sequential").plan.plan
-    actions.plans.open_file("plan.json", plan.to_json().encode())
+    found = planned("pick_pour_place", "sequential").plan
+    assert found
+    actions.plans.open_file("plan.json", found.plan.to_json().encode())
     assert "pick_pour_place" in title(visitor.wait_for(lambda html: "plan.json" in html and ready(html)))
 
 
@@ -137,6 +138,7 @@ def test_no_message_shows_where_the_server_has_its_files(content, tmp_path):
 
 def test_an_opened_plan_takes_the_maps_that_the_server_has(server, visitor, actions, monkeypatch):
     results = planned("pick_pour_place", "sequential")
+    assert results.plan
     for result in results.maps.values():
         server.cache.keep(result)
     kept: list[object] = []
