@@ -16,11 +16,19 @@ from typing import IO, Any
 
 import yaml
 
+try:
+    from yaml import CSafeLoader as SafeLoader  # ten times as fast, but not built everywhere
+except ImportError:
+    from yaml import SafeLoader
+
 __all__ = [
+    "LARGEST_YAML",
     "SCENES_DIR",
+    "check_size",
     "file_sha256",
     "package_dir",
     "parse_yaml",
+    "read_file",
     "resolve",
     "temporary_folder",
     "write_atomically",
@@ -93,56 +101,98 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(SafeLoader):  # pyright: ignore[reportGeneralTypeIssues]
     """YAML loader that accepts plain data only and rejects duplicate keys."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict:
         mapping = super().construct_mapping(node, deep=deep)
         if len(mapping) != len(node.value):
-            keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-            raise ValueError(f"the key {next(k for k in keys if keys.count(k) > 1)!r} twice")
+            seen = set()
+            for key_node, _ in node.value:
+                key = self.construct_object(key_node, deep=True)
+                if key in seen:
+                    raise ValueError(f"the key {key!r} twice")
+                seen.add(key)
         return mapping
 
 
-MOST_NODES = 1_000_000
+LARGEST_YAML = 1_000_000
+"""Largest YAML document (bytes) that is read."""
+
+MOST_VALUES = 100_000
 """Largest number of values in a YAML document with its aliases expanded, which can make a small file huge."""
+
+DEEPEST = 50
+"""Deepest nesting of a YAML document."""
+
+LONGEST = 10_000
+"""Most characters of a value in a YAML document: reading a number takes the square of its length."""
+
+
+def read_file(path: Path, largest: int) -> bytes:
+    """Return the content of a file.
+
+    Args:
+        path: the file.
+        largest: most bytes that it may have.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is larger; no more than that is read.
+    """
+    with path.open("rb") as file:
+        content = file.read(largest + 1)
+    check_size(content, largest)
+    return content
+
+
+def check_size(content: str | bytes, largest: int) -> None:
+    """Raise ValueError if the content of a file has more than so many bytes or characters."""
+    if len(content) > largest:
+        raise ValueError(f"more than {largest / 1e6:g} MB")
 
 
 def parse_yaml(text: str) -> Any:
     """Parse a YAML document of plain data.
 
     Raises:
-        ValueError: it is not such a document; the text says why in one line.
+        ValueError: it is not such a document, or is too large; the text says why in one line.
     """
     try:
-        content = yaml.load(text, Loader=_Loader)
-        if _nodes(content, {}) > MOST_NODES:
-            raise ValueError("aliases that stand for too much")
-    except RecursionError:
-        raise ValueError("nested too deeply") from None
+        _check_extent(text)
+        return yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise ValueError(f"{where}{error.problem}") from error
     except Exception as error:  # a malformed scalar can raise any exception
         raise ValueError(" ".join(f"{error or type(error).__name__}".split())) from error
-    return content
 
 
-def _nodes(value: Any, known: dict[int, int]) -> int:
-    """Count the values in plain data with every alias expanded.
-
-    Args:
-        value: the data.
-        known: id of a mapping or list → its count; filled by the function.
-    """
-    if not isinstance(value, (dict, list)):
-        return 1
-    if id(value) not in known:
-        known[id(value)] = MOST_NODES + 1  # for data that contains itself
-        parts = value.values() if isinstance(value, dict) else value
-        known[id(value)] = 1 + sum(_nodes(part, known) for part in parts)
-    return known[id(value)]
+def _check_extent(text: str) -> None:
+    """Raise ValueError if a YAML document is too large, before anything is built of it."""
+    check_size(text, LARGEST_YAML)
+    count = 0
+    begun: list[tuple[str | None, int]] = []  # the anchor of each open collection, and the count before it
+    sizes: dict[str | None, int] = {}  # anchor → number of values that an alias of it stands for
+    for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = begun.pop()
+            sizes[anchor] = count - before
+        elif isinstance(event, yaml.NodeEvent):
+            if isinstance(event, yaml.CollectionStartEvent):
+                begun.append((event.anchor, count))
+            if isinstance(event, yaml.ScalarEvent):
+                sizes[event.anchor] = 1
+                if len(event.value) > LONGEST:
+                    raise ValueError(f"a value of more than {LONGEST:,} characters")
+            if isinstance(event, yaml.AliasEvent) and event.anchor not in sizes:
+                raise ValueError(f"the alias *{event.anchor} before the end of what it stands for")
+            count += sizes[event.anchor] if isinstance(event, yaml.AliasEvent) else 1
+            if count > MOST_VALUES:
+                raise ValueError(f"more than {MOST_VALUES:,} values")
+            if len(begun) > DEEPEST:
+                raise ValueError(f"nested more than {DEEPEST} deep")
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import Path
 
 from symgrasp.errors import SceneError, one_of
@@ -88,8 +89,14 @@ class SharedCache:
         with self._lock:
             return self._with_object.setdefault((name, option), changed)
 
-    def linked(self, link: Link) -> tuple[Scene, ObjectChoice | None]:
+    def linked(
+        self, link: Link, mount: Callable[[Scene, str, str], Scene]
+    ) -> tuple[Scene, ObjectChoice | None]:
         """Return the scene of a link with its object and hands.
+
+        Args:
+            link: the link.
+            mount: returns a scene with a hand on an arm, by their names.
 
         Raises:
             InputError: there is no scene, object or hand of a name, or they do not fit.
@@ -97,8 +104,7 @@ class SharedCache:
         scene, choice = self.scene_with(link.scene or self.first, link.object or OWN)
         for arm, hand in link.hand.items():
             if scene.replaceable_hands.get(arm) != hand:
-                scene = scene.with_hand(arm, hand)
-                check_visuals(scene)
+                scene = mount(scene, arm, hand)
         return scene, choice
 
     def map(self, request: MapRequest) -> MapResult | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -12,6 +13,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 
+from ..state.object_choice import ObjectChoice
 from ..state.plan_results import PlanResult
 from ..state.requests import (
     CompareRequest,
@@ -22,7 +24,9 @@ from ..state.requests import (
     MapResult,
     Maps,
 )
+from ..state.uploaded_scene import UploadedScene
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
+from .limits import MEMORY_LIMIT
 from .plan_service import OpenedPlan, PlanOutcome, PlanRequest
 from .process_pool import ProcessPool, WorkerProcess
 
@@ -35,12 +39,18 @@ CANCEL_TIMEOUT = 10.0
 """Time (s) after a cancel until the process is killed: compiled code cannot be interrupted."""
 
 
+READING_TIMEOUT = 60.0
+"""Time (s) without a word after which a process that reads a file is killed: the file hangs its parser."""
+
+TOO_MUCH_MEMORY = f"more memory than a session may use ({MEMORY_LIMIT / 1e9:g} GB)"
+
+
 class ProcessDied(Exception):
-    """The process ended in the middle of a computation."""
+    """The process ended, or was ended, in the middle of a computation."""
 
 
 class ComputeProcess:
-    """Calls `MapService` and `PlanService` in a process of its own; used by one thread at a time.
+    """Calls the services in a process of its own; used by one thread at a time.
 
     The process is started when it is first needed. Every method may raise `Cancelled` through its
     progress, the errors of the service, and `ProcessDied`.
@@ -89,9 +99,17 @@ class ComputeProcess:
         """Compute the result of every candidate of a cell."""
         return self._call("explain", progress, request)
 
-    def check_tasks(self, scene: Scene, progress: Progress) -> None:
-        """Check the tasks of an uploaded scene; see `MapService.check_tasks`."""
-        self._call("check_tasks", progress, scene)
+    def read_scene(self, name: str, content: bytes, progress: Progress) -> UploadedScene:
+        """Read an uploaded scene; see `UploadService.read_scene`."""
+        return self._call("read_scene", progress, name, content, reads=name)
+
+    def measure(self, name: str, content: bytes, scale: float, progress: Progress) -> ObjectChoice:
+        """Measure an uploaded mesh; see `UploadService.measure`."""
+        return self._call("measure", progress, name, content, scale, reads=name)
+
+    def mount(self, scene: Scene, arm: str, hand: str, progress: Progress) -> Scene:
+        """Return a scene with another hand on an arm; see `UploadService.mount`."""
+        return self._call("mount", progress, scene, arm, hand, reads=hand)
 
     def plan(self, request: PlanRequest, cached: Maps, progress: Progress) -> tuple[PlanOutcome, Maps]:
         """Run a planner; return its outcome and the maps it used, by task and arm.
@@ -115,17 +133,9 @@ class ComputeProcess:
             raise NoPlanError("the list of solutions ended with the process that made it: plan again")
         return self._call("more", progress)
 
-    def open(self, content: bytes, name: str, progress: Progress) -> tuple[OpenedPlan, Maps]:
-        """Read and verify a plan file; return the report, and plan, scene and maps if the plan holds."""
-        opened: OpenedPlan = self._call("open", progress, content, name)
-        if opened.scene is None:
-            return opened, {}
-        scene = opened.scene.scene
-        requests = [MapRequest(scene, c.map.arm, c.map.task) for c in self._computed]
-        maps = self._results(requests)
-        for result in maps.values():
-            self._keep(result)
-        return opened, maps
+    def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
+        """Read and verify a plan file; see `PlanService.open`."""
+        return self._call("open", progress, content, name, reads=name)
 
     def _results(self, requests: Sequence[MapRequest]) -> Maps:
         """Return the maps that the last call computed, as the answers to requests."""
@@ -134,7 +144,14 @@ class ComputeProcess:
         pairs = ((c, by_key.get((c.map.task, c.map.arm))) for c in computed)
         return {(r.task, r.arm): MapResult(r, c.map, c.contacts) for c, r in pairs if r}
 
-    def _call(self, method: str, progress: Progress, *args: object, maps: Sequence[MapRequest] = ()) -> Any:
+    def _call(
+        self,
+        method: str,
+        progress: Progress,
+        *args: object,
+        maps: Sequence[MapRequest] = (),
+        reads: str = "",
+    ) -> Any:
         """Call a method of the services in the process.
 
         Args:
@@ -142,6 +159,7 @@ class ComputeProcess:
             progress: called with the finished share; may raise `Cancelled`.
             args: of the method, besides its progress.
             maps: the maps that it may compute.
+            reads: name of the file that it reads, if it reads one.
         """
         process = self._ready(progress)
         self._requests = {(request.task, request.arm): request for request in maps}
@@ -149,7 +167,7 @@ class ComputeProcess:
         process.job_id += 1
         try:
             process.channel.send(Call(process.job_id, method, args))
-            return self._follow(process, progress)
+            return self._follow(process, progress, reads)
         except Cancelled:
             process.cancelled_at = time.monotonic()
             with suppress(OSError):  # it is dead already, which the next call notices
@@ -159,6 +177,8 @@ class ComputeProcess:
             self._process = None
             how = process.end(grace=1.0)  # a pipe may end a little before its process does
             text = f"the process that computes ended unexpectedly ({how or 'it hung up'})"
+            if how == "SIGABRT":  # so libraries end that cannot raise an exception
+                text += f", perhaps because it needs {TOO_MUCH_MEMORY}"
             raise ProcessDied(text) from error
 
     def _ready(self, progress: Progress) -> WorkerProcess:
@@ -189,14 +209,18 @@ class ComputeProcess:
                 return
             progress(0.0)
 
-    def _follow(self, process: WorkerProcess, progress: Progress) -> Any:
+    def _follow(self, process: WorkerProcess, progress: Progress, reads: str) -> Any:
         """Receive messages until the call under way ends, and return its result."""
-        channel, share = process.channel, 0.0
+        channel, share, heard = process.channel, 0.0, time.monotonic()
         while True:
             if not channel.poll(POLL_INTERVAL):
+                if reads and time.monotonic() - heard > READING_TIMEOUT:
+                    self.close()
+                    raise ProcessDied(f"{reads} takes longer to read than {READING_TIMEOUT:g} s")
                 progress(share)
                 continue
             message = channel.receive()
+            heard = math.inf if isinstance(message, Compiling) else time.monotonic()
             if isinstance(message, ProgressReport):
                 share = message.share
                 progress(share)
@@ -205,6 +229,9 @@ class ComputeProcess:
             elif isinstance(message, Compiling):
                 self._compiling()
             elif isinstance(message, Failure):
+                if isinstance(message.error, MemoryError):
+                    self.close()
+                    raise ProcessDied(f"{reads or 'this computation'} needs {TOO_MUCH_MEMORY}")
                 if isinstance(message.error, (EOFError, OSError)):  # it is not about this connection
                     raise RuntimeError(f"{type(message.error).__name__}: {message.error}")
                 raise message.error

@@ -12,7 +12,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import rotation_z
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
-from symgrasp.world import RESTING_DEPTH, BulletWorld, check_tasks, open_world
+from symgrasp.world import RESTING_DEPTH, BulletWorld, open_world
 
 from ..state.requests import (
     CompareRequest,
@@ -98,15 +98,6 @@ class MapService:
         maker, the_map = self._maker_for(request.map.scene), request.map
         explanation = maker.explain(the_map.arm, the_map.moved_task(), request.cell, progress=progress)
         return ExplainResult(request, explanation)
-
-    def check_tasks(self, scene: Scene, progress: Progress) -> None:
-        """Check that the object collides with no obstacle in any task of a scene.
-
-        Raises:
-            SceneError: it does.
-        """
-        progress(0.0)
-        check_tasks(scene)
 
     def _maker_for(self, scene: Scene) -> MapMaker:
         """Return the present map maker if it is for the same robots, obstacles and object, else a new one."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from symgrasp.errors import NoPlanError, PlanError
+from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.plan.checked_plan import check_plan
@@ -29,8 +29,8 @@ from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
-from ..files.plan_formats import PLAN_LIMIT
 from ..files.scene_files import refuse_foreign_files
+from ..files.shown_paths import shown_paths
 from ..scene3d.visual_meshes import check_visuals
 from ..state.object_pose import ObjectPose, with_poses
 from ..state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
@@ -127,6 +127,14 @@ class OpenedPlan:
     scene: UploadedScene | None = None
     plan: PlanResult | None = None
 
+    @property
+    def maps(self) -> list[MapRequest]:
+        """The maps that show the plan; none where it does not hold."""
+        if self.scene is None or self.plan is None:
+            return []
+        holds = [(task.name, hold.arm) for task in self.plan.plan.tasks for hold in task.holds]
+        return [MapRequest(self.scene.scene, arm, task) for task, arm in dict.fromkeys(holds)]
+
 
 class PlanService:
     """Runs planners; used by one thread at a time.
@@ -185,7 +193,7 @@ class PlanService:
         return self._next_plans()
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
-        """Read and verify a plan file; if the plan holds, return all that is needed to show it.
+        """Read and verify a plan file; if the plan holds, return all that is needed to show it but its maps.
 
         The references to files in its scene are checked before anything is loaded.
 
@@ -194,20 +202,14 @@ class PlanService:
             SceneError: its scene refers to files that an uploaded scene may not use.
         """
         self.close()
-        if len(content) > PLAN_LIMIT:
-            size, limit = f"{len(content) / 1e6:.1f} MB", f"{PLAN_LIMIT / 1e6:g} MB"
-            raise PlanError(name, "size of the file", size, f"a plan of at most {limit}")
         content_of_scene = Plan.parse(content, name).scene.content
         refuse_foreign_files(f"{name}: scene.content", content_of_scene, self._folders)
-        checked = check_plan(content, name, lambda share: progress(share / 2))
-        report = PlanFileReport(name, checked.report.checks, tuple(checked.report.failures))
+        checked = check_plan(content, name, progress)
+        report = PlanFileReport(name, checked.report.checks, tuple(map(shown_paths, checked.report.failures)))
         scene, plan = checked.scene, checked.plan
         if scene is None:
             return OpenedPlan(report)
         check_visuals(scene)
-        keys = dict.fromkeys((task.name, hold.arm) for task in plan.tasks for hold in task.holds)
-        requests = [MapRequest(scene, arm, task) for task, arm in keys]
-        self._maps.maps(requests, {}, lambda share: progress((1 + share) / 2))
         return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene))
 
     def _start_planner(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:

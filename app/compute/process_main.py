@@ -1,4 +1,4 @@
-"""The main function of a process that computes for one session; only it runs PyBullet."""
+"""The main function of a process that computes for one session; it alone parses what was uploaded."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ from symgrasp.progress import Progress
 
 from ..state.requests import MapRequest
 from .channel import Call, Cancel, Channel, Compiling, ComputedMap, Failure, ProgressReport, Result
+from .limits import limit_memory, ran_out_of_memory
 from .map_service import MapService
 from .plan_service import PlanService
+from .upload_service import UploadService
 
 __all__ = ["serve"]
 
@@ -39,6 +41,7 @@ def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
         folders: where the files of an uploaded scene may lie.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the server, which closes the pipe
+    limit_memory()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         _Server(Channel(pipe), folders).run()
@@ -59,11 +62,11 @@ class _Server:
         self._channel = channel
         self._job_id, self._reported = 0, 0.0
         self._maps = MapService(lambda result: channel.send(ComputedMap(result.map, result.contacts)))
-        plans = PlanService(self._maps, folders)
+        plans, uploads = PlanService(self._maps, folders), UploadService(folders)
         self._methods: dict[str, Callable[..., Any]] = {
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
-            "check_tasks": self._maps.check_tasks,
             "plan": plans.plan, "more": plans.more, "open": plans.open,
+            "read_scene": uploads.read_scene, "measure": uploads.measure, "mount": uploads.mount,
         }  # fmt: skip
 
     def run(self) -> None:
@@ -71,7 +74,11 @@ class _Server:
             message = self._channel.receive()
             if isinstance(message, Call):  # else it cancels a call that has ended
                 self._job_id, self._reported = message.job_id, 0.0
-                self._channel.send(self._answer(message))
+                answer = self._answer(message)
+                try:
+                    self._channel.send(answer)
+                except MemoryError:
+                    self._channel.send(Failure(MemoryError()))
 
     def _answer(self, call: Call) -> Result | Failure:
         try:
@@ -79,9 +86,11 @@ class _Server:
                 return Result(self._methods[call.method](*call.args, self._progress))
         except Cancelled:
             return Failure(Cancelled())
-        except SymgraspError as error:
-            return Failure(error)
         except Exception as error:  # the server reports whatever a library raises
+            if ran_out_of_memory(error):
+                return Failure(MemoryError())
+            if isinstance(error, SymgraspError):
+                return Failure(error)
             log.exception("a computation failed")
             return Failure(_portable(error))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from symgrasp.plan.exports import EXPORTS
-from symgrasp.plan.plan import Plan
+from symgrasp.plan.plan import LARGEST_PLAN, Plan
 
 __all__ = ["FORMATS", "PLAN_LIMIT"]
 
@@ -17,5 +17,5 @@ FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
 }
 """Label of a format on the page → ending of its files, and the function that writes them."""
 
-PLAN_LIMIT = 5_000_000
+PLAN_LIMIT = LARGEST_PLAN
 """Largest plan file (bytes) that is read."""

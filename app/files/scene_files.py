@@ -15,7 +15,7 @@ import yaml
 from pydantic import ValidationError
 
 from symgrasp.errors import SceneError
-from symgrasp.files import SCENES_DIR, package_dir, parse_yaml, resolve
+from symgrasp.files import LARGEST_YAML, SCENES_DIR, package_dir, parse_yaml, resolve
 from symgrasp.scene.format import SceneFile, describe_error
 from symgrasp.scene.scene import Scene
 
@@ -23,7 +23,7 @@ from ..state.uploaded_scene import UploadedScene
 
 __all__ = ["SCENE_LIMIT", "read_scene", "refuse_foreign_files", "scene_yaml"]
 
-SCENE_LIMIT = 1_000_000
+SCENE_LIMIT = LARGEST_YAML
 """Largest scene file (bytes) that is read."""
 
 MAX_NAME = 100
@@ -121,8 +121,9 @@ def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> Path
         for root in roots:
             if path := _inside(resolve(reference, root), roots):
                 return path
-    folder = f"in {roots[0]}" if roots else "of the server"
-    expected = f"a file that a Python package ships (package://<package>/<path>), or one {folder}"
+    expected = (
+        "a file that a Python package ships (package://<package>/<path>), or one of the server's scenes"
+    )
     raise SceneError(source, field, reference, expected)
 
 

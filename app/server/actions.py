@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from functools import partial
 
 import viser
 
@@ -15,14 +14,12 @@ from symgrasp.scene.scene import Scene
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
 from ..files.links import Link
-from ..files.scene_files import read_scene, scene_yaml
+from ..files.scene_files import scene_yaml
 from ..render.map_picture import map_picture, picture_name
-from ..scene3d.visual_meshes import check_visuals
 from ..state import changes, job_changes
-from ..state.object_choice import OWN, ObjectChoice, check_size, from_library, from_mesh
+from ..state.object_choice import OWN, ObjectChoice, check_size, from_library
 from ..state.page_link import Camera
 from ..state.state import State
-from ..state.uploaded_scene import UploadedScene
 from .plan_actions import PlanActions
 from .session_api import SessionApi
 from .snapshot import snapshot_html
@@ -72,18 +69,16 @@ class Actions:
     def upload_scene(self, name: str, content: bytes) -> None:
         """Read an uploaded scene and show it."""
 
-        def run(progress: Progress) -> UploadedScene:
-            uploaded = read_scene(name, content, self._cache.folders)
-            self._process.check_tasks(uploaded.scene, progress)
-            check_visuals(uploaded.scene)
-            return uploaded
-
-        self._session.submit(f"Opening {name}", run, changes.open_upload)
+        self._session.submit(
+            f"Opening {name}",
+            lambda progress: self._process.read_scene(name, content, progress),
+            changes.open_upload,
+        )
 
     def choose_object(self, option: str) -> None:
         """Replace the scene's object by an option of the menu."""
         if state := self._session.state:
-            self._change_object(f"Loading {option}", partial(self._with_option, state, option))
+            self._change_object(f"Loading {option}", lambda _: self._with_option(state, option))
 
     def upload_object(self, name: str, content: bytes, scale: float) -> None:
         """Measure an uploaded mesh and put the object into the scene; one unit of it is ``scale`` metres."""
@@ -95,7 +90,10 @@ class Actions:
         except SymgraspError as error:
             self._fail(error)
             return
-        self._change_object(f"Measuring {name}", lambda: _with_object(state, from_mesh(name, content, scale)))
+        self._change_object(
+            f"Measuring {name}",
+            lambda progress: _with_object(state, self._process.measure(name, content, scale, progress)),
+        )
 
     def choose_hand(self, hand: str) -> None:
         """Mount another hand on the chosen arm."""
@@ -103,17 +101,13 @@ class Actions:
         if state is None:
             return
 
-        def run() -> SceneWithObject:
-            scene = state.scene.with_hand(state.arm, hand)
-            check_visuals(scene)
-            return scene, state.object_choice
+        def run(progress: Progress) -> SceneWithObject:
+            return self._process.mount(state.scene, state.arm, hand, progress), state.object_choice
 
         self._change_object(f"Mounting {hand}", run)
 
-    def _change_object(self, label: str, run: Callable[[], SceneWithObject]) -> None:
-        self._session.submit(
-            label, lambda _: run(), lambda state, result: changes.choose_object(state, *result)
-        )
+    def _change_object(self, label: str, run: Callable[[Progress], SceneWithObject]) -> None:
+        self._session.submit(label, run, lambda state, result: changes.choose_object(state, *result))
 
     def _with_option(self, state: State, option: str) -> SceneWithObject:
         """Return the scene with its own object, the uploaded one, or one of the library."""

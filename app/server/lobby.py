@@ -14,6 +14,7 @@ import viser
 
 from ..compute.cache import SharedCache
 from ..compute.process_pool import ProcessPool
+from ..files.shown_paths import shown_paths
 from .proxy import HELLO, Proxy, Visit
 from .session import Session
 from .viser_server import quiet_server
@@ -125,7 +126,7 @@ class Lobby:
         except Exception as error:
             log.exception("a session could not be opened")
             client.gui.reset()
-            why = escape(f"{type(error).__name__}: {error}")
+            why = escape(shown_paths(f"{type(error).__name__}: {error}"))
             client.gui.add_html(
                 f'<div style="{STYLE}">This page could not be opened ({why}). Load it again.</div>'
             )

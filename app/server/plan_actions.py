@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+
+from symgrasp.progress import Progress
 
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
@@ -12,7 +15,7 @@ from ..files.plan_formats import FORMATS
 from ..state.changes import open_upload
 from ..state.plan_changes import more_listed, show_results
 from ..state.plan_results import PlanKind, PlanResults
-from ..state.requests import Maps
+from ..state.requests import MapRequest, Maps
 from ..state.state import State
 from .session_api import SessionApi
 
@@ -61,11 +64,22 @@ class PlanActions:
 
     def open_file(self, name: str, content: bytes) -> None:
         """Verify an uploaded plan file, and show the plan if it holds."""
-        self._session.submit(
-            f"Verifying {name}",
-            lambda progress: self._process.open(content, name, progress),
-            lambda state, result: show_opened_plan(state, *result),
-        )
+
+        def run(progress: Progress) -> tuple[OpenedPlan, Maps]:
+            opened = self._process.open(content, name, lambda share: progress(share / 2))
+            return opened, self._maps(opened.maps, lambda share: progress((1 + share) / 2))
+
+        self._session.submit(f"Verifying {name}", run, lambda state, result: show_opened_plan(state, *result))
+
+    def _maps(self, requests: Sequence[MapRequest], progress: Progress) -> Maps:
+        """Return maps by task and arm, computing those that are not cached."""
+        maps: Maps = {}
+        for k, request in enumerate(requests):
+            cached = self._cache.map(request)
+            maps[request.task, request.arm] = cached or self._process.map(
+                request, lambda share, k=k: progress((k + share) / len(requests))
+            )
+        return maps
 
     def download(self, format_name: str) -> None:
         """Send the plan to the browser in one of `FORMATS`."""

@@ -21,6 +21,7 @@ from ..compute.compute_process import ComputeProcess
 from ..compute.job_queue import Job, JobQueue
 from ..compute.process_pool import ProcessPool
 from ..files.links import Link
+from ..files.shown_paths import shown_paths
 from ..panels.layout import Layout
 from ..scene3d.scene_view import SceneView
 from ..state import changes, job_changes
@@ -186,6 +187,8 @@ class Session:
                 state, job = self._begin(state, request)
         if state.is_obsolete:
             state = replace(state, busy=None)
+        if before is None or state.problem != before.problem:
+            state = replace(state, problem=shown_paths(state.problem))
         self.state = state
         self._changed.notify()
         if job:
@@ -231,9 +234,11 @@ class Session:
     def _open_first(self) -> None:
         """Open what the address says; if that fails, `_failed` opens the first scene and shows the reason."""
 
-        def run(_: Progress) -> tuple[State, Camera | None]:
+        def run(progress: Progress) -> tuple[State, Camera | None]:
             link = Link.parse(self.visit.query)
-            scene, choice = self.cache.linked(link)
+            scene, choice = self.cache.linked(
+                link, lambda scene, arm, hand: self.process.mount(scene, arm, hand, progress)
+            )
             name = link.scene or self.cache.first
             return link.apply(replace(State.of(scene, name), object_choice=choice)), link.camera
 

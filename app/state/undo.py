@@ -13,10 +13,13 @@ from symgrasp.feasibility.map import FeasibilityMap
 from .history import History
 from .state import State
 
-__all__ = ["PLANS_KEPT", "redo", "remember", "undo"]
+__all__ = ["PLANS_KEPT", "UPLOADS_KEPT", "redo", "remember", "undo"]
 
 PLANS_KEPT = 6
 """How many results of planners the history keeps, as a map may take 4 MB; older steps lose theirs."""
+
+UPLOADS_KEPT = 10
+"""How many uploads the history keeps, as one takes a megabyte or more; steps before them cannot be undone."""
 
 
 def remember(before: State, after: State, origin: str, time: float) -> State:
@@ -36,7 +39,7 @@ def remember(before: State, after: State, origin: str, time: float) -> State:
     values = _changed_values(before, after, origin)
     history = before.history.recorded(lambda: _without_results(before), values, time, dragged=bool(origin))
     if history.past is not before.history.past:
-        history = replace(history, past=_with_few_plans(history.past))
+        history = replace(history, past=_with_few_plans(_with_few_uploads(history.past)))
     return replace(after, history=history)
 
 
@@ -66,6 +69,16 @@ def _without_results(state: State) -> State:
     return replace(
         state, history=History(), map_view=map_view, result=None, refused=None, busy=None, problem=""
     )
+
+
+def _with_few_uploads(past: tuple[State, ...]) -> tuple[State, ...]:
+    """Return the latest steps, as far back as they have no more than `UPLOADS_KEPT` uploads."""
+    kept: set[object] = set()
+    for k, state in reversed(tuple(enumerate(past))):
+        kept |= {state.uploaded_object, state.uploaded_scene} - {None}
+        if len(kept) > UPLOADS_KEPT:
+            return past[k + 1 :]
+    return past
 
 
 def _with_few_plans(past: tuple[State, ...]) -> tuple[State, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from symgrasp.errors import ProfileError, one_of
-from symgrasp.files import SCENES_DIR, parse_yaml
+from symgrasp.files import LARGEST_YAML, SCENES_DIR, parse_yaml, read_file
 from symgrasp.object.measure.mesh_io import MESH_ENDINGS
 from symgrasp.object.profile import Profile
 
@@ -53,7 +53,7 @@ def _read(path: Path) -> tuple[str, Profile]:
         ProfileError: it cannot be read, or is not a mapping of ``name`` and ``profile``.
     """
     try:
-        content = parse_yaml(path.read_text(encoding="utf-8"))
+        content = parse_yaml(read_file(path, LARGEST_YAML).decode("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise ProfileError(path, "file", str(error), "a text file that can be read") from error
     except ValueError as error:

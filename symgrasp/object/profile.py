@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,7 +14,10 @@ from symgrasp.errors import ProfileError
 from symgrasp.object.measure.measurement import Measurement, measure_mesh
 from symgrasp.poses import Array
 
-__all__ = ["COLLISION_FACETS", "Profile"]
+__all__ = ["COLLISION_FACETS", "MOST_KNOTS", "Profile"]
+
+MOST_KNOTS = 10_000
+"""Most knots of a profile."""
 
 COLLISION_FACETS = 48
 """Sides of the polygons that stand for circles in the object's collision shape. They are circumscribed,
@@ -24,7 +28,7 @@ class Profile:
     """Outer radius r(h) of an object of revolution over the height along its axis, piecewise linear.
 
     Args:
-        points: (n, 2) array of ``[h, r]`` in metres, n >= 2, heights strictly increasing,
+        points: (n, 2) array of ``[h, r]`` in metres, 2 <= n <= `MOST_KNOTS`, heights strictly increasing,
             radii not negative and not all zero.
         source: what to call this profile in error messages.
 
@@ -39,6 +43,8 @@ class Profile:
     T_mesh_object: Array | None = None
 
     def __init__(self, points: ArrayLike, source: str = "profile") -> None:
+        if isinstance(points, Sized) and len(points) > MOST_KNOTS:
+            raise ProfileError(source, "profile", f"{len(points):,} knots", f"at most {MOST_KNOTS:,} knots")
         try:
             array = np.array(points, dtype=float)
         except (TypeError, ValueError):

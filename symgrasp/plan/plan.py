@@ -13,12 +13,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from symgrasp import page
 from symgrasp.errors import PlanError, SymgraspError
 from symgrasp.feasibility.pictures import to_png
-from symgrasp.files import write_atomically
+from symgrasp.files import check_size, read_file, write_atomically
 from symgrasp.poses import Array, quat_wxyz
-from symgrasp.scene.format import describe_error
+from symgrasp.scene.format import MOST_TASKS, describe_error
 
 __all__ = [
     "CLEARANCE_LIMIT",
+    "LARGEST_PLAN",
     "Grasp",
     "Hold",
     "Plan",
@@ -31,6 +32,9 @@ __all__ = [
 
 CLEARANCE_LIMIT = 0.1
 """Clearances are measured up to this distance (m)."""
+
+LARGEST_PLAN = 5_000_000
+"""Largest plan file (bytes) that is read."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Row = tuple[Finite, Finite, Finite, Finite]
@@ -125,7 +129,7 @@ class Plan(_Part):
         "tool": "between the finger tips, z = approach, y = closing direction",
     }
     robots: dict[str, tuple[str, ...]] = Field(description="robot → names of all its joints")
-    tasks: tuple[PlanTask, ...]
+    tasks: Annotated[tuple[PlanTask, ...], Field(max_length=MOST_TASKS, fail_fast=True)]
 
     def to_json(self) -> str:
         """Return the plan as JSON text; floats read back exactly."""
@@ -175,8 +179,8 @@ class Plan(_Part):
             PlanError: the file is missing or is not such a plan.
         """
         try:
-            content = Path(path).read_bytes()
-        except OSError as error:
+            content = read_file(Path(path), LARGEST_PLAN)
+        except (OSError, ValueError) as error:
             raise PlanError(path, "file", str(error), "a readable JSON file") from error
         return Plan.parse(content, str(path))
 
@@ -188,6 +192,7 @@ class Plan(_Part):
             PlanError: it is not such a plan.
         """
         try:
+            check_size(content, LARGEST_PLAN)
             data = json.loads(content)
         except (ValueError, RecursionError) as error:
             raise PlanError(source, "file", str(error), "a readable JSON file") from error

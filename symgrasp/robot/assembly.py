@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,10 +11,19 @@ from pathlib import Path
 import numpy as np
 
 from symgrasp.errors import UrdfError, one_of
-from symgrasp.files import resolve
+from symgrasp.files import read_file, resolve
 from symgrasp.poses import Array, from_position_quat, rpy
 
 __all__ = ["Frame", "Mount", "assemble"]
+
+LARGEST_URDF = 5_000_000
+"""Largest URDF file (bytes) that is read."""
+
+MOST_LINKS = 1000
+"""Most links of a URDF file, and most joints."""
+
+MOST_ELEMENTS, DEEPEST = 100_000, 50
+"""Most XML elements of a URDF file, and how deep they may be nested."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +85,16 @@ def assemble(path: Path, mounts: Sequence[Mount] = ()) -> bytes:
 def _read(path: Path) -> ET.Element:
     """Parse a URDF file, check that its names are unique, and make its mesh references absolute."""
     try:
-        robot = ET.parse(path).getroot()
+        robot = _parse(read_file(path, LARGEST_URDF))
     except OSError as error:
         raise UrdfError(path, "urdf", str(path), "a readable URDF file") from error
     except (ET.ParseError, ValueError, LookupError) as error:
         raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
     for tag in ("link", "joint"):
-        _no_repeats(path, f"{tag} name", _names(robot, tag))
+        names = _names(robot, tag)
+        if len(names) > MOST_LINKS:
+            raise UrdfError(path, f"{tag}s", f"{len(names):,} of them", f"at most {MOST_LINKS:,} of them")
+        _no_repeats(path, f"{tag} name", names)
     _no_repeats(path, "child link of joints", [c.get("link", "") for c in robot.iterfind("joint/child")])
     for link in robot.iter("link"):
         for mesh in link.iter("mesh"):
@@ -91,6 +104,21 @@ def _read(path: Path) -> ET.Element:
                 raise UrdfError(path, f"link {link.get('name')}", reference, "an existing mesh file")
             mesh.set("filename", str(file.resolve()))
     return robot
+
+
+def _parse(content: bytes) -> ET.Element:
+    """Parse XML; raise ValueError as soon as it has too many elements or nests them too deeply."""
+    root, depth = None, 0
+    events = ET.iterparse(io.BytesIO(content), ("start", "end"))
+    for count, (event, element) in enumerate(events):
+        root = element if root is None else root
+        depth += 1 if event == "start" else -1
+        if depth > DEEPEST:
+            raise ValueError(f"elements nested more than {DEEPEST} deep")
+        if count > 2 * MOST_ELEMENTS:
+            raise ValueError(f"more than {MOST_ELEMENTS:,} elements")
+    assert root is not None  # else the parser raises
+    return root
 
 
 def _no_repeats(path: Path, field: str, names: Sequence[str]) -> None:

@@ -111,7 +111,8 @@ class RobotModel:
         by_name = {j.name: j for j in urdf.robot.joints}
         remaining = list(urdf.robot.joints)
         while remaining:
-            ready = [j for j in remaining if j.parent in links]
+            known = set(links)
+            ready = [j for j in remaining if j.parent in known]
             if not ready:
                 raise UrdfError(self.path, "joint", remaining[0].name, "a parent link that hangs on the root")
             for j in ready:
@@ -119,7 +120,7 @@ class RobotModel:
                     raise UrdfError(self.path, f"joint {j.name}", j.type, one_of((*MOVING, "fixed")))
                 links.append(j.child)
                 joints.append(self._joint(j, by_name, links))
-            remaining = [j for j in remaining if j not in ready]
+            remaining = [j for j in remaining if j.parent not in known]
         return tuple(joints), tuple(links)
 
     def _joint(self, j: yourdfpy.Joint, by_name: Mapping[str, yourdfpy.Joint], links: list[str]) -> Joint:

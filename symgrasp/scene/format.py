@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
 
+from symgrasp.object.manifold import ROLLS
+from symgrasp.object.profile import MOST_KNOTS
 from symgrasp.poses import Array, from_position_quat, from_position_rpy, quat_wxyz
 from symgrasp.robot.assembly import Frame
 
@@ -27,6 +29,12 @@ __all__ = [
 
 LARGEST = 1e4
 """Largest absolute value of a number in a scene file (m, degrees or a factor)."""
+
+MOST_ROBOTS, MOST_ARMS, MOST_OBSTACLES, MOST_TASKS = 32, 16, 1000, 500
+"""Most robots of a scene, arms of a robot, obstacles and tasks of a scene."""
+
+MOST_CANDIDATES = 10_000_000
+"""Most candidates of a map: heights × angles × rolls × redundancy. It takes minutes at worst."""
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
@@ -129,7 +137,7 @@ class RobotFile(_Strict):
     tool: str | None = None
     hand: NamedOrInline | None = None
     mount: MountFile | None = None
-    arms: Annotated[tuple[ArmFile, ...], Field(min_length=1)] | None = None
+    arms: Annotated[tuple[ArmFile, ...], Field(min_length=1, max_length=MOST_ARMS)] | None = None
     home: tuple[Number, ...] | dict[str, Number] | None = None
 
     @model_validator(mode="after")
@@ -155,7 +163,9 @@ class ObjectFile(_Strict):
     """
 
     name: Name
-    profile: list[tuple[Number, Number]] | None = None
+    profile: Annotated[list[tuple[Number, Number]], Field(max_length=MOST_KNOTS, fail_fast=True)] | None = (
+        None
+    )
     library: str | None = None
     mesh: str | None = None
     scale: Positive = 1.0
@@ -206,7 +216,7 @@ class TaskFile(_Strict):
     """A pose of the object; its rotation about its own axis is free."""
 
     name: Name
-    arms: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    arms: Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_ROBOTS * MOST_ARMS)] | None = None
     pose: PoseFile
 
 
@@ -221,6 +231,16 @@ class MapSettings(_Strict):
     margin: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
     """distance (m) to keep from obstacles and other robots"""
 
+    @model_validator(mode="after")
+    def _not_too_many(self) -> MapSettings:
+        candidates = self.heights * self.angles * len(ROLLS) * self.redundancy
+        if candidates > MOST_CANDIDATES:
+            raise ValueError(
+                f"heights × angles × {len(ROLLS)} rolls × redundancy of at most {MOST_CANDIDATES:,}, "
+                f"not {candidates:,}"
+            )
+        return self
+
 
 class SceneFile(_Strict):
     """A scene file, version 1."""
@@ -228,10 +248,10 @@ class SceneFile(_Strict):
     schema_version: Literal[1]
     name: Name
     description: str = ""
-    robots: Annotated[tuple[RobotFile, ...], Field(min_length=1)]
+    robots: Annotated[tuple[RobotFile, ...], Field(min_length=1, max_length=MOST_ROBOTS, fail_fast=True)]
     object: ObjectFile
-    obstacles: tuple[ObstacleFile, ...] = ()
-    tasks: Annotated[tuple[TaskFile, ...], Field(min_length=1)]
+    obstacles: Annotated[tuple[ObstacleFile, ...], Field(max_length=MOST_OBSTACLES, fail_fast=True)] = ()
+    tasks: Annotated[tuple[TaskFile, ...], Field(min_length=1, max_length=MOST_TASKS, fail_fast=True)]
     map: MapSettings = MapSettings()
 
 
@@ -266,6 +286,12 @@ def describe_error(error: ValidationError, content: Any) -> tuple[str, object, s
         return field, first["input"], "a key of the file format; check its spelling"
     if first["type"] == "missing":
         return field, None, "a value; this key is required"
+    if first["type"] == "too_long":
+        return (
+            field,
+            f"{len(first['input']):,} of them",
+            f"at most {first.get('ctx', {})['max_length']:,} of them",
+        )
     if first["type"] == "too_short":
         return field, first["input"], f"at least {first.get('ctx', {})['min_length']} of them"
     expected = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")

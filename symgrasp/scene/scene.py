@@ -13,12 +13,20 @@ from typing import Any
 from pydantic import ValidationError
 
 from symgrasp.errors import SceneError, one_of
-from symgrasp.files import parse_yaml
+from symgrasp.files import LARGEST_YAML, parse_yaml, read_file
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.building import SceneBuilder
-from symgrasp.scene.format import MapSettings, ObjectFile, PoseFile, SceneFile, TaskFile, describe_error
+from symgrasp.scene.format import (
+    MOST_TASKS,
+    MapSettings,
+    ObjectFile,
+    PoseFile,
+    SceneFile,
+    TaskFile,
+    describe_error,
+)
 from symgrasp.scene.map_content import map_content
 from symgrasp.scene.parts import Obstacle, Task
 from symgrasp.scene.shipped import shipped_scenes
@@ -72,7 +80,7 @@ class Scene:
                 raise SceneError("scene", "name", str(scene), one_of(shipped, scene) + ", or a .yaml file")
             path = shipped[str(scene)]
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_file(path, LARGEST_YAML).decode("utf-8")
         except (OSError, ValueError) as error:
             raise SceneError(path, "file", str(path), f"a readable text file ({error})") from error
         return Scene.parse(text, source=str(path), folder=path.parent)
@@ -190,12 +198,14 @@ class Scene:
         """Return the scene with these tasks in this order; robots and object are shared.
 
         Raises:
-            SceneError: there are no tasks, a name is used twice or empty, or an arm is unknown.
+            SceneError: there are no tasks or too many, a name is used twice or empty, or an arm is unknown.
         """
         tasks = tuple(tasks)
         names = [task.name for task in tasks]
         if not names:
             raise SceneError(self.source, "tasks", names, "at least one task")
+        if len(tasks) > MOST_TASKS:
+            raise SceneError(self.source, "tasks", len(tasks), f"at most {MOST_TASKS:,} of them")
         files = []
         for i, task in enumerate(tasks):
             if task.name in names[:i]:

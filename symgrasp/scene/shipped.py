@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import yaml
-
-from symgrasp.files import SCENES_DIR
+from symgrasp.files import SCENES_DIR, parse_yaml
 
 __all__ = ["list_scenes", "shipped_scenes"]
 
@@ -22,7 +20,4 @@ def list_scenes() -> dict[str, str]:
 
 
 def _description(path: Path) -> str:
-    # libyaml, where PyYAML was built with it, takes a tenth of the time. Its messages are poorer than
-    # those of `symgrasp.files.parse_yaml`, which does not matter for files that ship.
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    return yaml.load(path.read_text(encoding="utf-8"), Loader=loader).get("description", "")
+    return parse_yaml(path.read_text(encoding="utf-8")).get("description", "")

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 
+from app.compute.limits import MEMORY_LIMIT
 from app.compute.process_main import REPORT_INTERVAL, serve
+from app.compute.upload_service import UploadService
+from app.state import object_choice
+from symgrasp.errors import MeshError
 from symgrasp.feasibility.create import MapMaker
 
 
@@ -47,4 +53,30 @@ def serve_compiling(pipe: Connection, folders: tuple[Path, ...]) -> None:
             pipe.poll(REPORT_INTERVAL)  # until a cancel is there to be read
 
     setattr(MapMaker, "map", compiles_first)  # noqa: B010
+    serve(pipe, folders)
+
+
+def serve_parsers(pipe: Connection, folders: tuple[Path, ...]) -> None:
+    """Do to the parser of meshes what the name of a file says; read anything else as ever."""
+    measure = UploadService.measure
+
+    def endless(*_: object, **__: object) -> None:
+        while True:
+            pass
+
+    def misbehave(service: UploadService, name: str, content: bytes, scale: float, progress: Any) -> Any:
+        if name == "hangs.stl":
+            setattr(object_choice, "measure_mesh", endless)  # noqa: B010
+        pipe.poll(2 * REPORT_INTERVAL)  # so that no report is left out
+        progress(0.5)
+        if name == "eats":
+            try:
+                np.zeros(MEMORY_LIMIT, dtype=np.uint8)
+            except Exception as error:  # as where any error of a library is one of the file
+                raise MeshError(name, "content", str(error), "a mesh") from error
+        if name == "aborts":
+            os.abort()
+        return measure(service, name, content, scale, progress)
+
+    setattr(UploadService, "measure", misbehave)  # noqa: B010
     serve(pipe, folders)

@@ -21,6 +21,7 @@ from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan, plan_schema
 from symgrasp.scene.scene import Scene
 from tests.conftest import SHIPPED, write_scene
+from tests.hostile import chain_urdf, doubling_yaml
 
 
 @pytest.fixture
@@ -124,6 +125,30 @@ def test_bad_input_is_one_line_and_status_2(arguments, message, capsys, tmp_path
     assert captured.err.count("\n") == 1
     assert captured.out == ""
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "text", "limit"),
+    [
+        ("map", "a.yaml", doubling_yaml(12), "more than 100,000 values"),
+        ("map", "a.yaml", " " * 1_000_001, "more than 1 MB"),
+        ("object", "a.yaml", doubling_yaml(12, merged=True), "more than 100,000 values"),
+        ("object", "a.yaml", f"name: a\nprofile: {[[k, 1] for k in range(10_001)]}", "at most 10,000 knots"),
+        ("hand", "a.urdf", chain_urdf(2000), "at most 1,000 of them"),
+        ("verify", "a.json", "[" * 1_000_000, "recursion"),
+        ("verify", "a.json", " " * 5_000_001, "more than 5 MB"),
+    ],
+    ids=lambda value: value[:20],
+)
+def test_a_hostile_file_is_one_line_that_names_the_limit(command, name, text, limit, tmp_path, capsys):
+    path = tmp_path / name
+    path.write_text(text)
+    assert main([command, str(path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f"symgrasp: {path}: ")
+    assert limit in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
 
 
 def test_an_object_inside_an_obstacle(content, tmp_path, capsys):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from scipy.spatial import ConvexHull
 
 from symgrasp.errors import ProfileError
-from symgrasp.object.profile import COLLISION_FACETS, Profile
+from symgrasp.object.profile import COLLISION_FACETS, MOST_KNOTS, Profile
 from tests.strategies import profiles
 
 BOTTLE = [[0, 0.033], [0.15, 0.033], [0.20, 0.014], [0.24, 0.014]]
@@ -31,6 +31,8 @@ def test_radius_is_linear_between_knots():
         ([[0, 0.1]], "profile"),
         ("abc", "profile"),
         ([[0, 1, 2], [1, 1, 1]], "profile"),
+        (np.ones((MOST_KNOTS + 1, 2)), "profile"),
+        ([["no number"]] * 1_000_000, "profile"),
     ],
 )
 def test_bad_profiles_name_the_knot(points, field):

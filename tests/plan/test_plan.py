@@ -17,7 +17,7 @@ import pytest
 from symgrasp.errors import NoPlanError, PlanError, SceneError
 from symgrasp.feasibility.create import create_map
 from symgrasp.object.manifold import grasp_to_tool
-from symgrasp.plan.plan import Plan, plan_schema
+from symgrasp.plan.plan import LARGEST_PLAN, Plan, plan_schema
 from symgrasp.plan.verify import verify
 from symgrasp.planners.configurations import ConfigurationFinder
 from symgrasp.planners.conflicts import ConflictError, Shared
@@ -25,7 +25,7 @@ from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.planning import plan_bimanual, plan_handover, plan_sequential
 from symgrasp.poses import from_position_quat, pose_error, rotation_z
 from symgrasp.reason import Reason
-from symgrasp.scene.format import scene_schema
+from symgrasp.scene.format import MOST_TASKS, scene_schema
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import load_small, write_scene
@@ -243,6 +243,8 @@ def test_no_plan_says_why():
         (lambda c: c.pop("tasks"), "tasks"),
         (lambda c: c.update(schema_version=2), "schema_version"),
         (lambda c: c["tasks"][0].update(delta="x"), "tasks[0].delta"),
+        (lambda c: c.update(tasks=c["tasks"][:1] * (MOST_TASKS + 1)), "tasks"),
+        (lambda c: c.update(tasks=[{}] * 100_000), "tasks[0].name"),
         (lambda c: c["tasks"][0]["holds"][0]["grasp"].update(extra=1), "tasks[0].holds[0].grasp.extra"),
     ],
 )
@@ -303,3 +305,16 @@ def test_progress_grows_to_the_end():
     plan_sequential(load_small("pick_pour_place"), progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[" * 1_000_000, '{"tasks": ' + "9" * 10_000 + "}", " " * (LARGEST_PLAN + 1)],
+    ids=lambda text: text[:20],
+)
+def test_a_hostile_plan_is_one_line(text, tmp_path):
+    path = tmp_path / "plan.json"
+    path.write_text(text)
+    with pytest.raises(PlanError, match=r"plan\.json: file: .*: expected a readable JSON file$") as caught:
+        Plan.load(path)
+    assert "\n" not in str(caught.value)

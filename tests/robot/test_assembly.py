@@ -9,8 +9,18 @@ import pytest
 from symgrasp.errors import UrdfError
 from symgrasp.files import resolve
 from symgrasp.poses import from_position_rpy, quat_wxyz
-from symgrasp.robot.assembly import Frame, Mount, assemble
+from symgrasp.robot import assembly
+from symgrasp.robot.assembly import (
+    DEEPEST,
+    LARGEST_URDF,
+    MOST_ELEMENTS,
+    MOST_LINKS,
+    Frame,
+    Mount,
+    assemble,
+)
 from symgrasp.robot.model import RobotModel
+from tests.hostile import chain_urdf
 
 WSG = resolve("package://static_scenes/hands/wsg50.urdf", Path()) or Path()
 IIWA = resolve("package://pybullet_data/kuka_iiwa/model.urdf", Path()) or Path()
@@ -31,6 +41,37 @@ def test_a_mounted_hand_is_where_it_was_put():
     for link, pose in zip(hand.link_names, hand.forward(opened), strict=True):
         np.testing.assert_allclose(links[both.link_index(link)], flange @ POSE @ pose, atol=1e-9)
         assert len(both.hulls(link)) == len(hand.hulls(link))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (chain_urdf(MOST_LINKS + 1), f"links: '1,001 of them': expected at most {MOST_LINKS:,} of them"),
+        (chain_urdf(15_000), "links: '15,000 of them'"),
+        ("<a>" * (LARGEST_URDF // 3), f"elements nested more than {DEEPEST} deep"),
+        (f"<robot name='r'>{'<a/>' * 1_000_000}</robot>", f"more than {MOST_ELEMENTS:,} elements"),
+        (" " * (LARGEST_URDF + 1), "more than 5 MB"),
+        (
+            f"<!DOCTYPE r [<!ENTITY a '{'b' * 100_000}'>]><robot name='r'>{'&a;' * 10_000}</robot>",
+            "amplification",
+        ),
+    ],
+    ids=lambda value: value[:20],
+)
+def test_a_hostile_urdf_is_refused_before_it_is_taken_apart(content, message, tmp_path, monkeypatch):
+    monkeypatch.setattr(assembly, "_no_repeats", None)
+    path = tmp_path / "robot.urdf"
+    path.write_text(content)
+    with pytest.raises(UrdfError, match=message) as caught:
+        RobotModel(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_chain_of_as_many_links_as_are_allowed_is_read_in_order(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(chain_urdf(MOST_LINKS))
+    assert RobotModel(path).link_names == tuple(f"l{i}" for i in range(MOST_LINKS))
 
 
 def test_the_same_hand_twice_takes_a_prefix():

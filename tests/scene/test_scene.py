@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -10,12 +11,14 @@ import yaml
 from symgrasp.errors import ProfileError, SceneError, SymgraspError, UrdfError
 from symgrasp.files import SCENES_DIR
 from symgrasp.object.library import load_object
+from symgrasp.object.profile import MOST_KNOTS
 from symgrasp.poses import from_position_rpy, translation
 from symgrasp.robot.hand import HANDS
-from symgrasp.scene.format import scene_schema
+from symgrasp.scene.format import MOST_ARMS, MOST_OBSTACLES, MOST_ROBOTS, MOST_TASKS, scene_schema
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import list_scenes, shipped_scenes
 from tests.conftest import SHIPPED, write_scene
+from tests.hostile import chain_urdf
 
 
 def test_the_shipped_scenes():
@@ -228,11 +231,26 @@ BAD = [
     (lambda c: c["tasks"][0].update(arms=["hand"]), SceneError, "tasks[0].arms", "'panda'"),
     (lambda c: c["map"].update(heights=0), SceneError, "map.heights", "greater than or equal to 1"),
     (lambda c: c["map"].update(margin=-1), SceneError, "map.margin", "greater than or equal to 0"),
+    (lambda c: c["map"].update(heights=1024, angles=1024, redundancy=1024), SceneError,
+     "map", "heights × angles × 2 rolls × redundancy of at most 10,000,000, not 2,147,483,648"),
+    (lambda c: c["object"].update(profile=[[k, 1] for k in range(MOST_KNOTS + 1)]), SceneError,
+     "object.profile", "at most 10,000 of them"),
+    (lambda c: c.update(robots=(MOST_ROBOTS + 1) * c["robots"]), SceneError,
+     "robots", "at most 32 of them"),
+    (lambda c: c["robots"][0].update(arms=[{"name": "a", "hand": "franka"}] * (MOST_ARMS + 1)), SceneError,
+     "robots[0].arms", "at most 16 of them"),
+    (lambda c: c.update(obstacles=(MOST_OBSTACLES + 1) * c["obstacles"][:1]), SceneError,
+     "obstacles", "at most 1,000 of them"),
+    (lambda c: c.update(obstacles=20_000 * [{}]), SceneError, "obstacles[0].name", "required"),
+    (lambda c: c.update(tasks=(MOST_TASKS + 1) * c["tasks"][:1]), SceneError,
+     "tasks", "at most 500 of them"),
+    (lambda c: c["robots"][0].update(urdf="chain.urdf"), UrdfError, "links", "at most 1,000 of them"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("change", "kind", "field", "expected"), BAD)
 def test_bad_scenes_get_one_line(change, kind, field, expected, content, tmp_path):
+    (tmp_path / "chain.urdf").write_text(chain_urdf(2000))
     if callable(change):
         change(content)
     path = write_scene(tmp_path, content if callable(change) else change)
@@ -241,8 +259,24 @@ def test_bad_scenes_get_one_line(change, kind, field, expected, content, tmp_pat
     error = caught.value
     assert error.field == field
     assert expected in error.expected
-    assert str(error).startswith(str(path))
+    assert str(error).startswith(str(tmp_path))
     assert "\n" not in str(error)
+
+
+def test_a_map_at_the_limit_is_allowed_and_one_cell_more_is_not():
+    scene = Scene.load("soda_can")
+    assert scene.with_settings(heights=1000, angles=1000, redundancy=5).manifold.angles == 1000
+    with pytest.raises(SceneError, match="at most 10,000,000"):
+        scene.with_settings(heights=1000, angles=1001, redundancy=5)
+
+
+def test_no_task_can_be_added_beyond_what_a_file_may_hold():
+    scene = Scene.load("soda_can")
+    tasks = [replace(scene.task(), name=str(k)) for k in range(MOST_TASKS + 1)]
+    full = scene.with_tasks(tasks[:-1])
+    assert len(Scene.from_content(full.content).tasks) == MOST_TASKS
+    with pytest.raises(SceneError, match="tasks: 501: expected at most 500 of them"):
+        full.with_tasks(tasks)
 
 
 def test_a_missing_scene(tmp_path):

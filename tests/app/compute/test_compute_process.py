@@ -12,7 +12,7 @@ from subprocess import PIPE
 import numpy as np
 import pytest
 
-from app.compute import process_pool
+from app.compute import compute_process, process_pool
 from app.compute.cache import SharedCache
 from app.compute.channel import Channel
 from app.compute.compute_process import ComputeProcess, ProcessDied
@@ -22,10 +22,11 @@ from app.compute.process_pool import ProcessPool
 from app.state import changes
 from app.state.requests import CompareRequest, ExplainRequest
 from app.state.state import State
-from symgrasp.errors import Cancelled, NoPlanError, PlanError
+from symgrasp.errors import Cancelled, NoPlanError, PlanError, SceneError
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from tests.app import failures
+from tests.app.state.test_object_choice import stl
 from tests.app.state.test_state import small_map
 from tests.conftest import load_small
 
@@ -163,6 +164,47 @@ def test_a_process_that_dies_is_reported_and_followed_by_another(cache, monkeypa
     idle.join()
     process.map(changes.moved(state, x=0.43).request, quiet)
     process.close()
+
+
+@pytest.fixture
+def misbehaving(cache, monkeypatch):
+    """Calls into a process whose parser of meshes does what the name of a file says."""
+    monkeypatch.setattr(process_pool, "serve", failures.serve_parsers)
+    pool = ProcessPool(cache.folders)
+    process = ComputeProcess(pool, cache.keep)
+    yield process
+    process.close()
+    pool.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("hangs.stl", r"^hangs\.stl takes longer to read than 1 s$"),
+        ("eats", r"^eats needs more memory than a session may use \(4 GB\)$"),
+        ("aborts", r"ended unexpectedly \(SIGABRT\), perhaps because it needs more memory .* \(4 GB\)$"),
+    ],
+)
+def test_a_parser_that_misbehaves_is_reported_and_the_next_file_is_read(
+    misbehaving, name, message, monkeypatch
+):
+    def impatient(share: float) -> None:
+        if share == 0.5:  # it has begun
+            monkeypatch.setattr(compute_process, "READING_TIMEOUT", 1.0)
+
+    with pytest.raises(ProcessDied, match=message):
+        misbehaving.measure(name, b"", 1.0, impatient)
+    assert misbehaving.pid is None
+    monkeypatch.setattr(compute_process, "READING_TIMEOUT", 60.0)
+    assert misbehaving.measure("a.stl", stl(), 1.0, quiet).name == "a"
+
+
+def test_a_mounted_hand_is_that_of_the_scene_here(process):
+    scene = load_small("log_iiwa_and_panda")
+    mounted = process.mount(scene, "iiwa", "pr2", quiet)
+    assert mounted.map_sha256 == scene.with_hand("iiwa", "pr2").map_sha256
+    with pytest.raises(SceneError, match="did you mean 'wsg50'"):
+        process.mount(scene, "iiwa", "wsg5", quiet)
 
 
 SERVER = """

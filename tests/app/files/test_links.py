@@ -23,6 +23,7 @@ from app.state.undo import remember, undo
 from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
 
 LENGTHS = st.floats(-2, 2)
@@ -95,13 +96,13 @@ def test_a_link_is_short_and_readable():
 
 def test_objects_of_the_library_and_hands_come_back():
     cache = SharedCache("log_iiwa_and_panda")
-    scene, object_choice = cache.linked(Link.parse("object=log_70mm&hand.iiwa=pr2"))
+    scene, object_choice = cache.linked(Link.parse("object=log_70mm&hand.iiwa=pr2"), Scene.with_hand)
     assert scene.replaceable_hands["iiwa"] == "pr2"
     assert object_choice
     assert object_choice.option == "log_70mm"
     state = replace(State.of(scene, "log_iiwa_and_panda"), object_choice=object_choice)
     link = Link.of(state, cache.scene(state.scene_name)).query()
-    again, _ = cache.linked(Link.parse(link))
+    again, _ = cache.linked(Link.parse(link), Scene.with_hand)
     assert again.sha256 == scene.sha256
     assert "tasks" not in link
 
@@ -289,7 +290,7 @@ def test_what_is_wrong_with_a_link_is_said_in_a_line(query, message):
     cache = SharedCache("bottle_on_table")
     with pytest.raises(SymgraspError, match=message) as error:
         link = Link.parse(query)
-        scene, _ = cache.linked(link)
+        scene, _ = cache.linked(link, Scene.with_hand)
         link.apply(State.of(scene, ""))
     assert "\n" not in str(error.value)
 

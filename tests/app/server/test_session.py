@@ -61,8 +61,8 @@ class Server:
 
 
 @contextmanager
-def start_server() -> Iterator[Server]:
-    cache = SharedCache("bottle_on_table")
+def start_server(scene: str = "bottle_on_table") -> Iterator[Server]:
+    cache = SharedCache(scene)
     compute_first_map(cache)
     port = any_port()
     with open_lobby(cache, "127.0.0.1", port) as lobby:
@@ -318,10 +318,10 @@ def test_what_a_person_asks_for_in_two_ways_at_once_leaves_nothing_half_begun(se
 def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(server, monkeypatch):
     linked, open_scene, asked = SharedCache.linked, Actions.open_scene, threading.Event()
 
-    def slow(cache, link):
+    def slow(*args):
         """Load the first scene only when another has been asked for."""
         assert asked.wait(30)
-        return linked(cache, link)
+        return linked(*args)
 
     def opened(actions, name):
         open_scene(actions, name)
@@ -335,7 +335,7 @@ def test_a_command_before_the_first_scene_stands_does_not_keep_it_away(server, m
 
 
 def test_a_first_scene_that_breaks_in_an_unexpected_way_leaves_no_empty_page(server, monkeypatch):
-    def broken(cache, link):
+    def broken(*_):
         raise RuntimeError("of this test")
 
     monkeypatch.setattr(SharedCache, "linked", broken)

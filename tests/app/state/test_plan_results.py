@@ -338,7 +338,7 @@ def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans)
         plans.open(text.replace("package://static_scenes/bowl.obj", "/etc/passwd").encode(), "a.json", quiet)
     with pytest.raises(SceneError, match="or an absolute path"):
         plans.open(text.replace("package://static_scenes/bowl.obj", "bowl.obj").encode(), "a.json", quiet)
-    with pytest.raises(PlanError, match="size of the file"):
+    with pytest.raises(PlanError, match="more than 5 MB"):
         plans.open(b" " * (PLAN_LIMIT + 1), "a.json", quiet)
     with pytest.raises(PlanError, match="JSON"):
         plans.open(b"{", "a.json", quiet)

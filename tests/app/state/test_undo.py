@@ -23,7 +23,7 @@ from app.state.map_view_state import RollChoice
 from app.state.object_choice import from_library
 from app.state.plan_results import PlanResults
 from app.state.state import State
-from app.state.undo import PLANS_KEPT, redo, remember, undo
+from app.state.undo import PLANS_KEPT, UPLOADS_KEPT, redo, remember, undo
 from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import InputError
 from symgrasp.feasibility.map import FeasibilityMap
@@ -200,6 +200,29 @@ def test_only_the_newest_plans_are_kept_with_their_maps():
         assert back.pick == pick  # the grasp stays also without its plan
         person.does(undo)
         person.does(undo)
+
+
+def test_the_history_keeps_few_uploads_and_every_step_since_them():
+    person = Person(opened())
+    kept: WeakSet[object] = WeakSet()
+    uploads = UPLOADS_KEPT + 3
+
+    def upload(state: State) -> State:
+        choice = replace(from_library("wine_bottle"), measurement=object())
+        kept.add(choice)
+        return changes.choose_object(state, state.scene.with_object("own", choice.profile), choice)
+
+    for k in range(uploads):
+        person.does(upload)
+        person.does(lambda s, k=k: changes.turn(s, 0.01 * (k + 1)))
+    gc.collect()
+    assert len(kept) == UPLOADS_KEPT
+    steps = 0
+    while (before := person.state) is not person.does(undo):
+        assert person.state is not before
+        steps += 1
+    assert steps == 2 * UPLOADS_KEPT - 1
+    assert person.state.uploaded_object in kept
 
 
 class UndoMachine(RuleBasedStateMachine):
