@@ -21,6 +21,9 @@ __all__ = ["SIMPLIFY_TOLERANCE", "Measurement", "measure_mesh"]
 SIMPLIFY_TOLERANCE = 1.5e-4
 """Largest difference (m) of r(h) between the measured profile and its simplification to few knots."""
 
+NEGLIGIBLE = 1e-5
+"""Difference (m) of two bounds of a deviation below which it counts as known."""
+
 LEAST_COVERED = 0.9
 """Smallest share of the angles at which an open mesh must have a surface, at every height."""
 
@@ -104,7 +107,7 @@ def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | Non
     bottom = points[0, 0]
     outline = simplify(curve, 0.05 * SIMPLIFY_TOLERANCE)
     deviation = _deviation(surface, outline, mesh.is_watertight)
-    limit = max(1.5e-3, 0.03 * float(points[:, 1].max())) if tolerance is None else tolerance
+    limit = _default_tolerance(float(points[:, 1].max())) if tolerance is None else tolerance
     angles = _wrap(column_angles(COLUMNS))
     _check_symmetric(source, surface, outline, deviation, limit)
     rows = surface.even & (surface.levels > points[0, 0]) & (surface.levels < points[-1, 0])
@@ -121,6 +124,15 @@ def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | Non
             float(np.abs(curve[:, 1] - np.interp(curve[:, 0], *points.T)).max()),
         )
     )
+
+
+def _default_tolerance(r: float) -> float:
+    """Return the tolerance (m) for an object of largest radius ``r`` (m).
+
+    A polygon of n sides deviates by r (1 - cos π/n) from the circle through its corners: 9.9 % of r for 7
+    sides, 7.6 % for 8. So the upper bound is what keeps thin prisms of up to 7 sides from being round.
+    """
+    return float(np.clip(1.5e-3, 0.03 * r, 0.09 * r))
 
 
 def _read_only(measurement: Measurement) -> Measurement:
@@ -235,8 +247,26 @@ def _round_end(curve: Array, rings: Array, end: Array) -> Array:
 def _deviation(surface: OuterSurface, outline: Array, closed: bool) -> Array:
     """Return by how much (levels, COLUMNS) the surface lies outside the measured profile (m).
 
+    Its size is the larger one of two distances: of the surface from the profile, and of the profile at the
+    same height from the surface. One alone is not enough: every point of a thin square plate is near to
+    the flat ends of the disc around it, but the rim of that disc is far from the plate.
+
     NaN where an open mesh has no surface.
     """
-    points = np.column_stack([np.repeat(surface.levels, COLUMNS), surface.radius.ravel()])
-    distance = distance_outside(points, outline).reshape(surface.radius.shape)
-    return distance if closed else np.where(surface.radius == 0, np.nan, distance)
+    levels, radius = surface.levels, surface.radius
+    points = np.column_stack([np.repeat(levels, COLUMNS), radius.ravel()])
+    deviation = distance_outside(points, outline).reshape(radius.shape)
+    on_profile = np.column_stack([levels, np.interp(levels, *outline.T)])
+    within = (levels >= outline[0, 0]) & (levels <= outline[-1, 0])
+    # The difference in radius bounds both distances, so where it is the first one there is nothing to find.
+    radial = radius - on_profile[:, 1:]
+    unknown = within[:, None] & (np.abs(radial) - np.abs(deviation) > NEGLIGIBLE)
+    for column in np.flatnonzero(unknown.any(axis=0)):
+        rows, solid = np.flatnonzero(unknown[:, column]), np.flatnonzero(radius[:, column])
+        back = radial[rows, column]
+        if len(solid) > 1:
+            section = np.column_stack([levels, radius[:, column]])[solid[0] : solid[-1] + 1]
+            back = -distance_outside(on_profile[rows], section)
+        first = deviation[rows, column]
+        deviation[rows, column] = np.where(np.abs(back) > np.abs(first), back, first)
+    return deviation if closed else np.where(radius == 0, np.nan, deviation)
