@@ -85,8 +85,8 @@ class Actions:
         if state := self._session.state:
             self._change_object(f"Loading {option}", partial(self._with_option, state, option))
 
-    def upload_object(self, name: str, content: bytes, scale: float) -> None:
-        """Measure an uploaded mesh and put the object into the scene; one unit of it is ``scale`` metres."""
+    def upload_object(self, name: str, content: bytes, scale: float, tolerance: float | None) -> None:
+        """Measure an uploaded mesh and put the object into the scene, see `app.panels.actions.Actions`."""
         state = self._session.state
         if state is None:
             return
@@ -95,7 +95,9 @@ class Actions:
         except SymgraspError as error:
             self._fail(error)
             return
-        self._change_object(f"Measuring {name}", lambda: _with_object(state, from_mesh(name, content, scale)))
+        self._change_object(
+            f"Measuring {name}", lambda: _with_object(state, from_mesh(name, content, scale, tolerance))
+        )
 
     def choose_hand(self, hand: str) -> None:
         """Mount another hand on the chosen arm."""
