@@ -170,7 +170,7 @@ class ObjectFile(_Strict):
     mesh: str | None = None
     scale: Positive = 1.0
     tolerance: Positive | None = None
-    flip: StrictBool = False
+    flip: StrictBool | None = None  # not False, which would be written into every scene and change its hash
 
     @model_validator(mode="after")
     def _one_source(self) -> ObjectFile:

@@ -47,7 +47,8 @@ class Measurement:
         points: (n, 2) knots [h, r] of the profile (m). r is the radius of the outer surface,
             averaged over the angle (median), with the facets of the mesh undone: the radius that
             its vertices lie on. A flat step becomes two knots a few micrometres apart in height.
-            The object may stick out of it by as much as `deviation` says.
+            The object sticks out of it by as much as `deviation` says, and nothing that is
+            computed from the profile keeps a distance for that.
         T_mesh_object: (4, 4) pose of the object frame in the file's frame, in metres.
         heights: (k,) heights of the rows of `deviation` (m).
         angles: (m,) angles of its columns (rad).
