@@ -76,11 +76,17 @@ def deviation(outline: Outline, r: float) -> float:
 
 
 def save(folder: Path, *prisms: tuple[Outline, float, float], pose: np.ndarray | None = None) -> Path:
-    mesh = trimesh.util.concatenate([prism(*p) for p in prisms])
+    mesh = joined([prism(*p) for p in prisms])
     mesh.apply_transform(np.eye(4) if pose is None else pose)
     path = folder / "object.ply"
     mesh.export(path)
     return path
+
+
+def joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    mesh = trimesh.util.concatenate(parts)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
 
 
 COLUMN = round_(0.01)
@@ -125,7 +131,7 @@ def test_prisms_are_refused_with_their_true_deviation(tmp_path, prisms, true):
     st.floats(0.001, 0.02),
     st.floats(0.2, 0.9),
 )
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 def test_deviations_are_those_of_the_shape(tmp_path_factory, kind, share, sides, r, thickness, column):
     outline = {"ellipse": ellipse(r, share * r), "polygon": regular(sides, r), "D": flattened(r, share)}[kind]
     inner = radius_at(outline, ALL_ROUND).min()
@@ -152,11 +158,17 @@ def test_deviations_are_those_of_the_shape(tmp_path_factory, kind, share, sides,
             measure_mesh(path)
 
 
-@pytest.mark.parametrize("r", [0.003, 0.01, 0.019, 0.044, 0.2])
-@pytest.mark.parametrize("sides", range(3, 17))
-def test_from_how_many_sides_on_a_polygon_is_a_circle(tmp_path, sides, r):
+@pytest.mark.parametrize(
+    ("sides", "r", "is_round"),
+    [
+        (3, 0.004, False), (4, 0.003, False), (6, 0.003, False), (7, 0.003, False), (7, 0.015, False),
+        (8, 0.003, True), (8, 0.0195, True), (8, 0.02, False), (12, 0.0435, True), (12, 0.045, False),
+        (13, 0.05, True), (13, 0.5, True),
+    ],
+)  # fmt: skip
+def test_from_how_many_sides_on_a_polygon_is_a_circle(tmp_path, sides, r, is_round):
     path = save(tmp_path, (regular(sides, r), 0.0, 4 * r))
-    if sides >= 13 or (sides >= 8 and r * (1 - np.cos(np.pi / sides)) < 1.5e-3):
+    if is_round:
         assert measure_mesh(path).points[:, 1] == pytest.approx(r, abs=1e-6)
     else:
         with pytest.raises(MeshError, match="symmetry"):
@@ -196,7 +208,7 @@ def test_an_axial_error_of_a_flat_end_is_no_difference_in_radius(tmp_path):
     top = mesh.vertices[:, 2] > 0.05
     mesh.vertices[top, 2] += 0.01 * mesh.vertices[top, 0]  # the top slants by 0.6 mm
     mesh.export(tmp_path / "slanted.ply")
-    assert measure_mesh(tmp_path / "slanted.ply").worst[0] == pytest.approx(3e-4, abs=5e-5)
+    assert 2e-4 < measure_mesh(tmp_path / "slanted.ply").worst[0] < 3.5e-4
 
 
 BOTTLE = [(0.033, 0.0), (0.033, 0.15), (0.014, 0.2), (0.014, 0.24)]
@@ -206,7 +218,7 @@ def test_an_object_stands_on_its_other_end_when_flipped(tmp_path):
     mesh = trimesh.creation.revolve(np.array([(0, 0), *BOTTLE, (0, 0.24)]), sections=64)
     # A dent of 1 mm at height 4 cm, angle 30°.
     centre = 0.033 * np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0.0]) + [0, 0, 0.04]
-    mesh = mesh.subdivide_to_size(0.006)
+    mesh = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, 0.006))
     dent = np.exp(-((np.linalg.norm(mesh.vertices - centre, axis=1) / 0.008) ** 2))
     mesh.vertices[:, :2] *= 1.0 - dent[:, None] / 33
     mesh.apply_transform(from_position_quat([0.5, 0.1, 0.2], [0.3, -0.8, 0.1, 0.4]))
@@ -243,9 +255,8 @@ def repeated(mesh: trimesh.Trimesh, kind: str) -> trimesh.Trimesh:
     more = {
         "doubled": [f],
         "two-sided": [f[:, ::-1]],
-        "rotated": [np.roll(f, 1, axis=1)],
         "three times": [f, f[:, ::-1]],
-        "some doubled": [f[::3]],
+        "some doubled": [np.roll(f[::3], 1, axis=1)],
         "some two-sided": [f[: len(f) // 2, ::-1]],
     }[kind]
     faces = np.concatenate([f, *more])
@@ -253,20 +264,21 @@ def repeated(mesh: trimesh.Trimesh, kind: str) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, faces[rng.permutation(len(faces))], process=False)
 
 
-KINDS = ["doubled", "two-sided", "rotated", "three times", "some doubled", "some two-sided"]
+KINDS = ["doubled", "two-sided", "three times", "some doubled", "some two-sided"]
 CUP = [(0, 0), (0.03, 0), (0.04, 0.12), (0.0375, 0.12), (0.028, 0.008), (0, 0.008)]
 
 
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ending", [".stl", ".ply"])
-def test_repeated_faces_count_once(tmp_path, kind, ending):
+def test_repeated_faces_count_once(tmp_path, ending):
     mesh = trimesh.creation.revolve(np.array(CUP, dtype=float), sections=80)
     mesh.export(tmp_path / ("cup" + ending))
-    repeated(mesh, kind).export(tmp_path / ("more" + ending))
-    once, more = (measure_mesh(tmp_path / (name + ending)) for name in ("cup", "more"))
-    assert more.points == pytest.approx(once.points, abs=1e-9)
-    assert more.worst == pytest.approx(once.worst, abs=1e-9)
-    assert more.T_mesh_object == pytest.approx(once.T_mesh_object, abs=1e-9)
+    once = measure_mesh(tmp_path / ("cup" + ending))
+    for kind in KINDS:
+        repeated(mesh, kind).export(tmp_path / (kind + ending))
+        more = measure_mesh(tmp_path / (kind + ending))
+        assert more.points == pytest.approx(once.points, abs=1e-9), kind
+        assert more.worst == pytest.approx(once.worst, abs=1e-9), kind
+        assert more.T_mesh_object == pytest.approx(once.T_mesh_object, abs=1e-9), kind
 
 
 @pytest.mark.parametrize("noise", [1e-8, 1e-7, 1e-6])
@@ -275,7 +287,7 @@ def test_nearly_repeated_faces_are_one_body(tmp_path, noise):
     mesh = trimesh.creation.revolve(np.array(CUP, dtype=float), sections=300)
     second = mesh.copy()
     second.vertices += noise * np.random.default_rng(1).standard_normal(mesh.vertices.shape)
-    trimesh.util.concatenate([mesh, second]).export(tmp_path / "cup.ply")
+    joined([mesh, second]).export(tmp_path / "cup.ply")
     mesh.export(tmp_path / "once.ply")
     found, once = measure_mesh(tmp_path / "cup.ply"), measure_mesh(tmp_path / "once.ply")
     h = np.linspace(1e-4, 0.1199, 500)
@@ -299,7 +311,7 @@ def test_a_wall_that_two_bodies_share_does_not_take_them_apart(tmp_path):
     # Every edge of the ring where the lid meets the can belongs to three faces.
     can = trimesh.creation.revolve(np.array([(0, 0), (0.03, 0), (0.03, 0.1), (0, 0.1)]), sections=400)
     neck = trimesh.creation.revolve(np.array([(0.03, 0.1), (0.02, 0.12), (0, 0.12)]), sections=400)
-    trimesh.util.concatenate([can, neck]).export(tmp_path / "can.stl")
+    joined([can, neck]).export(tmp_path / "can.stl")
     assert measure_mesh(tmp_path / "can.stl").points == pytest.approx(
         np.array([[0, 0.03], [0.1, 0.03], [0.12, 0.02]]), abs=1e-5
     )

@@ -26,9 +26,6 @@ SLACK = (5e-4, 1.5e-3)
 """Smallest and largest length (m), six times the noise between them, by which a flat end or shoulder may be
 too high or too low at an angle without this counting as a difference in radius."""
 
-NEGLIGIBLE = 1e-5
-"""Difference (m) of two bounds of a deviation below which it counts as known."""
-
 LEAST_COVERED = 0.9
 """Smallest share of the angles at which an open mesh must have a surface, at every height."""
 
@@ -52,11 +49,11 @@ class Measurement:
         T_mesh_object: (4, 4) pose of the object frame in the file's frame, in metres.
         heights: (k,) heights of the rows of `deviation` (m).
         angles: (m,) angles of its columns (rad).
-        deviation: (k, m) how far the surface lies outside the profile (m), negative inside: in the
-            half-plane at each angle, the distance of the surface from the profile or of the profile from
-            the surface, whichever is larger. On a wall parallel to the axis that is the difference in
-            radius. The surface is that of the facets, so a polygon of n sides around the axis deviates by
-            r (1 - cos π/n) in the middle of each side. NaN where an open mesh has no surface.
+        deviation: (k, m) how far the surface lies outside the profile (m), negative inside: measured
+            perpendicular to the profile, or in radius where that is more even after moving the surface along
+            the axis by half a millimetre (up to 1.5 mm for noisy meshes). On a wall parallel to the axis
+            both are the same. The surface is that of the facets, so a polygon of n sides around the axis
+            deviates by r (1 - cos π/n) in the middle of each side. NaN where an open mesh has no surface.
         tolerance: largest deviation that was accepted (m).
         simplification: largest difference (m) of r(h) between the measured profile and ``points``.
     """
@@ -294,31 +291,17 @@ def _round_end(curve: Array, rings: Array, end: Array) -> Array:
 def _deviation(surface: OuterSurface, outline: Array, slack: float, closed: bool) -> Array:
     """Return by how much (levels, COLUMNS) the surface lies outside the measured profile (m).
 
-    Its size is the largest one of three: the distance of the surface from the profile, that of the profile at
-    the same height from the surface, and the difference in radius. One distance is not enough, because
-    every point of a thin square plate is near to the flat ends of the disc around it, but the rim of that
-    disc is far from the plate. Nor are both where a round plate lies on the square one.
+    Its size is the larger one of two: the distance of the surface from the profile, and the difference in
+    radius. The distance alone is not enough, because every point of a thin square plate is near to the flat
+    ends of the disc around it.
 
     NaN where an open mesh has no surface.
     """
-    levels, radius = surface.levels, surface.radius
+    levels, radius, even = surface.levels, surface.radius, surface.even
     points = np.column_stack([np.repeat(levels, COLUMNS), radius.ravel()])
     deviation = distance_outside(points, outline).reshape(radius.shape)
-    on_profile = np.column_stack([levels, np.interp(levels, *outline.T, left=0.0, right=0.0)])
-    within = (levels >= outline[0, 0]) & (levels <= outline[-1, 0])
-    # The difference in radius bounds both distances, so where it is the first one there is nothing to find.
-    radial = radius - on_profile[:, 1:]
-    unknown = within[:, None] & (np.abs(radial) - np.abs(deviation) > NEGLIGIBLE)
-    for column in np.flatnonzero(unknown.any(axis=0)):
-        rows, solid = np.flatnonzero(unknown[:, column]), np.flatnonzero(radius[:, column])
-        back = radial[rows, column]
-        if len(solid) > 1:
-            section = np.column_stack([levels, radius[:, column]])[solid[0] : solid[-1] + 1]
-            back = -distance_outside(on_profile[rows], section)
-        first = deviation[rows, column]
-        deviation[rows, column] = np.where(np.abs(back) > np.abs(first), back, first)
-    even = surface.even
-    difference = _radial_difference(levels[even], radius[even], on_profile[even, 1], slack)
+    profile = np.interp(levels[even], *outline.T, left=0.0, right=0.0)
+    difference = _radial_difference(levels[even], radius[even], profile, slack)
     deviation[even] = np.where(np.abs(difference) > np.abs(deviation[even]), difference, deviation[even])
     return deviation if closed else np.where(radius == 0, np.nan, deviation)
 
