@@ -218,7 +218,8 @@ def test_an_object_stands_on_its_other_end_when_flipped(tmp_path):
     mesh = trimesh.creation.revolve(np.array([(0, 0), *BOTTLE, (0, 0.24)]), sections=64)
     # A dent of 1 mm at height 4 cm, angle 30°.
     centre = 0.033 * np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0.0]) + [0, 0, 0.04]
-    mesh = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, 0.006))
+    vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, 0.006)[:2]
+    mesh = trimesh.Trimesh(vertices, faces)
     dent = np.exp(-((np.linalg.norm(mesh.vertices - centre, axis=1) / 0.008) ** 2))
     mesh.vertices[:, :2] *= 1.0 - dent[:, None] / 33
     mesh.apply_transform(from_position_quat([0.5, 0.1, 0.2], [0.3, -0.8, 0.1, 0.4]))
