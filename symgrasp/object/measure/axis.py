@@ -236,9 +236,10 @@ def _deviation_from_mean(x: Array, y: Array, theta: Array, kind: str, sign: floa
     spread = np.broadcast_to(x[:, None], y.shape)
     if kind == "wall":
         rho, h, normal, step = y, spread, (across, along), x[1] - x[0]
-        # Of the surface or of the mean, whichever is larger: a stick that pierces the mean at a few angles,
-        # as around an axis across it, is not outweighed by those at which there is nothing.
-        weight = np.maximum(y, mean[:, None]) * step
+        # Equal around the axis, but more for what is further out than the mean: a stick that reaches out at a
+        # few angles, as around an axis across it, is not outweighed by those at which there is nothing.
+        around = y.mean(axis=1, keepdims=True)
+        weight = np.maximum(around, np.sqrt(around * y)) * step
     else:
         rho, h, normal, step = spread, sign * y, (along, sign * across), x[1] - x[0]
         weight = spread * step
