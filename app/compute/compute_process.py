@@ -103,9 +103,11 @@ class ComputeProcess:
         """Read an uploaded scene; see `UploadService.read_scene`."""
         return self._call("read_scene", progress, name, content, reads=name)
 
-    def measure(self, name: str, content: bytes, scale: float, progress: Progress) -> ObjectChoice:
+    def measure(
+        self, name: str, content: bytes, scale: float, tolerance: float | None, progress: Progress
+    ) -> ObjectChoice:
         """Measure an uploaded mesh; see `UploadService.measure`."""
-        return self._call("measure", progress, name, content, scale, reads=name)
+        return self._call("measure", progress, name, content, scale, tolerance, reads=name)
 
     def mount(self, scene: Scene, arm: str, hand: str, progress: Progress) -> Scene:
         """Return a scene with another hand on an arm; see `UploadService.mount`."""

@@ -45,10 +45,12 @@ class UploadService:
         check_visuals(uploaded.scene)
         return uploaded
 
-    def measure(self, name: str, content: bytes, scale: float, progress: Progress) -> ObjectChoice:
+    def measure(
+        self, name: str, content: bytes, scale: float, tolerance: float | None, progress: Progress
+    ) -> ObjectChoice:
         """Measure the object of revolution in a mesh file; see `app.state.object_choice.from_mesh`."""
         progress(0.0)
-        return from_mesh(name, content, scale)
+        return from_mesh(name, content, scale, tolerance)
 
     def mount(self, scene: Scene, arm: str, hand: str, progress: Progress) -> Scene:
         """Return a scene with another hand on an arm, of which the 3D view can show everything.

@@ -59,8 +59,15 @@ class Actions(Protocol):
     def choose_object(self, option: str) -> None:
         """Replace the scene's object by an option of the menu."""
 
-    def upload_object(self, name: str, content: bytes, scale: float) -> None:
-        """Measure an uploaded mesh and put the object into the scene; one unit of it is ``scale`` metres."""
+    def upload_object(self, name: str, content: bytes, scale: float, tolerance: float | None) -> None:
+        """Measure an uploaded mesh and put the object into the scene.
+
+        Args:
+            name: of the file.
+            content: of the file.
+            scale: metres in one unit of the mesh.
+            tolerance: largest deviation from symmetry (m), None for the default.
+        """
 
     def choose_hand(self, hand: str) -> None:
         """Mount another hand on the chosen arm."""

@@ -43,6 +43,11 @@ class ObjectPanel(Panel):
             f"{', '.join(ending[1:].upper() for ending in MESH_ENDINGS)}; at most {UPLOAD_LIMIT / 1e6:g} MB"
         )
         self.unit = self.dropdown("Mesh unit", tuple(UNITS), hint="What one unit of an uploaded mesh is.")
+        self.tolerance = gui.add_number(
+            "Tolerance (mm)", 0.0, min=0.0, step=0.1,
+            hint="How far an uploaded mesh may deviate from symmetry; 0 for the larger of 1.5 mm and 3 % of "
+            "the radius. The object may stick out of what is planned with by that much.",
+        )  # fmt: skip
         self.upload = gui.add_upload_button(
             "Upload a mesh",
             icon=viser.Icon.UPLOAD,
@@ -52,8 +57,19 @@ class ObjectPanel(Panel):
         )
         self.upload.on_upload(
             lambda _: self.actions.upload_object(
-                self.upload.value.name, self.upload.value.content, UNITS[self.unit.value]
+                self.upload.value.name,
+                self.upload.value.content,
+                UNITS[self.unit.value],
+                self.tolerance.value / 1e3 or None,
             )
+        )
+        self.flip = self.button(
+            "Flip",
+            viser.Icon.FLIP_VERTICAL,
+            lambda: self.actions.change(changes.flip_object),
+            color="gray",
+            visible=False,
+            hint="Stand the uploaded object on its other end.",
         )
         self.surface_colors = self.dropdown("Colours", SURFACE_COLORS, visible=False)
         self.on(self.surface_colors, lambda s, v: changes.switched(s, symmetry_error=v == SURFACE_COLORS[1]))
@@ -103,7 +119,8 @@ class ObjectPanel(Panel):
         self.lean.value = slider_value(self.lean, np.rad2deg(base.lean))
         self.towards.value = slider_value(self.towards, np.rad2deg(base.towards))
         self.object_choice.value = state.object_option
-        self.surface_colors.visible = bool(state.object_choice and state.object_choice.measurement)
+        measured = bool(state.object_choice and state.object_choice.measurement)
+        self.surface_colors.visible = self.flip.visible = measured
         self.surface_colors.value = SURFACE_COLORS[state.display.symmetry_error]
         self.gizmo.value = state.display.drag_handles
 

@@ -80,8 +80,8 @@ class Actions:
         if state := self._session.state:
             self._change_object(f"Loading {option}", lambda _: self._with_option(state, option))
 
-    def upload_object(self, name: str, content: bytes, scale: float) -> None:
-        """Measure an uploaded mesh and put the object into the scene; one unit of it is ``scale`` metres."""
+    def upload_object(self, name: str, content: bytes, scale: float, tolerance: float | None) -> None:
+        """Measure an uploaded mesh and put the object into the scene, see `app.panels.actions.Actions`."""
         state = self._session.state
         if state is None:
             return
@@ -92,7 +92,9 @@ class Actions:
             return
         self._change_object(
             f"Measuring {name}",
-            lambda progress: _with_object(state, self._process.measure(name, content, scale, progress)),
+            lambda progress: _with_object(
+                state, self._process.measure(name, content, scale, tolerance, progress)
+            ),
         )
 
     def choose_hand(self, hand: str) -> None:

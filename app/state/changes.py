@@ -87,6 +87,16 @@ def choose_object(state: State, scene: Scene, choice: ObjectChoice | None) -> St
     )
 
 
+def flip_object(state: State) -> State:
+    """Show the scene with the uploaded object that is in it standing on its other end."""
+    choice = state.object_choice
+    if choice is None or choice.measurement is None:
+        return state
+    choice = choice.flipped()
+    flipped = choose_object(state, state.scene.with_object(choice.name, choice.profile), choice)
+    return replace(flipped, display=state.display)
+
+
 def choose_task(state: State, name: str) -> State:
     """Show another task, with its first arm unless the chosen one takes part in it."""
     task = state.scene.task(name)

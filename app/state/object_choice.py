@@ -50,6 +50,13 @@ class ObjectChoice:
     profile: Profile
     measurement: Measurement | None = None
 
+    def flipped(self) -> ObjectChoice:
+        """Return the same object standing on its other end; one without a measurement stays as it is."""
+        if self.measurement is None:
+            return self
+        measurement = self.measurement.flipped()
+        return replace(self, profile=Profile.measured(measurement), measurement=measurement)
+
 
 def object_options(uploaded: ObjectChoice | None = None) -> tuple[str, ...]:
     """Return all options: the scene's own object, the library, and the uploaded one if any."""
@@ -79,13 +86,15 @@ def check_size(name: str, content: bytes) -> None:
         raise MeshError(name, "size of the file", size, f"a mesh file of at most {limit}")
 
 
-def from_mesh(name: str, content: bytes, scale: float) -> ObjectChoice:
+def from_mesh(name: str, content: bytes, scale: float, tolerance: float | None = None) -> ObjectChoice:
     """Measure the object of revolution in the content of a mesh file.
 
     Args:
         name: of the file; its ending is that of its format.
         content: of the file.
         scale: length (m) of one of its units.
+        tolerance: largest deviation from symmetry (m), see
+            `symgrasp.object.measure.measurement.measure_mesh`.
 
     Raises:
         MeshError: the file is too large or unusable, or is not a solid of revolution.
@@ -99,11 +108,13 @@ def from_mesh(name: str, content: bytes, scale: float) -> ObjectChoice:
         path = folder / f"mesh{file.suffix.lower()}"
         path.write_bytes(content)
         try:
-            measurement = measure_mesh(path, scale=scale)
+            measurement = measure_mesh(path, scale=scale, tolerance=tolerance)
         except MeshError as error:
             expected = error.expected
             if error.field == "size":
                 expected = f"{SMALLEST:g} to {LARGEST:g} m; choose the unit of the mesh and upload it again"
+            elif error.field == "symmetry":
+                expected = expected.partition(" (")[0] + "; choose it and upload the mesh again"
             raise MeshError(name, error.field, error.value, expected) from None
     measurement = replace(measurement, source=name)
     return ObjectChoice(f"{file.name} (upload)", file.stem[:100], Profile.measured(measurement), measurement)

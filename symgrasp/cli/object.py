@@ -17,6 +17,9 @@ def add_parser(commands: Commands) -> None:
     command.add_argument("object", metavar="OBJECT", help="name of the library, a mesh, or a .yaml profile")
     text = "metres in one unit of a mesh (default: 1)"
     command.add_argument("--scale", type=float, default=1.0, help=text)
+    text = "how far a mesh may deviate from symmetry (default: the larger of 0.0015 and 3 %% of the radius)"
+    command.add_argument("--tolerance", metavar="METRES", type=float, help=text)
+    command.add_argument("--flip", action="store_true", help="stand the object of a mesh on its other end")
     add_out(command, "write a picture of the profile (.png)")
     add_out(command, "write a picture of openings (.png)", option="--fit")
 
@@ -33,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     from symgrasp.feasibility.pictures import to_png
     from symgrasp.robot.hand import HANDS
 
-    report = describe_object(args.object, args.scale)
+    report = describe_object(args.object, args.scale, tolerance=args.tolerance, flip=args.flip)
     for line in report.lines():
         say(line)
     pictures = [(args.out, report.plot), (args.fit, lambda: plot_openings(report.profile, HANDS))]

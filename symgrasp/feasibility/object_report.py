@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symgrasp.errors import InputError
 from symgrasp.feasibility import pictures
 from symgrasp.feasibility.fit import fit
 from symgrasp.object.library import load_object
@@ -73,22 +74,36 @@ class ObjectReport:
         return pictures.draw_object(self.profile.points, self.measurement, self.name)
 
 
-def describe_object(name: str | Path, scale: float = 1.0, hands: Mapping[str, Hand] = HANDS) -> ObjectReport:
+def describe_object(
+    name: str | Path,
+    scale: float = 1.0,
+    hands: Mapping[str, Hand] = HANDS,
+    *,
+    tolerance: float | None = None,
+    flip: bool = False,
+) -> ObjectReport:
     """Load or measure an object and try hands on it.
 
     Args:
         name: as for `symgrasp.object.library.load_object`.
         scale: metres in one unit of a mesh.
         hands: the hands by the names to report.
+        tolerance: largest deviation (m) of a mesh from symmetry, see
+            `symgrasp.object.measure.measurement.measure_mesh`.
+        flip: whether the object of a mesh is to stand on its other end.
 
     Raises:
+        InputError: scale, tolerance or flip are given for an object that is no mesh.
         ProfileError, MeshError: as `symgrasp.object.library.load_object`.
     """
     path, measurement = Path(name), None
     if path.suffix.lower() in MESH_ENDINGS:
-        measurement = measure_mesh(path, scale=scale)
+        measurement = measure_mesh(path, scale=scale, tolerance=tolerance, flip=flip)
         label, profile = path.stem, Profile.measured(measurement)
     else:
+        given = {"scale": scale != 1.0, "tolerance": tolerance is not None, "flip": flip}
+        for option in (option for option, is_given in given.items() if is_given):
+            raise InputError("object", option, str(name), f"a mesh ({', '.join(MESH_ENDINGS)})")
         label, profile = load_object(name)
     holds = {hand_name: holding_heights(hand, profile) for hand_name, hand in hands.items()}
     return ObjectReport(label, profile, measurement, holds)

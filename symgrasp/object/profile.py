@@ -71,18 +71,23 @@ class Profile:
         self._points = array
 
     @classmethod
-    def from_mesh(cls, path: str | Path, scale: float = 1.0) -> Profile:
+    def from_mesh(
+        cls, path: str | Path, scale: float = 1.0, *, tolerance: float | None = None, flip: bool = False
+    ) -> Profile:
         """Measure the object of revolution that a mesh shows, in any orientation and place.
 
         Args:
             path: an STL, OBJ, PLY, OFF or GLB file.
             scale: metres in one unit of the file.
+            tolerance: largest deviation from symmetry (m), see
+                `symgrasp.object.measure.measurement.measure_mesh`.
+            flip: whether the object is to stand on its other end.
 
         Raises:
             MeshError: the file is unusable, or what it shows is no object of revolution; see
                 `symgrasp.object.measure.measurement.measure_mesh`, which also returns the deviations.
         """
-        return cls.measured(measure_mesh(path, scale=scale))
+        return cls.measured(measure_mesh(path, scale=scale, tolerance=tolerance, flip=flip))
 
     @classmethod
     def measured(cls, measurement: Measurement) -> Profile:

@@ -94,7 +94,7 @@ class SceneBuilder:
                 raise SceneError(self.source, "object.library", entry.library, expected)
             return load_object(entry.library)[1]
         path = self._path(self._reference("object.mesh", entry.mesh or "", "mesh"))
-        return Profile.from_mesh(path, entry.scale)
+        return Profile.from_mesh(path, entry.scale, tolerance=entry.tolerance, flip=bool(entry.flip))
 
     def _absolute(self, profile: Profile) -> SceneFile:
         """Return the file with absolute references and the profile's knots, valid from any folder.

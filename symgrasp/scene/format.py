@@ -6,7 +6,16 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StrictBool,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from symgrasp.object.manifold import ROLLS
 from symgrasp.object.profile import MOST_KNOTS
@@ -159,7 +168,8 @@ class ObjectFile(_Strict):
     """The object of revolution: exactly one of a profile, a name of the library, and a mesh.
 
     A profile is a list of knots [height, radius] in metres, bottom to top. A mesh is measured;
-    ``scale`` is metres in one of its units.
+    ``scale`` is metres in one of its units, ``tolerance`` the largest deviation (m) from symmetry, and
+    ``flip`` stands the object on its other end.
     """
 
     name: Name
@@ -169,11 +179,15 @@ class ObjectFile(_Strict):
     library: str | None = None
     mesh: str | None = None
     scale: Positive = 1.0
+    tolerance: Positive | None = None
+    flip: StrictBool | None = None  # not False, which would be written into every scene and change its hash
 
     @model_validator(mode="after")
     def _one_source(self) -> ObjectFile:
         if sum(source is not None for source in (self.profile, self.library, self.mesh)) != 1:
             raise ValueError("exactly one of profile, library, mesh")
+        if self.mesh is None and (self.tolerance is not None or self.flip):
+            raise ValueError("tolerance and flip only for a mesh")
         return self
 
 

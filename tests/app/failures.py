@@ -64,7 +64,14 @@ def serve_parsers(pipe: Connection, folders: tuple[Path, ...]) -> None:
         while True:
             pass
 
-    def misbehave(service: UploadService, name: str, content: bytes, scale: float, progress: Any) -> Any:
+    def misbehave(
+        service: UploadService,
+        name: str,
+        content: bytes,
+        scale: float,
+        tolerance: float | None,
+        progress: Any,
+    ) -> Any:
         if name == "hangs.stl":
             setattr(object_choice, "measure_mesh", endless)  # noqa: B010
         pipe.poll(2 * REPORT_INTERVAL)  # so that no report is left out
@@ -76,7 +83,7 @@ def serve_parsers(pipe: Connection, folders: tuple[Path, ...]) -> None:
                 raise MeshError(name, "content", str(error), "a mesh") from error
         if name == "aborts":
             os.abort()
-        return measure(service, name, content, scale, progress)
+        return measure(service, name, content, scale, tolerance, progress)
 
     setattr(UploadService, "measure", misbehave)  # noqa: B010
     serve(pipe, folders)

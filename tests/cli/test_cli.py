@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from docs.schemas import schemas
 from symgrasp.cli import export
 from symgrasp.cli.main import main
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.library import load_object
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan, plan_schema
 from symgrasp.scene.scene import Scene
@@ -86,6 +88,31 @@ def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):
     assert "symmetry error" in text
     assert main(["object", "wine_bottel"]) == 2
     assert "did you mean 'wine_bottle'" in capsys.readouterr().err
+
+
+def test_tolerance_and_flip_of_a_mesh(tmp_path, capsys):
+    mesh = tmp_path / "bottle.stl"
+    oval = load_object("wine_bottle")[1].mesh()
+    oval.vertices[:, 0] *= 1.2
+    oval.export(mesh)
+    assert main(["object", str(mesh)]) == 2
+    refusal = capsys.readouterr().err
+    accepts = re.search(r"--tolerance ([\d.]+)", refusal)
+    assert accepts, refusal
+    assert main(["object", str(mesh), "--tolerance", accepts[1]]) == 0
+    upright = capsys.readouterr().out
+    assert f"{1e3 * float(accepts[1]):.2f} mm allowed" in upright
+    assert main(["object", str(mesh), "--tolerance", accepts[1], "--flip"]) == 0
+    flipped = capsys.readouterr().out
+    assert "axis in the file     (0.0000, 0.0000, 1.0000)" in upright.replace("-0.0000", "0.0000")
+    assert "axis in the file     (0.0000, 0.0000, -1.0000)" in flipped.replace("-0.0000", "0.0000")
+    for value in ("0", "-0.1", "nan", "inf"):
+        assert main(["object", str(mesh), f"--tolerance={value}"]) == 2
+        assert "bottle.stl: tolerance: " in (error := capsys.readouterr().err)
+        assert "a length in metres above zero" in error
+    for options in (["--flip"], ["--tolerance", "0.01"], ["--scale", "0.1"]):
+        assert main(["object", "wine_bottle", *options]) == 2
+        assert f"object: {options[0][2:]}: 'wine_bottle': expected a mesh" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["scene", "plan"])

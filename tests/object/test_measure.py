@@ -3,6 +3,7 @@ from __future__ import annotations
 import struct
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -334,7 +335,7 @@ def test_a_knob_on_the_axis_is_part_of_the_object(tmp_path):
     assert found.points[-1] == pytest.approx([0.115, 0.006], abs=2e-5)
 
 
-def refused(path: Path, field: str, **options: float) -> str:
+def refused(path: Path, field: str, **options: Any) -> str:
     with pytest.raises(MeshError) as caught:
         measure_mesh(path, **options)
     assert caught.value.field == field

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from symgrasp.errors import ProfileError, SceneError, SymgraspError, UrdfError
+from symgrasp.errors import MeshError, ProfileError, SceneError, SymgraspError, UrdfError
 from symgrasp.files import SCENES_DIR
 from symgrasp.object.library import load_object
 from symgrasp.object.profile import MOST_KNOTS
@@ -209,6 +209,13 @@ BAD = [
      "profile[2]", "above"),
     (lambda c: c["object"].update(mesh="can.stl"), SceneError,
      "object", "exactly one of profile, library"),
+    (lambda c: c.update(object={"name": "o", "library": "can_330ml", "flip": True}), SceneError,
+     "object", "only for a mesh"),
+    (lambda c: c["object"].update(tolerance=0.01), SceneError, "object", "only for a mesh"),
+    (lambda c: c.update(object={"name": "o", "mesh": "can.stl", "tolerance": 0}), SceneError,
+     "object.tolerance", "greater than 0"),
+    (lambda c: c.update(object={"name": "o", "mesh": "can.stl", "flip": 1}), SceneError,
+     "object.flip", "boolean"),
     (lambda c: c.update(object={"name": "o", "mesh": "no.stl"}), SceneError,
      "object.mesh", "existing mesh file"),
     (lambda c: c.update(object={"name": "o", "library": "beer"}), SceneError,
@@ -284,6 +291,26 @@ def test_a_missing_scene(tmp_path):
         Scene.load("soda_cans")
     with pytest.raises(SceneError, match="readable text file"):
         Scene.load(tmp_path / "none.yaml")
+
+
+def test_a_mesh_takes_a_tolerance_and_its_other_end(content, tmp_path):
+    oval = load_object("wine_bottle")[1].mesh()
+    oval.vertices[:, 0] *= 1.2
+    oval.export(tmp_path / "oval.stl")
+    content["object"] = {"name": "bottle", "mesh": "oval.stl"}
+    with pytest.raises(MeshError, match=r"oval\.stl: symmetry: .* tolerance: 0\.00\d+ in a scene"):
+        Scene.load(write_scene(tmp_path, content))
+    content["object"]["tolerance"] = 0.01
+    upright = Scene.load(write_scene(tmp_path, content)).profile
+    content["object"]["flip"] = True
+    scene = Scene.load(write_scene(tmp_path, content))
+    heights = np.linspace(upright.h_min, upright.h_max, 99)
+    assert scene.profile.radius(upright.h_max - heights) == pytest.approx(upright.radius(heights))
+    assert scene.profile.radius(0.001) < 0.5 * upright.radius(0.001)
+    # A saved scene holds the flipped knots, and needs neither mesh nor tolerance.
+    again = Scene.from_content(scene.content)
+    assert np.array_equal(again.profile.points, scene.profile.points)
+    assert again.sha256 == scene.sha256
 
 
 def test_a_missing_mesh_of_a_robot_is_an_error(content, tmp_path):

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from symgrasp.object.measure.meridian import column_angles, cut, envelope
-from symgrasp.poses import Array, from_rotation, inverse, rotation_about, translation
+from symgrasp.object.measure.meridian import column_angles, cut, envelope, in_frame
+from symgrasp.poses import Array, from_rotation, rotation_about, translation
 
 __all__ = ["find_axis", "frame_along"]
 
@@ -24,6 +24,9 @@ COLUMNS, FINE_COLUMNS = 48, 240
 
 ROWS, RINGS = 128, 32
 """Number of heights at which the side wall is sampled, and of radii at which the two ends are."""
+
+MOST_NORMALS = 50_000
+"""Largest number of triangles whose normals are asked where they meet; of a finer mesh, as many at random."""
 
 MOST_STEPS = 20
 """Largest number of steps of the refinement; it usually converges in five."""
@@ -71,8 +74,9 @@ def find_axis(mesh: trimesh.Trimesh) -> Array:
     Its origin lies on the axis at half height; which end is up is left open. A mesh that is no
     surface of revolution gets the axis that fits most of its surface.
     """
-    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    # Coordinate by coordinate and corner by corner, since that is how they are read.
+    vertices, faces = np.asfortranarray(mesh.vertices), np.asfortranarray(mesh.faces)
+    centre = mesh.bounds.mean(axis=0)
     size = float(np.linalg.norm(mesh.extents))
     # Candidates are scored around the origin, because coordinates far from it are less precise.
     local = vertices - centre
@@ -134,6 +138,9 @@ def _lines_met_by_normals(points: Array, normals: Array, areas: Array) -> list[t
     ``n·m + (p × n)·a = 0``. Least squares over m leave an eigenvector problem for a. It is
     solved again with the normals that do not fit weighted down, so a handle does not pull.
     """
+    if len(areas) > MOST_NORMALS:
+        some = np.random.default_rng(0).choice(len(areas), MOST_NORMALS, replace=False)
+        points, normals, areas = points[some], normals[some], areas[some]
     middle = np.average(points, axis=0, weights=areas)
     scale = float(np.abs(points - middle).max())
     moments = np.cross((points - middle) / scale, normals)
@@ -200,8 +207,7 @@ def _score(samples: _SurfaceSamples) -> float:
 
 def _sample(vertices: Array, faces: np.ndarray, pose: Array, columns: int) -> _SurfaceSamples:
     """Sample the side wall and both ends of a mesh in a candidate's axis frame ``pose`` (4, 4)."""
-    to_frame = inverse(pose)
-    local = vertices @ to_frame[:3, :3].T + to_frame[:3, 3]
+    local = in_frame(vertices, pose)
     theta, cuts = column_angles(columns), cut(local, faces, columns)
     bottom, top = local[:, 2].min(), local[:, 2].max()
     heights = bottom + (np.arange(ROWS) + 0.5) * ((top - bottom) / ROWS)
@@ -230,7 +236,10 @@ def _deviation_from_mean(x: Array, y: Array, theta: Array, kind: str, sign: floa
     spread = np.broadcast_to(x[:, None], y.shape)
     if kind == "wall":
         rho, h, normal, step = y, spread, (across, along), x[1] - x[0]
-        weight = np.broadcast_to(y.mean(axis=1, keepdims=True) * step, y.shape)
+        # Equal around the axis, but more for what is further out than the mean: a stick that reaches out at a
+        # few angles, as around an axis across it, is not outweighed by those at which there is nothing.
+        around = y.mean(axis=1, keepdims=True)
+        weight = np.maximum(around, np.sqrt(around * y)) * step
     else:
         rho, h, normal, step = spread, sign * y, (along, sign * across), x[1] - x[0]
         weight = spread * step

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.poses import Array
+from symgrasp.poses import Array, inverse
 
-__all__ = ["Cuts", "column_angles", "cut", "envelope"]
+__all__ = ["Cuts", "column_angles", "cut", "envelope", "in_frame"]
 
 
 class Cuts(NamedTuple):
@@ -38,6 +38,16 @@ def column_angles(columns: int) -> Array:
     return np.linspace(0.0, 2 * np.pi, columns, endpoint=False) + np.pi / columns
 
 
+def in_frame(points: Array, pose: Array) -> Array:
+    """Return points (n, 3) in the coordinates of a frame ``pose`` (4, 4).
+
+    The result lies in memory coordinate by coordinate, which makes the reading of one of them fast.
+    """
+    to_frame = inverse(pose)
+    # einsum, because a product with so small a matrix is no work for the threads of a BLAS.
+    return (np.einsum("ij,nj->in", to_frame[:3, :3], points) + to_frame[:3, 3, None]).T
+
+
 def cut(vertices: Array, faces: np.ndarray, columns: int) -> Cuts:
     """Cut triangles by the half-planes at `column_angles`.
 
@@ -51,26 +61,33 @@ def cut(vertices: Array, faces: np.ndarray, columns: int) -> Cuts:
     angle = column_angles(columns)[column][:, None]
     side = corners[..., 1] * np.cos(angle) - corners[..., 0] * np.sin(angle)
     along = corners[..., 0] * np.cos(angle) + corners[..., 1] * np.sin(angle)
-    rho = np.hypot(vertices[:, 0], vertices[:, 1])[faces[face]]
+    rho = np.hypot(corners[..., 0], corners[..., 1])
     crossing, ends = _crossings(side, np.stack([along, corners[..., 2], rho], axis=-1))
-    outside = (ends[..., 0] >= 0).any(axis=1)
+    outside = np.maximum(ends[:, 0, 0], ends[:, 1, 0]) >= 0
     ends = _clip_at_axis(ends[outside])
     return Cuts(column[crossing][outside], ends[..., 1], ends[..., 0], ends[..., 2])
 
 
 def _overlapping(vertices: Array, faces: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
     """Return (face (k,), column (k,)): every pair of triangle and half-plane whose angles overlap."""
-    angle = np.arctan2(vertices[:, 1], vertices[:, 0])[faces]
-    relative = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi
-    low, high = relative.min(axis=1), relative.max(axis=1)
+    angle = np.arctan2(vertices[:, 1], vertices[:, 0])
+    # Corner by corner, since numpy is slow along an axis of three.
+    start, *others = (angle[corner] for corner in faces.T)
+    second, third = (_wrap(other - start) for other in others)
+    low, high = np.minimum(np.minimum(second, third), 0.0), np.maximum(np.maximum(second, third), 0.0)
     step = 2 * np.pi / columns
-    first = np.ceil((angle[:, 0] + low) / step - 0.5 - 1e-6).astype(int)
-    last = np.floor((angle[:, 0] + high) / step - 0.5 + 1e-6).astype(int)
+    first = np.ceil((start + low) / step - 0.5 - 1e-6).astype(int)
+    last = np.floor((start + high) / step - 0.5 + 1e-6).astype(int)
     # Corners on more than half a circle: the axis runs through the triangle.
     count = np.where(high - low >= np.pi, columns, last - first + 1)
     face = np.repeat(np.arange(len(faces)), count)
     offset = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
     return face, (first[face] + offset) % columns
+
+
+def _wrap(angle: Array) -> Array:
+    """Wrap angles (rad) into [-π, π]."""
+    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
 def _crossings(side: Array, values: Array) -> tuple[np.ndarray, Array]:
@@ -84,7 +101,7 @@ def _crossings(side: Array, values: Array) -> tuple[np.ndarray, Array]:
         Indices (m,) of the triangles that cross, and the values (m, 2, v) at both ends of the crossing.
     """
     above = side >= 0
-    count = above.sum(axis=1)
+    count = np.count_nonzero(above, axis=1)
     crossing = np.flatnonzero((count == 1) | (count == 2))
     side, values, above, count = side[crossing], values[crossing], above[crossing], count[crossing]
     # One corner lies alone on its side of the plane; the crossing runs between its two edges.
@@ -127,8 +144,8 @@ def envelope(
         there is none.
     """
     companion = y if companion is None else companion
-    first = np.searchsorted(levels, x.min(axis=1), side="left")
-    count = np.searchsorted(levels, x.max(axis=1), side="right") - first
+    first = np.searchsorted(levels, np.minimum(*x.T), side="left")
+    count = np.searchsorted(levels, np.maximum(*x.T), side="right") - first
     segment = np.repeat(np.arange(len(x)), count)
     level = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + first[segment]
     start, run = x[segment, 0], x[segment, 1] - x[segment, 0]

@@ -33,7 +33,7 @@ FLAT_THICKNESS = 1e-4
 
 
 def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
-    """Read the mesh of a single object, in metres, with coinciding vertices merged.
+    """Read the mesh of a single object, in metres, with coinciding vertices and repeated faces merged.
 
     Args:
         path: an STL, OBJ, PLY, OFF or GLB file.
@@ -53,6 +53,7 @@ def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
         raise MeshError(path, "faces", int(mesh.faces.max()), f"vertices numbered below {len(mesh.vertices)}")
     mesh = trimesh.Trimesh(scale * mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices(digits_vertex=7)
+    mesh.update_faces(mesh.unique_faces())  # exporters write a face twice to show both of its sides
     mesh.update_faces(mesh.area_faces > 0)
     if not len(mesh.faces):
         raise MeshError(path, "surface", "no area", "triangles that enclose an object")
@@ -123,13 +124,17 @@ def _check_not_flat(path: Path, mesh: trimesh.Trimesh) -> None:
 
 def _check_one_object(path: Path, mesh: trimesh.Trimesh) -> None:
     """Raise MeshError if the mesh shows several objects: parts that neither touch nor enclose each other."""
-    labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
+    # Parts that share a vertex touch. (Edges would not do: where walls meet, more than two faces share one.)
+    first, *others = mesh.faces.T
+    links = np.concatenate([np.column_stack([first, other]) for other in others])
+    labels = trimesh.graph.connected_component_labels(links, node_count=len(mesh.vertices))
     count = int(labels.max()) + 1
-    # Faces that only share a vertex are not adjacent, but their hulls touch.
+    if count == 1:
+        return
     if count > MOST_PARTS:
         raise MeshError(path, "bodies", f"{count} unconnected parts", "one connected body")
-    areas = np.bincount(labels, mesh.area_faces)
-    parts = [mesh.vertices[np.unique(mesh.faces[labels == k])] for k in np.argsort(-areas)]
+    areas = np.bincount(labels[first], mesh.area_faces)
+    parts = [mesh.vertices[labels == k] for k in np.argsort(-areas)]
     largest, apart = _corners(parts[0]), [_corners(part) for part in parts[1:]]
     absorbed = True
     while apart and absorbed:

@@ -8,8 +8,8 @@ import numpy as np
 import trimesh
 
 from symgrasp.object.measure.axis import frame_along
-from symgrasp.object.measure.meridian import cut, envelope
-from symgrasp.poses import Array, inverse
+from symgrasp.object.measure.meridian import cut, envelope, in_frame
+from symgrasp.poses import Array
 
 __all__ = ["COLUMNS", "EDGE", "OuterSurface", "orient_upright", "sample_surface"]
 
@@ -53,9 +53,8 @@ class OuterSurface(NamedTuple):
 
 def sample_surface(mesh: trimesh.Trimesh, T_mesh_object: Array) -> OuterSurface:
     """Sample the outer surface of a mesh around the z axis of its object frame ``T_mesh_object`` (4, 4)."""
-    to_object = inverse(T_mesh_object)
-    vertices = mesh.vertices @ to_object[:3, :3].T + to_object[:3, 3]
-    cuts = cut(vertices, np.asarray(mesh.faces), COLUMNS)
+    vertices = in_frame(np.asarray(mesh.vertices), T_mesh_object)
+    cuts = cut(vertices, np.asfortranarray(mesh.faces), COLUMNS)
     levels, even = _levels(vertices[:, 2])
     radius, rho = envelope(cuts.column, cuts.h, cuts.r, levels, COLUMNS, cuts.rho)
     rings = (np.arange(RINGS) + 0.5) * (np.hypot(vertices[:, 0], vertices[:, 1]).max() / RINGS)

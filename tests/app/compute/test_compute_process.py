@@ -193,10 +193,10 @@ def test_a_parser_that_misbehaves_is_reported_and_the_next_file_is_read(
             monkeypatch.setattr(compute_process, "READING_TIMEOUT", 1.0)
 
     with pytest.raises(ProcessDied, match=message):
-        misbehaving.measure(name, b"", 1.0, impatient)
+        misbehaving.measure(name, b"", 1.0, None, impatient)
     assert misbehaving.pid is None
     monkeypatch.setattr(compute_process, "READING_TIMEOUT", 60.0)
-    assert misbehaving.measure("a.stl", stl(), 1.0, quiet).name == "a"
+    assert misbehaving.measure("a.stl", stl(), 1.0, None, quiet).name == "a"
 
 
 def test_a_mounted_hand_is_that_of_the_scene_here(process):

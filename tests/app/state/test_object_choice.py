@@ -67,6 +67,33 @@ def test_a_mug_is_refused_at_its_handle():
         from_mesh("mug.obj", mug, 1.0)
 
 
+def test_a_tolerance_accepts_what_the_refusal_says():
+    oval = BOTTLE.mesh(64)
+    oval.vertices[:, 0] *= 1.2
+    content = oval.export(file_type="stl")
+    assert isinstance(content, bytes)
+    with pytest.raises(
+        SymgraspError, match=r"to within 1\.5 mm; a tolerance of [\d.]+ mm .* again$"
+    ) as caught:
+        from_mesh("oval.stl", content, 1.0)
+    assert "--" not in str(caught.value)
+    needed = float(str(caught.value).split("a tolerance of ")[1].split()[0])
+    measurement = from_mesh("oval.stl", content, 1.0, needed / 1e3).measurement
+    assert measurement is not None
+    assert measurement.tolerance == pytest.approx(needed / 1e3)
+
+
+def test_a_measured_object_can_stand_on_its_other_end():
+    choice = from_mesh("b.stl", stl(), 1.0)
+    flipped = choice.flipped()
+    h = np.linspace(0, choice.profile.h_max, 50)
+    assert flipped.profile.radius(choice.profile.h_max - h) == pytest.approx(choice.profile.radius(h))
+    assert (flipped.name, flipped.option) == (choice.name, choice.option)
+    assert flipped.measurement is not None
+    assert flipped.profile.T_mesh_object is flipped.measurement.T_mesh_object
+    assert from_library("tennis_ball").flipped().measurement is None
+
+
 def test_a_file_over_the_limit_is_refused_before_it_is_looked_at(monkeypatch):
     monkeypatch.setattr(module, "measure_mesh", None)
     monkeypatch.setattr(module, "UPLOAD_LIMIT", 1_000_000)

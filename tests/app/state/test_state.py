@@ -21,7 +21,7 @@ from app.panels.keyboard import next_arm
 from app.render.drawn_poses import drawn_joint_values
 from app.state import changes, job_changes, plan_changes
 from app.state.map_view_state import RollChoice
-from app.state.object_choice import OWN, from_library
+from app.state.object_choice import OWN, from_library, from_mesh
 from app.state.object_pose import ObjectPose
 from app.state.plan_results import PlanKind, PlanResults
 from app.state.requests import MapRequest, MapResult
@@ -314,6 +314,24 @@ def test_an_uploaded_object_stays_on_offer():
     scene = state.scene.with_object(object_choice.name, object_choice.profile)
     state = changes.choose_object(changes.choose_object(state, scene, measured), scene, object_choice)
     assert (state.object_choice, state.uploaded_object) == (object_choice, measured)
+
+
+def test_an_uploaded_object_is_flipped_in_the_scene_and_undone():
+    content = from_library("wine_bottle").profile.mesh(48).export(file_type="stl")
+    assert isinstance(content, bytes)
+    choice = from_mesh("b.stl", content, 1.0)
+    state = opened()
+    state = changes.choose_object(state, state.scene.with_object(choice.name, choice.profile), choice)
+    flipped = remember(state, changes.flip_object(state), "", 1.0)
+    top = choice.profile.h_max
+    knots = np.array(choice.profile.points)[::-1] * [-1, 1] + [top, 0]
+    assert np.array(flipped.scene.file.object.profile) == pytest.approx(knots)
+    assert flipped.object_choice is flipped.uploaded_object is not choice
+    assert flipped.next_request == flipped.request != state.request
+    assert undo(flipped).scene is state.scene
+    assert np.array(changes.flip_object(flipped).scene.profile.points) == pytest.approx(choice.profile.points)
+    library = changes.choose_object(state, state.scene, from_library("wine_bottle"))
+    assert changes.flip_object(library) is library
 
 
 def test_a_new_object_drops_the_plan():
