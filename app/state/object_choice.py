@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from symgrasp.errors import InputError, MeshError, one_of
+from symgrasp.meshes import MESH_ENDINGS
 from symgrasp.object.library import library_objects, load_object
 from symgrasp.object.measure.measurement import Measurement, measure_mesh
-from symgrasp.object.measure.mesh_io import LARGEST, MESH_ENDINGS, SMALLEST
+from symgrasp.object.measure.mesh_io import SIZES
 from symgrasp.object.profile import Profile
 
 __all__ = [
@@ -103,7 +104,7 @@ def from_mesh(name: str, content: bytes, scale: float) -> ObjectChoice:
         except MeshError as error:
             expected = error.expected
             if error.field == "size":
-                expected = f"{SMALLEST:g} to {LARGEST:g} m; choose the unit of the mesh and upload it again"
+                expected = f"{SIZES[0]:g} to {SIZES[1]:g} m; choose the unit of the mesh and upload it again"
             raise MeshError(name, error.field, error.value, expected) from None
     measurement = replace(measurement, source=name)
     return ObjectChoice(f"{file.name} (upload)", file.stem[:100], Profile.measured(measurement), measurement)

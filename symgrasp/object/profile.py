@@ -69,7 +69,7 @@ class Profile:
         """Measure the object of revolution that a mesh shows, in any orientation and place.
 
         Args:
-            path: an STL, OBJ, PLY, OFF or GLB file.
+            path: a DAE, GLB, OBJ, OFF, PLY or STL file.
             scale: metres in one unit of the file.
 
         Raises:

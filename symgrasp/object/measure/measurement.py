@@ -30,7 +30,7 @@ class Measurement:
     """The object of revolution measured from a mesh: its profile, its pose and its deviation from symmetry.
 
     The object frame stands at the bottom end of the axis, z along it. Which end is the bottom: the
-    lower one where the axis is within 10° of the file's vertical (y in GLB, z otherwise); else
+    lower one where the axis is within 10° of the file's vertical; else
     the end that is not hollow; else the wider end; else the one that is lower along z.
 
     Attributes:
@@ -38,7 +38,7 @@ class Measurement:
         points: (n, 2) knots [h, r] of the profile (m). r is the radius of the outer surface,
             averaged over the angle (median), with the facets of the mesh undone: the radius that
             its vertices lie on. A flat step becomes two knots a few micrometres apart in height.
-        T_mesh_object: (4, 4) pose of the object frame in the file's frame, in metres.
+        T_mesh_object: (4, 4) pose of the object frame in the mesh's: metres, with z up whatever the file has.
         heights: (k,) heights of the rows of `deviation` (m).
         angles: (m,) angles of its columns (rad).
         deviation: (k, m) how far the surface lies outside the profile (m), negative inside;
@@ -81,7 +81,7 @@ def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | Non
     Only the outer surface counts; the inside of a hollow object may have any shape.
 
     Args:
-        path: an STL, OBJ, PLY, OFF or GLB file.
+        path: a DAE, GLB, OBJ, OFF, PLY or STL file.
         scale: metres in one unit of the file.
         tolerance: largest deviation from symmetry (m); the larger of 1.5 mm and 3 % of the largest
             radius if not given.
@@ -94,9 +94,7 @@ def measure_mesh(path: str | Path, *, scale: float = 1.0, tolerance: float | Non
     if tolerance is not None and not tolerance > 0:
         raise MeshError(source, "tolerance", tolerance, "a length in metres above zero")
     mesh = read_single_object(path, scale)
-    T_mesh_object = orient_upright(
-        mesh, find_axis(mesh), vertical=1 if source.lower().endswith(".glb") else 2
-    )
+    T_mesh_object = orient_upright(mesh, find_axis(mesh))
     surface = sample_surface(mesh, T_mesh_object)
     _check_closed(source, mesh, surface)
     curve = _measured_profile(surface)
