@@ -83,9 +83,9 @@ class SphericalIK(ClosedFormIK):
         free = [j for j in range(arm.dof) if j != locked]
         backwards = rows[0].backwards
         bounded = np.isfinite(arm.lower) & np.isfinite(arm.upper)
-        middle = np.zeros(arm.dof)
-        middle[bounded] = 0.5 * (arm.lower + arm.upper)[bounded]
-        half = np.minimum(np.where(bounded, 0.5 * (arm.upper - arm.lower), np.inf), np.pi)
+        lower, upper = np.where(bounded, arm.lower, -np.pi), np.where(bounded, arm.upper, np.pi)
+        middle = 0.5 * (lower + upper)
+        half = np.minimum(0.5 * (upper - lower), np.pi)
         least = np.cos(half) - COSINE_TOLERANCE
         tolerance = [self.tolerance.position, self.tolerance.rotation, 0.0]
         return Chain(

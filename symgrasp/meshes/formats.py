@@ -90,7 +90,7 @@ def _stl(content: bytes) -> Declared:
         return Declared(content, int.from_bytes(content[80:84], "little"))
     # A solid may have any name, also one that looks like what follows.
     text = re.sub(rb"(?im)^[ \t]*(end)?solid\b.*$", rb"\1solid", content.removeprefix(BOM))
-    if len(re.findall(rb"(?m)^solid", text)) != len(re.findall(rb"(?m)^endsolid", text)):
+    if len(re.findall(rb"(?im)^solid", text)) != len(re.findall(rb"(?im)^endsolid", text)):
         raise ValueError("the end is missing")
     starts = [m.start() for m in re.finditer(rb"(?im)^[ \t]*facet\b", text)]
     for start in starts:
@@ -122,9 +122,7 @@ def _obj(content: bytes) -> Declared:
                 corners = [_corner(word, counts) for word in words[1:]]
             except ValueError as error:
                 raise ValueError(f"line {number}: {error}") from None
-            if len(corners) < 3:
-                raise ValueError(f"line {number}: a face of {len(corners)} corners")
-            triangles += len(corners) - 2
+            triangles += max(len(corners) - 2, 0)  # with two corners it is an edge
             lines += [f"f {corners[0]} {a} {b}" for a, b in pairwise(corners[1:])]
         elif key in counts:
             counts[key] += 1
