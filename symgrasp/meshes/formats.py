@@ -29,13 +29,15 @@ class Declared(NamedTuple):
         content: the file, put in a form that the parser reads right.
         triangles: their number, with polygons of n corners as n − 2, and once for each time they are placed.
         instances: how many times a mesh is placed.
-        to_metres: (4, 4) takes coordinates of the file to metres with z up.
+        unit: length (m) of one unit of the file.
+        upright: (4, 4) turns coordinates of the file so that z is up.
     """
 
     content: bytes
     triangles: int
     instances: int = 1
-    to_metres: Array | None = None
+    unit: float = 1.0
+    upright: Array | None = None
 
 
 Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -317,7 +319,7 @@ def _glb(content: bytes) -> Declared:
         lambda k: [nodes[k]["mesh"]] if "mesh" in nodes[k] else [],
         meshes,
     )
-    return Declared(content, *placed, Y_UP)
+    return Declared(content, *placed, upright=Y_UP)
 
 
 def _gltf_triangles(primitive: Mapping[str, Any], accessors: Sequence[Mapping[str, Any]]) -> int:
@@ -407,7 +409,7 @@ def _dae(content: bytes) -> Declared:
         lambda node: [inner.get("url", "") for inner in node.iterfind("{*}instance_geometry")],
         triangles,
     )
-    return Declared(content, *placed, UP_AXES[up] @ np.diag([metres, metres, metres, 1.0]))
+    return Declared(content, *placed, metres, UP_AXES[up])
 
 
 def _collada_triangles(part: ET.Element) -> int:

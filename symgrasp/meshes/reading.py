@@ -38,7 +38,7 @@ POINTER = b"version https://git-lfs.github.com/spec/"
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 
-def read_mesh(path: Path, field: str = "mesh") -> trimesh.Trimesh:
+def read_mesh(path: Path, field: str = "mesh", *, upright: bool = True) -> trimesh.Trimesh:
     """Read all triangles of a mesh file as one mesh, in metres with z up.
 
     The units and the vertical of formats that state them are followed: COLLADA has both, glTF is in metres
@@ -47,17 +47,19 @@ def read_mesh(path: Path, field: str = "mesh") -> trimesh.Trimesh:
     Args:
         path: the file; `MESH_ENDINGS` are known.
         field: what refers to it, for error messages.
+        upright: whether to turn it so that z is up. A mesh in a URDF is not turned, because other programs
+            do not turn it either, and some that export COLLADA always state the same vertical.
 
     Raises:
         MeshError: the file is missing, of another kind than its ending says, damaged or too large, holds
             something that cannot be read, has no triangles, or vertices that are not finite.
     """
-    return joined(_parts(path, field, materials=False))
+    return joined(_parts(path, field, upright=upright, materials=False))
 
 
 def read_parts(path: Path, field: str = "mesh") -> list[trimesh.Trimesh]:
-    """Read a mesh file as `read_mesh` does, as one mesh for each material, with their colours."""
-    return _parts(path, field, materials=True)
+    """Read a mesh of a URDF as `read_mesh` does, as one mesh for each material, with their colours."""
+    return _parts(path, field, upright=False, materials=True)
 
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
@@ -101,7 +103,7 @@ def check_size(
     raise MeshError(path, field, f"{size:.4g} m", expected)
 
 
-def _parts(path: Path, field: str, *, materials: bool) -> list[trimesh.Trimesh]:
+def _parts(path: Path, field: str, *, upright: bool, materials: bool) -> list[trimesh.Trimesh]:
     """Read the parts of a mesh, and compare them with what the file says of itself."""
     declared = _declared(path, field)
     kind = path.suffix.lower()[1:]
@@ -125,8 +127,10 @@ def _parts(path: Path, field: str, *, materials: bool) -> list[trimesh.Trimesh]:
     for part in parts:
         if part.faces.min() < 0 or part.faces.max() >= len(part.vertices):
             raise MeshError(path, field, "a corner that is no vertex", "faces between the vertices")
-        if declared.to_metres is not None:
-            part.apply_transform(declared.to_metres)
+        if declared.unit != 1.0:
+            part.apply_scale(declared.unit)
+        if upright and declared.upright is not None:
+            part.apply_transform(declared.upright)
         if not np.isfinite(part.vertices).all():
             raise MeshError(path, field, "NaN or infinite", "finite vertices")
     return parts

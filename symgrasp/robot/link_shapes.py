@@ -32,12 +32,14 @@ class CollisionShape(NamedTuple):
             and z, negative ones mirror it.
         path: the file of a mesh, otherwise None.
         pose: pose (4, 4) in the frame of the link or obstacle; boxes, cylinders and spheres are centred.
+        upright: whether a mesh is turned to z up; see `symgrasp.meshes.read_mesh`.
     """
 
     kind: str
     size: tuple[float, ...]
     path: Path | None
     pose: Array
+    upright: bool = False
 
     def mesh(self, field: str) -> trimesh.Trimesh:
         """Read the mesh of a shape that is one, scaled, in the shape's own frame.
@@ -49,7 +51,7 @@ class CollisionShape(NamedTuple):
             MeshError: it cannot be read, or is too large or too small to be meant in metres.
         """
         assert self.path is not None
-        mesh = read_mesh(self.path, field)
+        mesh = read_mesh(self.path, field, upright=self.upright)
         vertices, faces = mesh.vertices * self.size, mesh.faces
         if np.prod(self.size) < 0:  # a mirror image is inside out
             faces = faces[:, ::-1]

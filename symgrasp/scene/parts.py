@@ -48,7 +48,7 @@ class Obstacle:
         The joints of a URDF are at their default values; the name is empty where there is no URDF.
         """
         if self.model is None:
-            return [("", CollisionShape(self.kind, self.size, self.path, np.eye(4)))]
+            return [("", CollisionShape(self.kind, self.size, self.path, np.eye(4), upright=True))]
         poses = self.model.forward(self.model.default_values())
         return [
             (link, shape._replace(pose=pose @ shape.pose))

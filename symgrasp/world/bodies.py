@@ -18,8 +18,8 @@ from symgrasp.world.collision import BodyName
 
 __all__ = ["MovableJoint", "SceneBodies"]
 
-MOST_TRIANGLES = 60_000
-"""PyBullet does not accept more triangles than this in one mesh."""
+MOST_TRIANGLES, MOST_VERTICES = 60_000, 130_000
+"""PyBullet does not accept more triangles or vertices than this in one mesh."""
 
 
 class MovableJoint(NamedTuple):
@@ -132,14 +132,13 @@ class SceneBodies:
         """
         field = f"obstacle {name}"
         mesh = shape.mesh(field)
-        if len(mesh.faces) > MOST_TRIANGLES:
-            expected = f"at most {MOST_TRIANGLES} triangles; simplify the mesh"
-            raise MeshError(shape.path, field, f"{len(mesh.faces)} triangles", expected)
-        merged = mesh.copy()
-        merged.merge_vertices()  # STL repeats every corner
-        if merged.is_watertight:
-            merged.apply_transform(pose)
-            self.closed_meshes.append((name, merged))
+        mesh.merge_vertices()  # STL repeats every corner
+        if len(mesh.faces) > MOST_TRIANGLES or len(mesh.vertices) > MOST_VERTICES:
+            value = f"{len(mesh.faces)} triangles between {len(mesh.vertices)} vertices"
+            expected = f"at most {MOST_TRIANGLES} between {MOST_VERTICES}; simplify the mesh"
+            raise MeshError(shape.path, field, value, expected)
+        if mesh.is_watertight:
+            self.closed_meshes.append((name, mesh.copy().apply_transform(pose)))
         return pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
             vertices=mesh.vertices.tolist(),
