@@ -239,10 +239,12 @@ def _ply(content: bytes) -> Declared:
 
 def _ply_text(body: bytes, elements: Sequence[_Element]) -> np.ndarray:
     """Return the number of corners (n,) of every face of a PLY file in text form."""
-    rows = body.split(b"\n")
+    rows = body.rstrip().split(b"\n")
     faces: list[int] = []
     for element in elements:
         own, rows = rows[: element.count], rows[element.count :]
+        if len(own) < element.count:
+            raise ValueError(f"{len(own)} of {element.count} rows for {element.name}")
         for words in (row.split() for row in own):
             at = 0
             for name, types in element.properties.items():
@@ -252,8 +254,6 @@ def _ply_text(body: bytes, elements: Sequence[_Element]) -> np.ndarray:
                     faces.append(size)
             if len(words) != at:
                 raise ValueError(f"a row of {len(words)} numbers in place of {at} for {element.name}")
-        if len(own) < element.count:
-            raise ValueError(f"{len(own)} of {element.count} rows for {element.name}")
     return np.array(faces)
 
 
