@@ -7,6 +7,7 @@ import logging
 import subprocess
 import sys
 import warnings
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -166,9 +167,8 @@ def glb(change: dict[str, Any] | None = None, instances: int = 1) -> bytes:
     }
     text = json.dumps(header).encode()
     text += b" " * (-len(text) % 4)
-    chunks = (
-        len(text).to_bytes(4, "little") + b"JSON" + text + len(data).to_bytes(4, "little") + b"BIN\0" + data
-    )
+    parts = ((b"JSON", text), (b"BIN\0", data))
+    chunks = b"".join(len(part).to_bytes(4, "little") + kind + part for kind, part in parts)
     return b"glTF" + (2).to_bytes(4, "little") + (12 + len(chunks)).to_bytes(4, "little") + chunks
 
 
@@ -193,11 +193,8 @@ def test_too_many_instances_are_refused_before_any_is_made(tmp_path, monkeypatch
     }
     assert str(2_000 * 2_000) in refused(write(tmp_path, "large.glb", glb(large, instances=2_000)))
     assert MOST_TRIANGLES < 2_000 * 2_000
-    header = (
-        f"ply\nformat ascii 1.0\nelement face {MOST_TRIANGLES + 1}\nproperty list uchar int vertex_indices\n"
-    )
-    rows = "3 0 1 2\n" * (MOST_TRIANGLES + 1)
-    assert "at most" in refused(write(tmp_path, "large.ply", header + "end_header\n" + rows))
+    soup = b" " * 80 + (MOST_TRIANGLES + 1).to_bytes(4, "little") + bytes(50 * (MOST_TRIANGLES + 1))
+    assert "at most" in refused(write(tmp_path, "large.stl", soup))
 
 
 ATTRIBUTES = {"attributes": {"POSITION": 0}, "indices": 1}
@@ -215,7 +212,8 @@ DAMAGED_GLB: dict[str, tuple[dict[str, Any], str]] = {
     "compressed": ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "KHR_draco_mesh_compression"),
     "a skin": ({"nodes": [{"mesh": 0, "skin": 0}]}, "bent"),
     "morphed": ({"meshes": [{"primitives": [{**ATTRIBUTES, "targets": [{"POSITION": 0}]}]}]}, "bent"),
-    "zeros without data": ({"accessors": [{"componentType": 5126, "count": 4_000_000_000, "type": "VEC3"}]}, "not"),
+    "zeros without data": ({"accessors": [
+        {"componentType": 5126, "count": 4_000_000_000, "type": "VEC3"}]}, "not in the file"),
     "corners that are none": ({"accessors": [
         {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
         {"bufferView": 1, "componentType": 5125, "count": 12, "type": "SCALAR"}]}, "corner"),
@@ -256,7 +254,7 @@ def test_obj_is_read_whatever_its_indices_count_from(tmp_path_factory, data):
             words = [form.format(k - len(points) if back else k + 1) for k in corners]
             split = data.draw(st.sampled_from([" ", " \\\n"]))
             lines.append("f " + split.join(words))
-            expected += [[corners[0], a, b] for a, b in zip(corners[1:], corners[2:], strict=False)]
+            expected += [[corners[0], a, b] for a, b in pairwise(corners[1:])]
     path = write(tmp_path_factory.mktemp("obj"), "wall.obj", "\n".join(lines))
     assert same_triangles(read_mesh(path).triangles, np.array(points, dtype=float)[np.array(expected)])
 
@@ -406,7 +404,7 @@ def test_files_that_are_no_mesh_are_refused(tmp_path, ending, caplog):
     tetrahedron().export(whole)
     with warnings.catch_warnings(), caplog.at_level(logging.WARNING):
         warnings.simplefilter("error")
-        for share in (0.3, 0.6, 0.9):
+        for share in (0.3, 0.6, 0.9) if ending != ".obj" else ():  # it does not say how long it is
             content = whole.read_bytes()
             refused(write(tmp_path, "cut" + ending, content[: int(share * len(content))]))
     assert not caplog.records
