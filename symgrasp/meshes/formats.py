@@ -206,12 +206,12 @@ class _Element(NamedTuple):
 
     Attributes:
         name: vertex, face or another.
-        count: number of rows.
+        rows: their number.
         properties: name → its type, or of a list the types of its length and its values.
     """
 
     name: str
-    count: int
+    rows: int
     properties: dict[str, tuple[str, ...]]
 
 
@@ -242,9 +242,9 @@ def _ply_text(body: bytes, elements: Sequence[_Element]) -> np.ndarray:
     rows = body.rstrip().split(b"\n")
     faces: list[int] = []
     for element in elements:
-        own, rows = rows[: element.count], rows[element.count :]
-        if len(own) < element.count:
-            raise ValueError(f"{len(own)} of {element.count} rows for {element.name}")
+        own, rows = rows[: element.rows], rows[element.rows :]
+        if len(own) < element.rows:
+            raise ValueError(f"{len(own)} of {element.rows} rows for {element.name}")
         for words in (row.split() for row in own):
             at = 0
             for name, types in element.properties.items():
@@ -266,7 +266,7 @@ def _ply_binary(body: bytes, elements: Sequence[_Element], order: str) -> np.nda
     faces = np.zeros(0, dtype=int)
     offset = 0
     for element in elements:
-        if not element.count:
+        if not element.rows:
             continue
         fields: list[tuple[str, str] | tuple[str, str, int]] = []
         for name, types in element.properties.items():
@@ -277,7 +277,7 @@ def _ply_binary(body: bytes, elements: Sequence[_Element], order: str) -> np.nda
                 fields.append((name, order + types[1], size))
             else:
                 fields.append((name, order + types[0]))
-        rows = np.frombuffer(body, np.dtype(fields), element.count, offset)
+        rows = np.frombuffer(body, np.dtype(fields), element.rows, offset)
         offset += rows.nbytes
         lengths = [name for name in rows.dtype.names or () if name.startswith("length of ")]
         if any((rows[name] != rows[name][0]).any() for name in lengths):

@@ -67,6 +67,8 @@ def load_urdf(client: int, model: RobotModel, pose: Array) -> int:
         UrdfError: PyBullet cannot load it, or a link has fewer shapes there.
         MeshError: a mesh is unusable.
     """
+    for link in model.colliding_links():
+        model.hulls(link)  # PyBullet takes a damaged mesh for an empty one
     with tempfile.TemporaryDirectory(prefix="symgrasp-") as folder:
         file = Path(folder, "model.urdf")
         file.write_bytes(_with_stl_meshes(model, Path(folder)))
@@ -84,7 +86,6 @@ def load_urdf(client: int, model: RobotModel, pose: Array) -> int:
         shapes = pybullet.getCollisionShapeData(body, i - 1, physicsClientId=client)
         expected = len(model.shapes(link))
         if len(shapes) < expected:
-            model.hulls(link)  # says what is wrong with a mesh
             found = f"{len(shapes)} shapes in PyBullet"
             raise UrdfError(model.path, f"link {link}: collision", found, f"{expected}, as in the URDF")
     return body

@@ -18,7 +18,7 @@ from symgrasp.object.measure.meridian import column_angles, cut, envelope
 from symgrasp.object.measure.mesh_io import read_single_object
 from symgrasp.object.measure.outline import distance_outside, simplify
 from symgrasp.object.profile import Profile
-from symgrasp.poses import from_position_quat, inverse
+from symgrasp.poses import from_position_quat, from_position_rpy, inverse
 
 MUG = Path(package_dir("pybullet_data") or "") / "objects/mug.obj"
 
@@ -68,7 +68,7 @@ def random_pose(rng: np.random.Generator) -> np.ndarray:
 
 def z_up(ending: str) -> np.ndarray:
     """Rotation (4, 4) of what is read from a file, relative to its numbers."""
-    return trimesh.transformations.rotation_matrix(np.pi / 2 if ending == ".glb" else 0.0, [1, 0, 0])
+    return from_position_rpy([0, 0, 0], [np.pi / 2 if ending == ".glb" else 0.0, 0, 0])
 
 
 def along(outline: np.ndarray) -> np.ndarray:
