@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
+from urllib.parse import unquote
 
 import yaml
 
@@ -73,22 +74,34 @@ def resolve(reference: str, folder: Path) -> Path | None:
 
     Args:
         reference: ``package://<package>/<path>``, ``file://<path>``, or a path relative to
-            ``folder``. Where no Python package of that name holds the file, the folders above
-            ``folder`` are searched for ``<package>/<path>``, as ROS packages are laid out.
+            ``folder``; as it is, or with ``%20`` for a space and the like. Where no Python package of
+            that name holds the file, the folders above ``folder`` are searched for
+            ``<package>/<path>``, as ROS packages are laid out.
         folder: folder of the file that holds the reference.
 
     Returns:
         The existing file, or None.
     """
+    candidates = [path for text in (reference, unquote(reference)) for path in _candidates(text, folder)]
+    return next((path for path in candidates if _is_file(path)), None)
+
+
+def _candidates(reference: str, folder: Path) -> list[Path]:
+    """Return the paths that a reference may stand for, in the order in which they are tried."""
     if not reference.startswith("package://"):
-        path = folder / reference.removeprefix("file://")
-        return path if path.is_file() else None
+        return [folder / reference.removeprefix("file://")]
     rest = reference.removeprefix("package://")
     package, _, inner = rest.partition("/")
     root = package_dir(package)
-    candidates = [root / inner] if root else []
-    candidates += [parent / rest for parent in (folder, *folder.parents)]
-    return next((path for path in candidates if path.is_file()), None)
+    inside = [root / inner] if root else []
+    return [*inside, *(parent / rest for parent in (folder, *folder.parents))]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that is too long, or has a null character
+        return False
 
 
 def file_sha256(path: Path) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from symgrasp.object.measure.mesh_io import MESH_ENDINGS
+from symgrasp.meshes import MESH_ENDINGS
 from symgrasp.scene.scene import Scene
 
 from ..state import changes

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 import viser
 
-from symgrasp.meshes import read_mesh
+from symgrasp.meshes import joined
 from symgrasp.poses import quat_wxyz
-from symgrasp.robot.model import RobotModel
+from symgrasp.robot.link_shapes import shape_mesh
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 
@@ -52,17 +53,21 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
         scene.add_cylinder(name, radius=o.size[0], height=o.size[1], radial_segments=48, **options)
     elif o.kind == "sphere":
         scene.add_icosphere(name, radius=o.size[0], **options)
-    elif o.kind == "mesh":
-        assert o.path is not None
-        mesh = read_mesh(o.path, f"obstacle {o.name}")
-        scene.add_mesh_simple(name, mesh.vertices, mesh.faces, side="double", flat_shading=True, **options)
     else:
-        assert o.path is not None
-        model = RobotModel(o.path)
-        set_pose(scene.add_frame(name, show_axes=False), o.T_world_obstacle)
-        poses = model.forward(model.default_values())
-        for link, node in add_links(client, name, model).items():
-            set_pose(node, poses[model.link_index(link)])
+        seen: Collection[str] = ()
+        if o.model is not None:
+            model = o.model
+            set_pose(scene.add_frame(f"{name}/links", show_axes=False), o.T_world_obstacle)
+            poses = model.forward(model.default_values())
+            seen = links = add_links(client, f"{name}/links", model)
+            for link, node in links.items():
+                set_pose(node, poses[model.link_index(link)])
+        bare = [shape_mesh(shape, f"obstacle {o.name}") for link, shape in o.shapes() if link not in seen]
+        if bare:  # what cannot be seen otherwise
+            mesh = joined(bare)
+            scene.add_mesh_simple(
+                f"{name}/shape", mesh.vertices, mesh.faces, side="double", flat_shading=True, **options
+            )
 
 
 def add_floor(client: viser.ClientHandle, name: str, scene: Scene, *, dark: bool) -> None:

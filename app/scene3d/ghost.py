@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from symgrasp.meshes import read_mesh
+from symgrasp.meshes import joined
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
+from symgrasp.robot.link_shapes import shape_mesh
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
@@ -61,7 +62,7 @@ def ghost(state: State) -> Ghost | None:
 
 def link_mesh(model: RobotModel, link: str) -> trimesh.Trimesh:
     """Return the convex collision shapes of a link as one mesh, in the link frame."""
-    return _joined([trimesh.convex.convex_hull(points) for points in model.hulls(link)])
+    return joined([trimesh.convex.convex_hull(points) for points in model.hulls(link)])
 
 
 def body_mesh(scene: Scene, body: BodyName, T_world_object: Array) -> tuple[trimesh.Trimesh, Array]:
@@ -79,35 +80,14 @@ def body_mesh(scene: Scene, body: BodyName, T_world_object: Array) -> tuple[trim
         return _inflated(link_mesh(robot.model, body.link)), pose
     for obstacle in scene.obstacles:
         if obstacle.name == body.body:
-            return _inflated(_obstacle_mesh(obstacle)), obstacle.T_world_obstacle
+            return _inflated(_obstacle_mesh(obstacle, body)), obstacle.T_world_obstacle
     return _inflated(scene.profile.mesh()), T_world_object
 
 
-def _obstacle_mesh(o: Obstacle) -> trimesh.Trimesh:
-    if o.kind == "box":
-        return trimesh.creation.box(extents=o.size)
-    if o.kind == "cylinder":
-        return trimesh.creation.cylinder(radius=o.size[0], height=o.size[1], sections=48)
-    if o.kind == "sphere":
-        return trimesh.creation.icosphere(radius=o.size[0])
-    assert o.path is not None
-    if o.kind == "mesh":
-        mesh = read_mesh(o.path, f"obstacle {o.name}")
-        return trimesh.Trimesh(mesh.vertices, mesh.faces)
-    model = RobotModel(o.path)
-    poses = model.forward(model.default_values())
-    parts = [
-        link_mesh(model, link).apply_transform(poses[model.link_index(link)])
-        for link in model.colliding_links()
-    ]
-    return _joined(parts)
-
-
-def _joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Return several meshes as one."""
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
-    return trimesh.Trimesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces), process=False)
+def _obstacle_mesh(o: Obstacle, body: BodyName) -> trimesh.Trimesh:
+    """Return the shapes of an obstacle, or of one link of it, in the obstacle's frame."""
+    shapes = [shape for link, shape in o.shapes() if link == body.link]
+    return joined([shape_mesh(shape, f"obstacle {body}") for shape in shapes])
 
 
 def _inflated(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -14,9 +15,7 @@ from trimesh.graph import smooth_shade
 from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from symgrasp.errors import MeshError
-from symgrasp.meshes import read_mesh
-from symgrasp.robot.model import RobotModel
+from symgrasp.meshes import read_parts
 from symgrasp.scene.scene import Scene
 
 __all__ = ["check_visuals", "link_visuals"]
@@ -72,10 +71,11 @@ def check_visuals(scene: Scene) -> None:
     for robot in scene.robots.values():
         link_visuals(robot.model.urdf)
     for o in scene.obstacles:
-        if o.kind == "urdf" and o.path:
-            link_visuals(RobotModel(o.path).urdf)
-        elif o.kind == "mesh" and o.path:
-            read_mesh(o.path, f"obstacle {o.name}")
+        if o.model is not None:
+            link_visuals(o.model.urdf)
+        for _, shape in o.shapes():
+            if shape.kind == "mesh":
+                shape.mesh(f"obstacle {o.name}")
 
 
 def _add_visual(
@@ -120,14 +120,7 @@ def _shapes(visual: yourdfpy.Visual, link: str) -> list[trimesh.Trimesh]:
     if geometry.sphere is not None:
         return [trimesh.creation.icosphere(subdivisions=3, radius=geometry.sphere.radius)]
     assert geometry.mesh is not None
-    path = geometry.mesh.filename
-    try:
-        loaded = trimesh.load_scene(path, process=False)
-        meshes = [m for m in loaded.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
-    except Exception as error:  # trimesh raises whatever its many parsers raise
-        raise MeshError(path, f"link {link}: visual", str(error), "a readable mesh") from error
-    if not meshes:
-        raise MeshError(path, f"link {link}: visual", "no triangles", "a mesh with triangles")
+    meshes = read_parts(Path(geometry.mesh.filename), f"link {link}: visual")
     for mesh in meshes:
         mesh.apply_scale(np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3))
     return meshes

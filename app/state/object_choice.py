@@ -8,9 +8,10 @@ from pathlib import Path
 
 from symgrasp.errors import InputError, MeshError, one_of
 from symgrasp.files import temporary_folder
+from symgrasp.meshes import MESH_ENDINGS
 from symgrasp.object.library import library_objects, load_object
 from symgrasp.object.measure.measurement import Measurement, measure_mesh
-from symgrasp.object.measure.mesh_io import LARGEST, MESH_ENDINGS, SMALLEST
+from symgrasp.object.measure.mesh_io import SIZES
 from symgrasp.object.profile import Profile
 
 __all__ = [
@@ -112,7 +113,7 @@ def from_mesh(name: str, content: bytes, scale: float, tolerance: float | None =
         except MeshError as error:
             expected = error.expected
             if error.field == "size":
-                expected = f"{SMALLEST:g} to {LARGEST:g} m; choose the unit of the mesh and upload it again"
+                expected = f"{SIZES[0]:g} to {SIZES[1]:g} m; choose the unit of the mesh and upload it again"
             elif error.field == "symmetry":
                 expected = expected.partition(" (")[0] + "; choose it and upload the mesh again"
             raise MeshError(name, error.field, error.value, expected) from None

@@ -15,12 +15,13 @@ from app.scene3d.backdrop import OBSTACLES
 from app.scene3d.visual_meshes import link_visuals
 from docs.figures.render import Body
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.meshes import read_mesh
+from symgrasp.meshes import joined
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.plan.plan import Hold, PlanTask
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
+from symgrasp.robot.link_shapes import shape_mesh
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Robot
 from symgrasp.scene.parts import Obstacle
@@ -98,19 +99,12 @@ def obstacles(scene: Scene, without: Collection[str] = ()) -> list[Body]:
 
 
 def _obstacle(o: Obstacle, color: Array) -> list[Body]:
-    if o.kind == "urdf":
-        assert o.path is not None
-        model = RobotModel(o.path)
-        return _links(model, o.T_world_obstacle @ model.forward(model.default_values()))
-    if o.kind == "box":
-        mesh = trimesh.creation.box(extents=o.size)
-    elif o.kind == "cylinder":
-        mesh = trimesh.creation.cylinder(*o.size, sections=96)
-    elif o.kind == "sphere":
+    if o.model is not None:
+        return _links(o.model, o.T_world_obstacle @ o.model.forward(o.model.default_values()))
+    if o.kind == "sphere":
         mesh = trimesh.creation.icosphere(subdivisions=4, radius=o.size[0])
     else:
-        assert o.path is not None
-        mesh = read_mesh(o.path, f"obstacle {o.name}")
+        mesh = joined([shape_mesh(shape, f"obstacle {o.name}", sides=96) for _, shape in o.shapes()])
     return [_body(_creased(mesh), o.T_world_obstacle, color)]
 
 

@@ -5,7 +5,6 @@ Needs the extra ``bench`` (``pip install 'symgrasp[bench]'``); importing this mo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import coal  # pyright: ignore[reportMissingImports]
@@ -13,10 +12,9 @@ import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
 
 from symgrasp.ik import ClosedFormIK
-from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, axis_frame
+from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.robot import Arm
-from symgrasp.scene.parts import Obstacle
 from symgrasp.world import BulletWorld, Shape, checked_self_pairs
 
 __all__ = ["BruteForce"]
@@ -37,7 +35,9 @@ class BruteForce:
 
     def __init__(self, world: BulletWorld, arm: Arm, ik: ClosedFormIK, T_world_object: Array) -> None:
         self.arm, self.ik = arm, ik
-        self._rounding = not any(o.kind == "mesh" for o in world.scene.obstacles)
+        self._rounding = not any(
+            shape.kind == "mesh" for o in world.scene.obstacles for _, shape in o.shapes()
+        )
         robot = arm.robot
         self._model = pinocchio.buildModelFromXML(robot.model.collision_urdf().decode())
         self._data = self._model.createData()
@@ -105,9 +105,9 @@ class BruteForce:
         axis = axis_frame(T_world_object)
         static = {"object": [add("object", axis, _hull(v)) for v in scene.profile.convex_pieces()]}
         static["rest"] = [
-            add(o.name, T @ o.T_world_obstacle if o.kind != "urdf" else T, shape)
+            add(o.name, o.T_world_obstacle @ shape.pose, _exact(shape, f"obstacle {o.name}"))
             for o in scene.obstacles
-            for T, shape in self._obstacle(world, o)
+            for _, shape in o.shapes()
         ]
         for name, other in scene.robots.items():
             if name != robot.name:
@@ -118,26 +118,6 @@ class BruteForce:
                     for shape in shapes
                 ]
         return static
-
-    def _obstacle(self, world: BulletWorld, o: Obstacle) -> Iterator[tuple[Array, Any]]:
-        """Yield (pose (4, 4), shape) of an obstacle, in its own frame; those of a URDF in the world."""
-        if o.kind == "box":
-            yield np.eye(4), coal.Box(*o.size)
-        elif o.kind == "cylinder":
-            yield np.eye(4), coal.Cylinder(*o.size)
-        elif o.kind == "sphere":
-            yield np.eye(4), coal.Sphere(o.size[0])
-        elif o.kind == "mesh":
-            assert o.path is not None
-            mesh = read_mesh(o.path, f"obstacle {o.name}")
-            yield np.eye(4), _triangles(mesh.vertices, mesh.faces)
-        else:
-            model = o.model
-            assert model is not None
-            links = o.T_world_obstacle @ model.forward(np.zeros(len(model.joint_names)))
-            for link, shapes in world.shapes(o.name).items():
-                for shape in shapes:
-                    yield links[model.link_index(link)], self._rounded(shape)
 
     def _add_pairs(self, own: dict[str, list[int]], static: dict[str, list[int]]) -> None:
         arm, scene_links = self.arm, set(own) - set(self.arm.robot.model.mount_links())
@@ -152,6 +132,18 @@ class BruteForce:
         pairs += [(a, b) for link in scene_links for a in own[link] for b in static["rest"]]
         for a, b in pairs:
             self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
+
+
+def _exact(shape: CollisionShape, field: str) -> Any:
+    """Return a shape of an obstacle as Coal has it."""
+    if shape.kind == "box":
+        return coal.Box(*shape.size)
+    if shape.kind == "cylinder":
+        return coal.Cylinder(*shape.size)
+    if shape.kind == "sphere":
+        return coal.Sphere(shape.size[0])
+    mesh = shape.mesh(field)
+    return _triangles(mesh.vertices, mesh.faces)
 
 
 def _points(vertices: Array) -> Any:

@@ -11,13 +11,12 @@ import numpy as np
 from symgrasp.engine.kinematics import MovingPieces
 from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.engine.tree import Tree, build
-from symgrasp.meshes import read_mesh
 from symgrasp.object.profile import COLLISION_FACETS
 from symgrasp.poses import Array, inverse
 from symgrasp.robot.joint import Joint
+from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm
-from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, BulletWorld, Shape, checked_self_pairs
 
@@ -105,7 +104,7 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
     own = [_Placed(BodyName(arm.robot.name, k), _piece(s), at_zero[model.link_index(k)]) for k, s in order]
     name = BodyName(scene.file.object.name, "")
     objects = [_Placed(name, _revolved(v), np.eye(4)) for v in scene.profile.convex_pieces()]
-    others = [*_obstacles(world), *_other_robots(world, arm)]
+    others = [*_obstacles(scene), *_other_robots(world, arm)]
     placed = [*own, *objects, *others]
 
     local = [inverse(frames[last_joint[p.name.link]]) @ p.pose for p in own[:moving_count]]
@@ -213,36 +212,26 @@ def _revolved(vertices: Array) -> Piece:
     return Piece(np.unique(np.round(knots, 12), axis=0), rounding=1e-11, slack=slack, revolved=True)
 
 
-def _obstacles(world: BulletWorld) -> Iterator[_Placed]:
+def _obstacles(scene: Scene) -> Iterator[_Placed]:
     """Yield the pieces of the obstacles; a mesh is one piece for each triangle."""
-    for o in world.scene.obstacles:
-        name, pose = BodyName(o.name, ""), o.T_world_obstacle
-        if o.kind == "urdf":
-            model = o.model
-            assert model is not None
-            links = pose @ model.forward(np.zeros(len(model.joint_names)))
-            yield from _links(world.shapes(o.name), o.name, model, links)
-        elif o.kind == "mesh":
-            for triangle in _triangles(o):
-                yield _Placed(name, Piece(triangle), pose)
-        else:
-            yield _Placed(name, _primitive(o), pose)
+    for o in scene.obstacles:
+        for link, shape in o.shapes():
+            name, pose = BodyName(o.name, link), o.T_world_obstacle @ shape.pose
+            for piece in _exact(shape, name):
+                yield _Placed(name, piece, pose)
 
 
-def _primitive(o: Obstacle) -> Piece:
-    """Return a box, cylinder or sphere as a piece in its own frame."""
-    if o.kind == "box":
-        return Piece((np.array(list(np.ndindex(2, 2, 2))) - 0.5) * o.size)
-    if o.kind == "cylinder":
-        radius, height = o.size
-        return Piece(np.array([[radius, 0.0, -0.5 * height], [radius, 0.0, 0.5 * height]]), revolved=True)
-    return Piece(np.zeros((1, 3)), rounding=o.size[0])
-
-
-def _triangles(o: Obstacle) -> Array:
-    """Return the triangles (n, 3, 3) of a mesh obstacle in its own frame."""
-    assert o.path is not None
-    return np.asarray(read_mesh(o.path, f"obstacle {o.name}").triangles, dtype=float)
+def _exact(shape: CollisionShape, name: BodyName) -> Iterator[Piece]:
+    """Yield the pieces of a shape in its own frame."""
+    if shape.kind == "box":
+        yield Piece((np.array(list(np.ndindex(2, 2, 2))) - 0.5) * shape.size)
+    elif shape.kind == "cylinder":
+        radius, height = shape.size
+        yield Piece(np.array([[radius, 0.0, -0.5 * height], [radius, 0.0, 0.5 * height]]), revolved=True)
+    elif shape.kind == "sphere":
+        yield Piece(np.zeros((1, 3)), rounding=shape.size[0])
+    else:
+        yield from map(Piece, np.asarray(shape.mesh(f"obstacle {name}").triangles))
 
 
 def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[_Placed]:

@@ -109,7 +109,9 @@ def pose_rows(poses: Array) -> Array:
 
 def _hull(points: Array) -> tuple[Array, np.ndarray | None]:
     """Return the vertices of the hull of points and, where it is large enough to climb on, its triangles."""
-    points = np.unique(np.asarray(points, dtype=float), axis=0)
+    points = np.asarray(points, dtype=float)
+    if len(points) > BRUTE:
+        points = np.unique(points, axis=0)
     if len(points) <= BRUTE:
         return points, None
     try:

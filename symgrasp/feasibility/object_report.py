@@ -12,9 +12,9 @@ import numpy as np
 from symgrasp.errors import InputError
 from symgrasp.feasibility import pictures
 from symgrasp.feasibility.fit import fit
+from symgrasp.meshes import MESH_ENDINGS
 from symgrasp.object.library import load_object
 from symgrasp.object.measure.measurement import Measurement, measure_mesh
-from symgrasp.object.measure.mesh_io import MESH_ENDINGS
 from symgrasp.object.profile import Profile
 from symgrasp.robot.hand import HANDS, Hand
 

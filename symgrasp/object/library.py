@@ -6,7 +6,7 @@ from pathlib import Path
 
 from symgrasp.errors import ProfileError, one_of
 from symgrasp.files import LARGEST_YAML, SCENES_DIR, parse_yaml, read_file
-from symgrasp.object.measure.mesh_io import MESH_ENDINGS
+from symgrasp.meshes import MESH_ENDINGS
 from symgrasp.object.profile import Profile
 
 __all__ = ["library_objects", "load_object"]
@@ -24,7 +24,7 @@ def load_object(name: str | Path, scale: float = 1.0) -> tuple[str, Profile]:
 
     Args:
         name: a name of the library; a YAML file with the keys ``name`` and ``profile``, knots
-            [height, radius] in metres; or a mesh (STL, OBJ, PLY, OFF or GLB).
+            [height, radius] in metres; or a mesh (DAE, GLB, OBJ, OFF, PLY or STL).
         scale: metres in one unit of a mesh.
 
     Returns:

@@ -77,7 +77,7 @@ class Profile:
         """Measure the object of revolution that a mesh shows, in any orientation and place.
 
         Args:
-            path: an STL, OBJ, PLY, OFF or GLB file.
+            path: a DAE, GLB, OBJ, OFF, PLY or STL file.
             scale: metres in one unit of the file.
             tolerance: largest deviation from symmetry (m), see
                 `symgrasp.object.measure.measurement.measure_mesh`.

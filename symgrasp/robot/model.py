@@ -14,11 +14,11 @@ import yourdfpy
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import UrdfError, one_of
-from symgrasp.files import file_sha256, resolve
+from symgrasp.files import file_sha256
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
 from symgrasp.robot.joint import Joint, joint_motion
-from symgrasp.robot.link_shapes import check_shape, collision_hull
+from symgrasp.robot.link_shapes import CollisionShape, collision_hull, link_shape
 
 __all__ = ["RobotModel"]
 
@@ -62,10 +62,10 @@ class RobotModel:
             root = _root_link(urdf)
         except Exception as error:  # the parser raises whatever its XML library raises
             raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
-        self._collisions = {link.name: list(link.collisions) for link in urdf.robot.links}
-        for link, shapes in self._collisions.items():
-            for shape in shapes:
-                check_shape(self.path, link, shape)
+        self._shapes = {
+            link.name: tuple(link_shape(self.path, link.name, shape) for shape in link.collisions)
+            for link in urdf.robot.links
+        }
         self.sha256 = self._content_sha256()
         self._hulls: dict[str, tuple[Array, ...]] = {}
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
@@ -74,24 +74,13 @@ class RobotModel:
         self.lower = np.array([by_name[name].lower for name in self.joint_names])
         self.upper = np.array([by_name[name].upper for name in self.joint_names])
 
-    def mesh_path(self, reference: str, link: str = "mesh") -> Path:
-        """Return the file behind a mesh reference of this URDF.
-
-        Raises:
-            UrdfError: there is no such file.
-        """
-        path = resolve(reference, self.path.parent)
-        if path is None:
-            raise UrdfError(self.path, f"link {link}", reference, "an existing mesh file")
-        return path
-
     def _content_sha256(self) -> str:
         """Hash the URDF and the files of its collision meshes; meshes that are only seen are left out."""
         digest = hashlib.sha256(self.urdf)
-        for link, shapes in self._collisions.items():
-            for mesh in (shape.geometry.mesh for shape in shapes if shape.geometry):
-                if mesh is not None:
-                    digest.update(self._file_sha256(self.mesh_path(mesh.filename, link)))
+        for shapes in self._shapes.values():
+            for shape in shapes:
+                if shape.path is not None:
+                    digest.update(self._file_sha256(shape.path))
         return digest.hexdigest()
 
     def _file_sha256(self, path: Path) -> bytes:
@@ -263,16 +252,16 @@ class RobotModel:
     def hulls(self, link: str) -> tuple[Array, ...]:
         """Return the vertices (n, 3) of the convex hull of each collision shape, in the link frame."""
         if link not in self._hulls:
-            hulls = []
-            for shape in self._collisions[link]:
-                origin = np.eye(4) if shape.origin is None else np.asarray(shape.origin, dtype=float)
-                hulls.append(collision_hull(shape, self.mesh_path, link) @ origin[:3, :3].T + origin[:3, 3])
-            self._hulls[link] = tuple(hulls)
+            self._hulls[link] = tuple(collision_hull(shape, link) for shape in self._shapes[link])
         return self._hulls[link]
+
+    def shapes(self, link: str) -> tuple[CollisionShape, ...]:
+        """Return the collision shapes of a link."""
+        return self._shapes[link]
 
     def has_shape(self, link: str) -> bool:
         """Whether a link has a collision shape."""
-        return bool(self._collisions[link])
+        return bool(self._shapes[link])
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may read a hull meanwhile."""
@@ -286,19 +275,27 @@ class RobotModel:
         return hash(self.sha256)
 
     def collision_urdf(self) -> bytes:
-        """Return the URDF without visual shapes, and with what PyBullet demands: masses and joint limits."""
+        """Return links and joints of the URDF, without visual shapes, in the form that PyBullet demands.
+
+        Every link has a mass, every mimic joint limits, and no line is long: it reads some kilobytes of each.
+        """
         root = ET.fromstring(self.urdf)
+        for other in [child for child in root if child.tag not in ("link", "joint")]:
+            root.remove(other)
         for joint in root.iter("joint"):
             if joint.find("mimic") is not None and joint.find("limit") is None:
                 ET.SubElement(joint, "limit", lower="0", upper="0", effort="0", velocity="0")  # not heeded
         for link in root.iter("link"):
-            for visual in link.findall("visual"):
-                link.remove(visual)
+            for other in [child for child in link if child.tag not in ("inertial", "collision")]:
+                link.remove(other)
+            for collision in link.iter("collision"):
+                collision.attrib.pop("concave", None)  # links are their convex hulls
             if link.find("inertial") is None:
                 inertial = ET.SubElement(link, "inertial")
                 ET.SubElement(inertial, "mass", value="1")
                 moments = {"ixx": "1", "ixy": "0", "ixz": "0", "iyy": "1", "iyz": "0", "izz": "1"}
                 ET.SubElement(inertial, "inertia", moments)
+        ET.indent(root)
         return ET.tostring(root)
 
 

@@ -280,6 +280,7 @@ class SceneBuilder:
             model = self._model(path, ())
             digest = model.sha256
         else:
+            size = 3 * (1.0 if o.scale is None else o.scale,)
             path = self._path(o.mesh or "")
             try:
                 digest = file_sha256(path)

@@ -205,13 +205,18 @@ class SphereFile(_Strict):
 
 
 class ObstacleFile(_Strict):
-    """A fixed body: exactly one shape, at a pose. Boxes give full sizes and are centred."""
+    """A fixed body: exactly one shape, at a pose. Boxes give full sizes and are centred.
+
+    A mesh, also one in a URDF, counts as its triangles: what is hollow stays hollow. ``scale`` is metres in
+    one unit of ``mesh``; of a format that states its unit, a factor on top of that.
+    """
 
     name: Name
     box: tuple[Positive, Positive, Positive] | None = None
     cylinder: CylinderFile | None = None
     sphere: SphereFile | None = None
     mesh: str | None = None
+    scale: Positive | None = None
     urdf: str | None = None
     pose: PoseFile = PoseFile()
 
@@ -219,6 +224,8 @@ class ObstacleFile(_Strict):
     def _one_shape(self) -> ObstacleFile:
         if sum(getattr(self, kind) is not None for kind in SHAPES) != 1:
             raise ValueError("exactly one of " + ", ".join(SHAPES))
+        if self.scale is not None and self.mesh is None:
+            raise ValueError("a scale only of a mesh")
         return self
 
 

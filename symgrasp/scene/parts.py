@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array
+from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.format import SceneFile
@@ -23,7 +26,7 @@ class Obstacle:
     Attributes:
         name: its name in the scene.
         kind: box, cylinder, sphere, mesh or urdf.
-        size: box: full sizes (3,); cylinder: radius, height; sphere: radius; otherwise empty.
+        size: box: full sizes (3,); cylinder: radius, height; sphere: radius; mesh: factors (3,); URDF: empty.
         path: the mesh or URDF file, otherwise None.
         T_world_obstacle: pose (4, 4) of its frame; boxes, cylinders and spheres are centred at the origin.
         model: the links of a URDF, otherwise None.
@@ -38,6 +41,20 @@ class Obstacle:
     T_world_obstacle: Array
     model: RobotModel | None = None
     file_sha256: str = ""
+
+    def shapes(self) -> list[tuple[str, CollisionShape]]:
+        """Return all shapes, posed in the obstacle's frame, each with the name of its link.
+
+        The joints of a URDF are at their default values; the name is empty where there is no URDF.
+        """
+        if self.model is None:
+            return [("", CollisionShape(self.kind, self.size, self.path, np.eye(4), upright=True))]
+        poses = self.model.forward(self.model.default_values())
+        return [
+            (link, shape._replace(pose=pose @ shape.pose))
+            for link, pose in zip(self.model.link_names, poses, strict=True)
+            for shape in self.model.shapes(link)
+        ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,18 +9,17 @@ import numpy as np
 import trimesh
 
 from symgrasp.errors import MeshError, SymgraspError
-from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array
+from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
-from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 from symgrasp.world.client import link_names, load_urdf, pybullet, xyzw
 from symgrasp.world.collision import BodyName
 
 __all__ = ["MovableJoint", "SceneBodies"]
 
-MOST_TRIANGLES = 60_000
-"""PyBullet does not accept more triangles than this in one mesh."""
+MOST_TRIANGLES, MOST_VERTICES = 60_000, 130_000
+"""PyBullet does not accept more triangles or vertices than this in one mesh."""
 
 
 class MovableJoint(NamedTuple):
@@ -57,9 +56,9 @@ class SceneBodies:
         names: body id → name in the scene.
         robots: name → body id.
         joints: name of a robot → its movable joints.
-        obstacles: body ids of the obstacles.
+        obstacles: body ids of the obstacles, one for each of their shapes.
         object: body ids of the object's convex pieces.
-        closed_meshes: (name, mesh in world coordinates) of every obstacle that is a closed mesh.
+        closed_meshes: (name, mesh in world coordinates) of every closed mesh of an obstacle.
     """
 
     def __init__(self, client: int, scene: Scene) -> None:
@@ -70,8 +69,12 @@ class SceneBodies:
             r.name: self._load_urdf(r.model, r.name, r.T_world_base) for r in scene.robots.values()
         }
         self.joints = {name: self._movable_joints(name, robot.model) for name, robot in scene.robots.items()}
-        self.closed_meshes: list[tuple[str, trimesh.Trimesh]] = []
-        self.obstacles = [self._load_obstacle(o) for o in scene.obstacles]
+        self.closed_meshes: list[tuple[BodyName, trimesh.Trimesh]] = []
+        self.obstacles = [
+            self._load_shape(BodyName(o.name, link), shape, o.T_world_obstacle @ shape.pose)
+            for o in scene.obstacles
+            for link, shape in o.shapes()
+        ]
         self.object = self._load_object(scene)
 
     def body_name(self, body: int, link: int) -> BodyName:
@@ -101,43 +104,41 @@ class SceneBodies:
             if j.source >= 0
         ]
 
-    def _load_obstacle(self, o: Obstacle) -> int:
-        if o.kind == "urdf":
-            assert o.model is not None
-            return self._load_urdf(o.model, o.name, o.T_world_obstacle)
+    def _load_shape(self, name: BodyName, shape: CollisionShape, pose: Array) -> int:
+        """Load a shape of an obstacle as a body of its own, at a pose (4, 4) in the world."""
         client = self.client
-        if o.kind == "box":
-            half = [0.5 * s for s in o.size]
-            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
-        elif o.kind == "cylinder":
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_CYLINDER, radius=o.size[0], height=o.size[1], physicsClientId=client
+        if shape.kind == "box":
+            half = [0.5 * s for s in shape.size]
+            made = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+        elif shape.kind == "cylinder":
+            radius, height = shape.size
+            made = pybullet.createCollisionShape(
+                pybullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=client
             )
-        elif o.kind == "sphere":
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_SPHERE, radius=o.size[0], physicsClientId=client
+        elif shape.kind == "sphere":
+            made = pybullet.createCollisionShape(
+                pybullet.GEOM_SPHERE, radius=shape.size[0], physicsClientId=client
             )
         else:
-            shape = self._mesh_shape(o)
-        return self._create_body(shape, o.name, o.T_world_obstacle)
+            made = self._mesh_shape(name, shape, pose)
+        return self._create_body(made, name, pose)
 
-    def _mesh_shape(self, o: Obstacle) -> int:
+    def _mesh_shape(self, name: BodyName, shape: CollisionShape, pose: Array) -> int:
         """Create the collision shape of a mesh from its surface, not its convex hull: hollows stay hollow.
 
         Distances to a surface do not tell that something lies inside it. For an arm this does not
         matter, because its links form a chain from its base outwards, and one of them crosses the surface.
         For the object it does, so closed meshes are kept in `closed_meshes`.
         """
-        assert o.path is not None
-        mesh = read_mesh(o.path, f"obstacle {o.name}")
-        if len(mesh.faces) > MOST_TRIANGLES:
-            expected = f"at most {MOST_TRIANGLES} triangles; simplify the mesh"
-            raise MeshError(o.path, f"obstacle {o.name}", f"{len(mesh.faces)} triangles", expected)
-        merged = mesh.copy()
-        merged.merge_vertices()  # STL repeats every corner
-        if merged.is_watertight:
-            merged.apply_transform(o.T_world_obstacle)
-            self.closed_meshes.append((o.name, merged))
+        field = f"obstacle {name}"
+        mesh = shape.mesh(field)
+        mesh.merge_vertices()  # STL repeats every corner
+        if len(mesh.faces) > MOST_TRIANGLES or len(mesh.vertices) > MOST_VERTICES:
+            value = f"{len(mesh.faces)} triangles between {len(mesh.vertices)} vertices"
+            expected = f"at most {MOST_TRIANGLES} between {MOST_VERTICES}; simplify the mesh"
+            raise MeshError(shape.path, field, value, expected)
+        if mesh.is_watertight:
+            self.closed_meshes.append((name, mesh.copy().apply_transform(pose)))
         return pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
             vertices=mesh.vertices.tolist(),
@@ -146,9 +147,9 @@ class SceneBodies:
             physicsClientId=self.client,
         )
 
-    def _create_body(self, shape: int, name: str, pose: Array) -> int:
+    def _create_body(self, shape: int, name: BodyName, pose: Array) -> int:
         if shape < 0:
-            raise SymgraspError(f"PyBullet cannot make the shape of {name!r}")
+            raise SymgraspError(f"PyBullet cannot make the shape of {name}")
         body = pybullet.createMultiBody(
             0.0,
             shape,
@@ -156,7 +157,7 @@ class SceneBodies:
             baseOrientation=xyzw(pose),
             physicsClientId=self.client,
         )
-        return self._register(body, name, [""])
+        return self._register(body, name.body, [name.link])
 
     def _load_object(self, scene: Scene) -> list[int]:
         bodies = []
@@ -164,5 +165,5 @@ class SceneBodies:
             shape = pybullet.createCollisionShape(
                 pybullet.GEOM_MESH, vertices=vertices.tolist(), physicsClientId=self.client
             )
-            bodies.append(self._create_body(shape, scene.file.object.name, np.eye(4)))
+            bodies.append(self._create_body(shape, BodyName(scene.file.object.name, ""), np.eye(4)))
         return bodies

@@ -140,8 +140,8 @@ class BulletWorld:
     # -- shapes -----------------------------------------------------------------------------
 
     def shapes(self, name: str) -> dict[str, list[Shape]]:
-        """Return the convex shapes of each link of a robot, or of an obstacle that is a URDF."""
-        body = next(body for body, own in self.bodies.names.items() if own == name)
+        """Return the convex shapes of each link of a robot."""
+        body = self.bodies.robots[name]
         links = enumerate(self.bodies.links[body], start=-1)
         return {link: shapes for index, link in links if (shapes := link_shapes(self._client, body, index))}
 
@@ -227,8 +227,8 @@ class BulletWorld:
         for name, mesh in self.bodies.closed_meshes:
             depth = depth_inside(mesh, middle[:3])
             if depth > 0:
-                names = (BodyName(self.scene.file.object.name, ""), BodyName(name, ""))
-                found.append(Collision(Reason.SCENE_COLLISION, *names, depth))
+                thing = BodyName(self.scene.file.object.name, "")
+                found.append(Collision(Reason.SCENE_COLLISION, thing, name, depth))
         return found
 
     def object_rests(self, T_world_object: ArrayLike) -> bool:

@@ -39,6 +39,23 @@ def synthetic(H, P, R0=None) -> Arm:
     return arm
 
 
+@pytest.mark.filterwarnings("error")
+def test_joints_that_turn_without_end():
+    """They have no limits to be outside of; the others keep theirs, silently."""
+    x, y, z = np.eye(3)
+    arm = synthetic(
+        [z, y, y, x, y, x], [[0, 0, 0.3], [0, 0, 0], [0.4, 0, 0], [0.35, 0, 0.03], *[[0, 0, 0]] * 3]
+    )
+    endless = [0, 3, 5]
+    arm.lower[endless], arm.upper[endless] = -np.inf, np.inf
+    solver = CompiledIK(arm, 1)
+    pose = from_position_quat([0.5, 0.1, 0.4], [0.5, 0.5, 0.5, 0.5])
+    found = solver.solve(pose)
+    assert len(found.q)
+    inside = (found.q >= arm.lower) & (found.q <= arm.upper)
+    assert np.array_equal(found.inside, inside.all(axis=1))
+
+
 @pytest.fixture(scope="module")
 def arms() -> dict[str, Arm]:
     scene = load_small("log_iiwa_and_panda")

@@ -35,7 +35,7 @@ class Measurement:
     """The object of revolution measured from a mesh: its profile, its pose and its deviation from symmetry.
 
     The object frame stands at the bottom end of the axis, z along it. Which end is the bottom: the
-    lower one where the axis is within 10° of the file's vertical (y in GLB, z otherwise); else
+    lower one where the axis is within 10° of the file's vertical; else
     the end that is not hollow; else the wider end; else the one that is lower along z. `flipped` stands it
     on its other end.
 
@@ -46,7 +46,7 @@ class Measurement:
             its vertices lie on. A flat step becomes two knots a few micrometres apart in height.
             The object sticks out of it by as much as `deviation` says, and nothing that is
             computed from the profile keeps a distance for that.
-        T_mesh_object: (4, 4) pose of the object frame in the file's frame, in metres.
+        T_mesh_object: (4, 4) pose of the object frame in the mesh's: metres, with z up whatever the file has.
         heights: (k,) heights of the rows of `deviation` (m).
         angles: (m,) angles of its columns (rad).
         deviation: (k, m) how far the surface lies outside the profile (m), negative inside: measured
@@ -107,7 +107,7 @@ def measure_mesh(
     Only the outer surface counts; the inside of a hollow object may have any shape.
 
     Args:
-        path: an STL, OBJ, PLY, OFF or GLB file.
+        path: a DAE, GLB, OBJ, OFF, PLY or STL file.
         scale: metres in one unit of the file.
         tolerance: largest deviation from symmetry (m). If not given, the larger of 1.5 mm and 3 % of the
             largest radius, but no more than 9 % of that radius: no polygon of 7 sides or fewer is taken
@@ -122,9 +122,7 @@ def measure_mesh(
     if tolerance is not None and not 0 < tolerance < np.inf:
         raise MeshError(source, "tolerance", tolerance, "a length in metres above zero")
     mesh = read_single_object(path, scale)
-    T_mesh_object = orient_upright(
-        mesh, find_axis(mesh), vertical=1 if source.lower().endswith(".glb") else 2
-    )
+    T_mesh_object = orient_upright(mesh, find_axis(mesh))
     surface = sample_surface(mesh, T_mesh_object)
     _check_closed(source, mesh, surface)
     curve = _measured_profile(surface)

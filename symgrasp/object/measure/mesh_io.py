@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -10,17 +9,14 @@ import trimesh
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from symgrasp.errors import MeshError, one_of
-from symgrasp.meshes import read_mesh
+from symgrasp.errors import MeshError
+from symgrasp.meshes import check_size, read_mesh
 from symgrasp.poses import Array
 
-__all__ = ["LARGEST", "MESH_ENDINGS", "SMALLEST", "read_single_object"]
+__all__ = ["SIZES", "read_single_object"]
 
-MESH_ENDINGS = (".glb", ".obj", ".off", ".ply", ".stl")
-"""File endings of the mesh formats that objects are measured from."""
-
-SMALLEST, LARGEST = 0.005, 10.0
-"""Range of sizes (m) of an object to be grasped; a mesh outside it is taken to be in other units."""
+SIZES = (0.005, 10.0)
+"""Smallest and largest size (m) of an object to be grasped; others are taken to be in other units."""
 
 CONTACT_GAP = 1e-4
 """Parts whose convex hulls come closer than this (m) belong to one object."""
@@ -33,11 +29,11 @@ FLAT_THICKNESS = 1e-4
 
 
 def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
-    """Read the mesh of a single object, in metres, with coinciding vertices and repeated faces merged.
+    """Read the mesh of a single object in metres with z up, coinciding vertices and repeated faces merged.
 
     Args:
-        path: an STL, OBJ, PLY, OFF or GLB file.
-        scale: metres in one unit of the file.
+        path: a file of a format that `symgrasp.meshes.read_mesh` knows.
+        scale: metres in one unit of the file; of a format that states its unit, a factor on top of that.
 
     Raises:
         MeshError: the file is missing, of another kind than its ending says, or damaged; it holds
@@ -47,10 +43,7 @@ def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     path = Path(path)
     if not (np.isfinite(scale) and scale > 0):
         raise MeshError(path, "scale", scale, "a number above zero: metres in one unit of the file")
-    _check_content(path)
     mesh = read_mesh(path, "content")
-    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
-        raise MeshError(path, "faces", int(mesh.faces.max()), f"vertices numbered below {len(mesh.vertices)}")
     mesh = trimesh.Trimesh(scale * mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices(digits_vertex=7)
     mesh.update_faces(mesh.unique_faces())  # exporters write a face twice to show both of its sides
@@ -58,60 +51,10 @@ def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     if not len(mesh.faces):
         raise MeshError(path, "surface", "no area", "triangles that enclose an object")
     mesh.remove_unreferenced_vertices()
-    _check_size(path, mesh, scale)
+    check_size(path, "size", mesh, SIZES, scale, "--scale")
     _check_not_flat(path, mesh)
     _check_one_object(path, mesh)
     return mesh
-
-
-def _check_content(path: Path) -> None:
-    """Raise MeshError unless the file can be read and its content is of the format that its ending says."""
-    ending = path.suffix.lower()
-    if ending not in MESH_ENDINGS:
-        raise MeshError(path, "ending", path.suffix, one_of(MESH_ENDINGS, ending))
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise MeshError(path, "file", error.strerror or str(error), "a mesh file that can be read") from error
-    if not content.strip():
-        raise MeshError(path, "content", "empty file", f"a mesh in {ending[1:].upper()} format")
-    kind = _ending_of_content(content)
-    if kind != ending:
-        found = f"{kind[1:].upper()} data" if kind else f"other or incomplete data ({len(content)} bytes)"
-        raise MeshError(path, "content", found, f"a complete {ending[1:].upper()} file, as its ending says")
-
-
-def _ending_of_content(content: bytes) -> str | None:
-    """Return the ending that fits the content of a mesh file, or None."""
-    if content.startswith(b"glTF"):
-        return ".glb"
-    if re.match(rb"ply\s", content):
-        return ".ply"
-    if re.match(rb"\s*(#[^\n]*\n\s*)*(ST)?C?N?4?n?OFF\b", content):
-        return ".off"
-    # Some binary STL files begin with "solid" as well, so their length is what tells.
-    if len(content) >= 84 and len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
-        return ".stl"
-    if re.match(rb"\s*solid\b", content) and b"endsolid" in content:
-        return ".stl"
-    if re.search(rb"^\s*v\s+[-+.\dnN]", content, re.MULTILINE):
-        return ".obj"
-    return None
-
-
-def _check_size(path: Path, mesh: trimesh.Trimesh, scale: float) -> None:
-    """Raise MeshError if the largest extent of the mesh is outside `SMALLEST` to `LARGEST`."""
-    size = float(mesh.extents.max())
-    if size > LARGEST:
-        raise MeshError(
-            path, "size", f"{size:.4g} m",
-            f"an object of at most {LARGEST:g} m; for a mesh in millimetres use --scale {scale / 1000:g}",
-        )  # fmt: skip
-    if size < SMALLEST:
-        raise MeshError(
-            path, "size", f"{size:.4g} m",
-            f"an object of at least {SMALLEST:g} m; lengths are in metres unless --scale says otherwise",
-        )  # fmt: skip
 
 
 def _check_not_flat(path: Path, mesh: trimesh.Trimesh) -> None:

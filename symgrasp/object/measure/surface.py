@@ -89,17 +89,16 @@ def _levels(heights: Array) -> tuple[Array, np.ndarray]:
     return levels, first < count
 
 
-def orient_upright(mesh: trimesh.Trimesh, T_mesh_axis: Array, vertical: int) -> Array:
+def orient_upright(mesh: trimesh.Trimesh, T_mesh_axis: Array) -> Array:
     """Return an axis frame (4, 4) whose z axis points from the bottom to the top of the object.
 
     Args:
         mesh: the mesh.
         T_mesh_axis: pose (4, 4) whose z axis is the axis of revolution, pointing either way.
-        vertical: index of the file's vertical coordinate.
     """
     axis, origin = T_mesh_axis[:3, 2], T_mesh_axis[:3, 3]
-    if abs(axis[vertical]) >= UPRIGHT:
-        return frame_along(axis * np.sign(axis[vertical]), origin)
+    if abs(axis[2]) >= UPRIGHT:
+        return frame_along(axis * np.sign(axis[2]), origin)
     surface = sample_surface(mesh, T_mesh_axis)
     upright = _points_up(surface)
     if upright is None:
