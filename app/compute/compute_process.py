@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from symgrasp.errors import Cancelled, NoPlanError
@@ -25,6 +26,7 @@ from ..state.requests import (
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
 from .plan_service import OpenedPlan, PlanOutcome, PlanRequest
 from .process_pool import ProcessPool, WorkerProcess
+from .turns import Turn
 
 __all__ = ["ComputeProcess", "ProcessDied"]
 
@@ -143,23 +145,24 @@ class ComputeProcess:
             args: of the method, besides its progress.
             maps: the maps that it may compute.
         """
-        process = self._ready(progress)
-        self._requests = {(request.task, request.arm): request for request in maps}
-        self._computed = []
-        process.job_id += 1
-        try:
-            process.channel.send(Call(process.job_id, method, args))
-            return self._follow(process, progress)
-        except Cancelled:
-            process.cancelled_at = time.monotonic()
-            with suppress(OSError):  # it is dead already, which the next call notices
-                process.channel.send(Cancel(process.job_id))
-            raise
-        except (EOFError, OSError) as error:
-            self._process = None
-            how = process.end(grace=1.0)  # a pipe may end a little before its process does
-            text = f"the process that computes ended unexpectedly ({how or 'it hung up'})"
-            raise ProcessDied(text) from error
+        with self._pool.turns.take(lambda: progress(0.0)) as turn:
+            process = self._ready(progress)
+            self._requests = {(request.task, request.arm): request for request in maps}
+            self._computed = []
+            process.job_id += 1
+            try:
+                process.channel.send(Call(process.job_id, method, args, turn.cores))
+                return self._follow(process, turn, progress)
+            except Cancelled:
+                process.cancelled_at = time.monotonic()
+                with suppress(OSError):  # it is dead already, which the next call notices
+                    process.channel.send(Cancel(process.job_id))
+                raise
+            except (EOFError, OSError) as error:
+                self._process = None
+                how = process.end(grace=1.0)  # a pipe may end a little before its process does
+                text = f"the process that computes ended unexpectedly ({how or 'it hung up'})"
+                raise ProcessDied(text) from error
 
     def _ready(self, progress: Progress) -> WorkerProcess:
         """Return an idle process: the present one, once a cancelled call has ended, or a new one."""
@@ -189,10 +192,16 @@ class ComputeProcess:
                 return
             progress(0.0)
 
-    def _follow(self, process: WorkerProcess, progress: Progress) -> Any:
+    def _follow(self, process: WorkerProcess, turn: Turn, progress: Progress) -> Any:
         """Receive messages until the call under way ends, and return its result."""
         channel, share = process.channel, 0.0
         while True:
+            if turn.is_over:
+                process.pause()
+                try:
+                    turn.renew(partial(progress, share))
+                finally:
+                    process.resume()
             if not channel.poll(POLL_INTERVAL):
                 progress(share)
                 continue

@@ -14,6 +14,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import numba
+
 from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
@@ -30,6 +32,9 @@ log = logging.getLogger(__name__)
 REPORT_INTERVAL = 0.03
 """Time (s) between two reports of the progress."""
 
+NICENESS = 10
+"""By how much its priority is lower than the server's, which has to answer at once."""
+
 
 def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
     """Answer calls until the connection is closed.
@@ -38,6 +43,7 @@ def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
         pipe: to the process that started this one.
         folders: where the files of an uploaded scene may lie.
     """
+    os.nice(NICENESS)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the server, which closes the pipe
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
@@ -71,6 +77,7 @@ class _Server:
             message = self._channel.receive()
             if isinstance(message, Call):  # else it cancels a call that has ended
                 self._job_id, self._reported = message.job_id, 0.0
+                numba.set_num_threads(min(message.cores, numba.config.NUMBA_NUM_THREADS))
                 self._channel.send(self._answer(message))
 
     def _answer(self, call: Call) -> Result | Failure:

@@ -43,17 +43,12 @@ class ObjectPanel(Panel):
             f"{', '.join(ending[1:].upper() for ending in MESH_ENDINGS)}; at most {UPLOAD_LIMIT / 1e6:g} MB"
         )
         self.unit = self.dropdown("Mesh unit", tuple(UNITS), hint="What one unit of an uploaded mesh is.")
-        self.upload = gui.add_upload_button(
+        self.upload = self.upload_button(
             "Upload a mesh",
-            icon=viser.Icon.UPLOAD,
-            color="gray",
+            UPLOAD_LIMIT,
+            lambda name, content: self.actions.upload_object(name, content, UNITS[self.unit.value]),
             mime_type=",".join(MESH_ENDINGS),
             hint=limit,
-        )
-        self.upload.on_upload(
-            lambda _: self.actions.upload_object(
-                self.upload.value.name, self.upload.value.content, UNITS[self.unit.value]
-            )
         )
         self.surface_colors = self.dropdown("Colours", SURFACE_COLORS, visible=False)
         self.on(self.surface_colors, lambda s, v: changes.switched(s, symmetry_error=v == SURFACE_COLORS[1]))

@@ -32,7 +32,7 @@ from ..state.state import State
 from ..state.undo import remember
 from .actions import Actions, camera_of
 from .playback_clock import PlaybackClock
-from .proxy import Visit
+from .front_door import BrowserConnection, Visit
 
 __all__ = ["Session"]
 
@@ -54,10 +54,10 @@ class Session:
 
     Args:
         client: the browser.
+        connection: to it.
         cache: what all sessions share.
         pool: starts the process that computes.
         visit: the address it opened, which may say what to show first.
-        loop: viser's event loop.
 
     Attributes:
         state: what is shown; None before the first scene is loaded.
@@ -66,12 +66,12 @@ class Session:
     def __init__(
         self,
         client: viser.ClientHandle,
+        connection: BrowserConnection,
         cache: SharedCache,
         pool: ProcessPool,
         visit: Visit,
-        loop: asyncio.AbstractEventLoop,
     ) -> None:
-        self.client, self.cache, self.visit, self._loop = client, cache, visit, loop
+        self.client, self.cache, self.visit, self._connection = client, cache, visit, connection
         self.state: State | None = None
         self._job_ids = itertools.count(1)
         self._changed = threading.Condition(threading.Lock())
@@ -91,7 +91,8 @@ class Session:
     def _build_page(self) -> None:
         """Add everything to the page, start the drawing thread, and open the first scene."""
         client = self.client
-        self.actions = Actions(self, client, self.cache, self.process, self.visit.address)
+        buttons = self._connection.upload_buttons
+        self.actions = Actions(self, client, self.cache, self.process, self.visit.address, buttons)
         self.layout = Layout(client, self.actions, self.cache.names)
         self.scene_view = SceneView(
             client,
@@ -278,7 +279,7 @@ class Session:
         try:
             self.layout.show(state)
             if write_inputs:
-                asyncio.run_coroutine_threadsafe(self._inputs_written(state), self._loop).result()
+                asyncio.run_coroutine_threadsafe(self._inputs_written(state), self._connection.loop).result()
             self.scene_view.show(state, move_gizmo=move_gizmo)
         except Exception as error:  # must not end the drawing thread
             log.exception("a picture could not be drawn")

@@ -15,7 +15,7 @@ import zstandard
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
-from app.server.proxy import HELLO
+from app.server.front_door import HELLO
 
 WAIT = 60.0
 
