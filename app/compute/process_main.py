@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import multiprocessing
 import os
 import pickle
 import signal
@@ -44,6 +45,8 @@ def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
         folders: where the files of an uploaded scene may lie.
     """
     os.nice(NICENESS)
+    # Else numba makes a lock for processes forked from this one, which is left behind when it is killed.
+    multiprocessing.set_start_method("spawn", force=True)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the server, which closes the pipe
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
@@ -77,7 +80,7 @@ class _Server:
             message = self._channel.receive()
             if isinstance(message, Call):  # else it cancels a call that has ended
                 self._job_id, self._reported = message.job_id, 0.0
-                numba.set_num_threads(min(message.cores, numba.config.NUMBA_NUM_THREADS))
+                numba.set_num_threads(message.cores)
                 self._channel.send(self._answer(message))
 
     def _answer(self, call: Call) -> Result | Failure:

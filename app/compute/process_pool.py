@@ -9,7 +9,6 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
-from . import process_main
 from .channel import Channel
 from .process_main import serve
 from .turns import Turns
@@ -18,7 +17,7 @@ __all__ = ["ProcessPool", "WorkerProcess"]
 
 # A process that only imports what all need, and is copied for each: they share its memory and start at once.
 PROCESSES = multiprocessing.get_context("forkserver")
-PROCESSES.set_forkserver_preload([process_main.__name__])
+PROCESSES.set_forkserver_preload([f"{__package__}.preload"])
 
 
 class WorkerProcess:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
+
+import numba
 
 __all__ = ["Turn", "Turns"]
 
@@ -21,11 +22,11 @@ class Turns:
     """A line in which computations wait for their turn, first come, first served; thread-safe.
 
     Args:
-        count: how many may compute at the same time; by default as many as this process has cores.
+        count: how many may compute at the same time.
     """
 
-    def __init__(self, count: int = 0) -> None:
-        self._count = count or len(os.sched_getaffinity(0))
+    def __init__(self, count: int = numba.config.NUMBA_NUM_THREADS) -> None:
+        self._count = count
         self._changed = threading.Condition()
         self._line: deque[object] = deque()
         self._running = 0
