@@ -26,7 +26,7 @@ from ..state.requests import (
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
 from .plan_service import OpenedPlan, PlanOutcome, PlanRequest
 from .process_pool import ProcessPool, WorkerProcess
-from .turns import Turn
+from .turns import Place
 
 __all__ = ["ComputeProcess", "ProcessDied"]
 
@@ -51,6 +51,7 @@ class ComputeProcess:
         pool: starts the process.
         keep: called with every computed map.
         compiling: called when the process begins to compile code.
+        waiting: called while others have to compute first.
     """
 
     def __init__(
@@ -58,8 +59,10 @@ class ComputeProcess:
         pool: ProcessPool,
         keep: Callable[[MapResult], None] = lambda _: None,
         compiling: Callable[[], None] = lambda: None,
+        waiting: Callable[[], None] = lambda: None,
     ) -> None:
-        self._pool, self._keep, self._compiling = pool, keep, compiling
+        self._pool, self._keep, self._compiling, self._waiting = pool, keep, compiling, waiting
+        self._place = Place(pool.turns)
         self._process: WorkerProcess | None = None
         self._planner: WorkerProcess | None = None
         self._requests: dict[tuple[str, str], MapRequest] = {}
@@ -145,14 +148,14 @@ class ComputeProcess:
             args: of the method, besides its progress.
             maps: the maps that it may compute.
         """
-        with self._pool.turns.take(lambda: progress(0.0)) as turn:
+        with self._place.turn(partial(self._wait, progress, 0.0)):
             process = self._ready(progress)
             self._requests = {(request.task, request.arm): request for request in maps}
             self._computed = []
             process.job_id += 1
             try:
-                process.channel.send(Call(process.job_id, method, args, turn.cores))
-                return self._follow(process, turn, progress)
+                process.channel.send(Call(process.job_id, method, args, self._place.cores))
+                return self._follow(process, progress)
             except Cancelled:
                 process.cancelled_at = time.monotonic()
                 with suppress(OSError):  # it is dead already, which the next call notices
@@ -192,14 +195,14 @@ class ComputeProcess:
                 return
             progress(0.0)
 
-    def _follow(self, process: WorkerProcess, turn: Turn, progress: Progress) -> Any:
+    def _follow(self, process: WorkerProcess, progress: Progress) -> Any:
         """Receive messages until the call under way ends, and return its result."""
         channel, share = process.channel, 0.0
         while True:
-            if turn.is_over:
+            if self._place.is_over:
                 process.pause()
                 try:
-                    turn.renew(partial(progress, share))
+                    self._place.renew(partial(self._wait, progress, share))
                 finally:
                     process.resume()
             if not channel.poll(POLL_INTERVAL):
@@ -219,6 +222,10 @@ class ComputeProcess:
                 raise message.error
             else:
                 return message.value
+
+    def _wait(self, progress: Progress, share: float) -> None:
+        self._waiting()
+        progress(share)
 
     def _receive_map(self, computed: ComputedMap) -> None:
         self._computed.append(computed)

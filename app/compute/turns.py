@@ -5,11 +5,12 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numba
 
-__all__ = ["Turn", "Turns"]
+__all__ = ["Place", "Turns"]
 
 SLICE = 1.0
 """Time (s) after which a computation makes room for one that waits."""
@@ -28,45 +29,36 @@ class Turns:
     def __init__(self, count: int = numba.config.NUMBA_NUM_THREADS) -> None:
         self._count = count
         self._changed = threading.Condition()
-        self._line: deque[object] = deque()
+        self._line: deque[Place] = deque()
         self._running = 0
 
-    def take(self, waiting: Callable[[], None]) -> Turn:
-        """Wait for a turn and return it; to be used in a ``with`` statement, which ends it.
-
-        Args:
-            waiting: called again and again meanwhile; what it raises ends the waiting.
-        """
-        turn = Turn(self)
-        turn._begin(waiting)
-        return turn
-
-    def _enter(self, waiting: Callable[[], None]) -> int:
-        """Wait; return how many cores the turn may use."""
-        me = object()
+    def _join(self, place: Place) -> None:
         with self._changed:
-            self._line.append(me)
-        try:
-            while not (cores := self._admitted(me)):
-                waiting()
-        except BaseException:
-            with self._changed:
-                self._line.remove(me)
-                self._changed.notify_all()
-            raise
-        return cores
+            place._wanted = True
+            if place not in self._line:
+                self._line.append(place)
 
-    def _admitted(self, me: object) -> int:
+    def _admit(self, place: Place) -> bool:
+        """Wait for a moment; return whether it is this place's turn, which begins then."""
+
         def is_next() -> bool:
-            return self._line[0] is me and self._running < self._count
+            while not self._line[0]._wanted:
+                self._line.popleft()
+            return self._line[0] is place and self._running < self._count
 
         with self._changed:
             if not self._changed.wait_for(is_next, POLL_INTERVAL):
-                return 0
+                return False
             self._line.popleft()
             self._running += 1
+            place.cores = max(1, self._count // self._running)
             self._changed.notify_all()
-            return max(1, self._count // self._running)
+            return True
+
+    def _abandon(self, place: Place) -> None:
+        with self._changed:
+            place._wanted = False
+            self._changed.notify_all()
 
     def _leave(self) -> None:
         with self._changed:
@@ -75,40 +67,60 @@ class Turns:
 
     @property
     def _is_awaited(self) -> bool:
-        return bool(self._line)
+        with self._changed:
+            return any(place._wanted for place in self._line)
 
 
-class Turn:
-    """The right to compute, for a while; used by one thread.
+class Place:
+    """The place in the line of one who computes one thing after another; used by one thread.
+
+    If the waiting for a turn is broken off, the next turn is waited for at the same place, unless that has
+    come to the front meanwhile: whoever always wants something newer gets a turn all the same.
+
+    Args:
+        turns: the line.
 
     Attributes:
-        cores: how many cores it may use.
+        cores: how many cores may be used during the turn.
     """
 
     def __init__(self, turns: Turns) -> None:
         self._turns = turns
-        self._held = False
+        self._wanted = self._held = False
         self._since = 0.0
         self.cores = 0
 
-    def __enter__(self) -> Turn:
-        return self
+    @contextmanager
+    def turn(self, waiting: Callable[[], None]) -> Iterator[None]:
+        """Wait for a turn, which lasts as long as the ``with`` block.
 
-    def __exit__(self, *_: object) -> None:
-        self._end()
+        Args:
+            waiting: called again and again meanwhile; what it raises ends the waiting.
+        """
+        self._begin(waiting)
+        try:
+            yield
+        finally:
+            self._end()
 
     @property
     def is_over(self) -> bool:
-        """Whether it has lasted for `SLICE` and somebody waits."""
+        """Whether the turn has lasted for `SLICE` and somebody waits."""
         return time.monotonic() - self._since > SLICE and self._turns._is_awaited
 
     def renew(self, waiting: Callable[[], None]) -> None:
-        """End the turn and wait for another, at the end of the line; see `Turns.take`."""
+        """Let others go first, and wait for the rest of the turn; see `turn`."""
         self._end()
         self._begin(waiting)
 
     def _begin(self, waiting: Callable[[], None]) -> None:
-        self.cores = self._turns._enter(waiting)
+        self._turns._join(self)
+        try:
+            while not self._turns._admit(self):
+                waiting()
+        except BaseException:
+            self._turns._abandon(self)
+            raise
         self._held, self._since = True, time.monotonic()
 
     def _end(self) -> None:

@@ -52,8 +52,8 @@ ANSWER_TIMEOUT = 60.0
 HELLO_TIMEOUT = 60.0
 """Time (s) within which a websocket's page must load its picture."""
 
-PING_TIMEOUT = 60.0
-"""Time (s) after which a browser that answers no ping is gone; one that is slowed down answers late."""
+GONE_TIMEOUT = 60.0
+"""Time (s) after which a browser is gone whose machine does not acknowledge what it is sent."""
 
 MAX_REQUESTS = 256
 """How many connections may be about to be answered; further ones are closed at once."""
@@ -267,6 +267,8 @@ class FrontDoor:
         self._loopback = _is_loopback(host)
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         self._socket = socket.create_server(address[:2], family=family)
+        # The machine acknowledges for a browser that is slowed down, whose answers to pings come late.
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1000 * GONE_TIMEOUT))
         self._browsers: set[BrowserConnection] = set()
 
     def serve(
@@ -297,7 +299,7 @@ class FrontDoor:
             connection.request_received()
             return self._refusal(connection, request) or process_request(connection, request)
 
-        options |= {"max_size": MESSAGE_LIMIT, "open_timeout": ANSWER_TIMEOUT, "ping_timeout": PING_TIMEOUT}
+        options |= {"max_size": MESSAGE_LIMIT, "open_timeout": ANSWER_TIMEOUT, "ping_timeout": None}
         return serve(
             handle,
             sock=self._socket,

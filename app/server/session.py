@@ -80,7 +80,9 @@ class Session:
         self._writing = False
         self._closed = False
         self._playback = PlaybackClock()
-        self.process = ComputeProcess(pool, cache.keep, lambda: self.jobs.compiling())
+        self.process = ComputeProcess(
+            pool, cache.keep, lambda: self.jobs.compiling(), lambda: self.jobs.waiting()
+        )
         self.jobs = JobQueue(f"jobs {client.client_id}", self.process.close)
         try:
             self._build_page()
@@ -214,6 +216,7 @@ class Session:
             run,
             progress,
             compiling=lambda: self.change(lambda s: job_changes.compiling(s, job_id)),
+            waiting=lambda: self.change(lambda s: job_changes.waiting(s, job_id)),
             done=done,
             failed=lambda problem: self._failed(job_id, problem),
         )

@@ -180,6 +180,7 @@ class Busy:
         share: how much of it is done, 0 to 1.
         late: whether it takes so long that the page shows it and newer requests interrupt it.
         compiling: whether code has to be compiled for it.
+        waiting: whether computations of others go first.
     """
 
     job_id: int
@@ -188,6 +189,7 @@ class Busy:
     share: float = 0.0
     late: bool = False
     compiling: bool = False
+    waiting: bool = False
 
     def goes_before(self, request: Request) -> bool:
         """Return whether a request waits for this computation instead of taking its place.
