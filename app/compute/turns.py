@@ -42,9 +42,11 @@ class Turns:
         """Wait for a moment; return whether it is this place's turn, which begins then."""
 
         def is_next() -> bool:
+            if self._running == self._count:
+                return False
             while not self._line[0]._wanted:
                 self._line.popleft()
-            return self._line[0] is place and self._running < self._count
+            return self._line[0] is place
 
         with self._changed:
             if not self._changed.wait_for(is_next, POLL_INTERVAL):
@@ -74,8 +76,8 @@ class Turns:
 class Place:
     """The place in the line of one who computes one thing after another; used by one thread.
 
-    If the waiting for a turn is broken off, the next turn is waited for at the same place, unless that has
-    come to the front meanwhile: whoever always wants something newer gets a turn all the same.
+    If the waiting for a turn is broken off, the next turn is waited for at the same place, unless its turn
+    has come meanwhile: whoever always wants something newer gets a turn all the same.
 
     Args:
         turns: the line.

@@ -12,8 +12,13 @@ import viser
 from viser.infra import Message
 
 from app.server import viser_server
-from app.server.viser_server import AsyncMessageBuffer, WakingBuffer, quiet_server
+from app.server.front_door import FrontDoor
+from app.server.viser_server import AsyncMessageBuffer, WakingBuffer, any_port, quiet_server
 from tests.app.wire import Wire
+
+
+def a_door() -> FrontDoor:
+    return FrontDoor("127.0.0.1", any_port(), lambda visit: True, 16)
 
 
 @dataclasses.dataclass
@@ -84,7 +89,7 @@ def test_every_browser_is_served_from_such_a_buffer(monkeypatch):
             super().push(message)
 
     monkeypatch.setattr(viser_server, "WakingBuffer", Watched)
-    server = quiet_server()
+    server = quiet_server(a_door())
     server.scene.add_frame("/everybody")
 
     @server.on_client_connect
@@ -97,7 +102,7 @@ def test_every_browser_is_served_from_such_a_buffer(monkeypatch):
     finally:
         server.stop()
     monkeypatch.undo()
-    quiet_server().stop()  # the next one has viser make the buffers of the application again
+    quiet_server(a_door()).stop()  # the next one has viser make the buffers of the application again
     to_all = {id(buffer) for buffer, message in pushed if "/everybody" in str(message)}
     to_one = {id(buffer) for buffer, message in pushed if "hello" in str(message)}
     assert len(to_all) == len(to_one) == 1
@@ -118,6 +123,6 @@ def test_servers_start_and_stop_without_a_word_and_leave_standard_output_to_othe
             super().stop()
 
     monkeypatch.setattr(viser, "ViserServer", Watched)
-    quiet_server().stop()
+    quiet_server(a_door()).stop()
     assert outs == [sys.stdout, sys.stdout]
     assert capsys.readouterr().out == ""
