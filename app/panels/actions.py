@@ -50,7 +50,7 @@ class Actions(Protocol):
         """
 
     def limit_uploads(self, button: viser.GuiUploadButtonHandle, limit: int) -> None:
-        """Let a button take files of a size (bytes); a larger one is refused before it is sent."""
+        """Let a button take files of a size (bytes); a larger one is refused when it is announced."""
 
     def open_scene(self, name: str) -> None:
         """Open a scene by its name in the menu."""

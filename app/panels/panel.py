@@ -66,7 +66,7 @@ class Panel:
 
         Args:
             label: on the button.
-            limit: largest file (bytes) that is taken; a larger one is refused before it is sent.
+            limit: largest file (bytes) that is taken; a larger one is refused when it is announced.
             action: what to run.
             options: further ones of `viser.GuiApi.add_upload_button`.
         """

@@ -149,7 +149,7 @@ class Actions:
     # -- files ------------------------------------------------------------------------------
 
     def limit_uploads(self, button: viser.GuiUploadButtonHandle, limit: int) -> None:
-        """Let a button take files of a size (bytes); a larger one is refused before it is sent."""
+        """Let a button take files of a size (bytes); a larger one is refused when it is announced."""
         uuid = button._impl.uuid
 
         def refuse(name: str, size: int, transfer: str) -> None:

@@ -58,16 +58,22 @@ GONE_TIMEOUT = 60.0
 MAX_REQUESTS = 256
 """How many connections may be about to be answered; further ones are closed at once."""
 
-MESSAGE_LIMIT = 1 << 20
-"""Largest message (bytes) from a browser; files come in parts of half of it."""
+PART_LIMIT = 1 << 20
+"""Largest message (bytes) with a part of a file; browsers send half of it."""
+
+MESSAGE_LIMIT = 1 << 16
+"""Largest other message (bytes)."""
 
 READ_RATE, READ_BURST = 1000.0, 1000.0
 """How many messages per second are read from one browser, and how many at once."""
 
+MESSAGE_BYTES = 1 << 14
+"""How many bytes of a message count as another message."""
+
 HANDLE_RATE, HANDLE_BURST = 60.0, 240.0
 """How many of the values among them are handled per second, and at once; nobody drags faster."""
 
-EVENT_TOKENS = 2.0
+EVENT_TOKENS = 3.0
 """How many values an event, such as a click, counts as: what it starts takes longer."""
 
 MAX_WAITING = 256
@@ -218,8 +224,10 @@ class BrowserConnection(ServerConnection):
         try:
             while True:
                 data = await super().recv()
-                await asyncio.sleep(self._reading.take())
+                await asyncio.sleep(self._reading.take(1.0 + len(data) / MESSAGE_BYTES))
                 message = BrowserMessage.decode(data)
+                if len(data) > MESSAGE_LIMIT and message.type != "FileTransferPart":
+                    raise Misuse("a message that is too long")
                 if not self._is_wanted(message):
                     continue
                 while len(self._inbox) >= MAX_WAITING:
@@ -299,7 +307,7 @@ class FrontDoor:
             connection.request_received()
             return self._refusal(connection, request) or process_request(connection, request)
 
-        options |= {"max_size": MESSAGE_LIMIT, "open_timeout": ANSWER_TIMEOUT, "ping_timeout": None}
+        options |= {"max_size": PART_LIMIT, "open_timeout": ANSWER_TIMEOUT, "ping_timeout": None}
         return serve(
             handle,
             sock=self._socket,
