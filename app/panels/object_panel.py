@@ -36,7 +36,6 @@ class ObjectPanel(Panel):
             self._build_pose()
 
     def _build_choice(self) -> None:
-        gui = self.gui
         self.object_choice = self.dropdown("Object", object_options())
         self.on_select(self.object_choice, self.actions.choose_object)
         limit = (

@@ -123,7 +123,8 @@ class Uploads:
         if size > button.limit:
             button.refuse(message.filename, size, message.transfer_uuid)
             return False
-        if size < 0 or message.transfer_uuid in self._open or any(t.uuid == uuid for t in self._open.values()):
+        sending = {transfer.uuid for transfer in self._open.values()}
+        if size < 0 or message.transfer_uuid in self._open or uuid in sending:
             raise Misuse("two files at once")
         if message.part_count:
             self._open[message.transfer_uuid] = _Transfer(uuid, size, message.part_count)

@@ -268,9 +268,7 @@ class FrontDoor:
         OSError: the address cannot be listened on.
     """
 
-    def __init__(
-        self, host: str, port: int, on_visit: Callable[[Visit], bool], max_browsers: int
-    ) -> None:
+    def __init__(self, host: str, port: int, on_visit: Callable[[Visit], bool], max_browsers: int) -> None:
         self._on_visit, self._max_browsers = on_visit, max_browsers
         self._loopback = _is_loopback(host)
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -323,9 +321,9 @@ class FrontDoor:
         """Return the answer to a request that is not for viser."""
         headers = _headers(request)
         if is_foreign(headers, loopback=self._loopback):
-            return connection.respond(HTTPStatus.FORBIDDEN, "This page may only be opened by its own address.\n")
+            return connection.respond(HTTPStatus.FORBIDDEN, "It may only be opened by its own address.\n")
         if headers.get("sec-fetch-dest") in FRAMES:
-            return connection.respond(HTTPStatus.FORBIDDEN, "This page may not be shown inside another one.\n")
+            return connection.respond(HTTPStatus.FORBIDDEN, "It may not be shown inside another page.\n")
         if request.path.startswith(HELLO):
             return self._picture(connection, request.path.removeprefix(HELLO), headers)
         if len(self._browsers) >= self._max_browsers:
@@ -349,7 +347,7 @@ class FrontDoor:
 
 
 def _headers(request: Request) -> dict[str, str]:
-    """Return the headers of a request, names in lower case; repeated ones become a list, which no page sends."""
+    """Return the headers of a request, names in lower case; repeated ones become one that no page sends."""
     headers: dict[str, str] = {}
     for name, value in request.headers.raw_items():
         name = name.lower()

@@ -31,8 +31,8 @@ from ..state.requests import CompareRequest, ExplainRequest, MapRequest, Request
 from ..state.state import State
 from ..state.undo import remember
 from .actions import Actions, camera_of
-from .playback_clock import PlaybackClock
 from .front_door import BrowserConnection, Visit
+from .playback_clock import PlaybackClock
 
 __all__ = ["Session"]
 

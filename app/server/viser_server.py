@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import socket
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -59,30 +60,34 @@ def any_port() -> int:
         return probe.getsockname()[1]
 
 
-def quiet_server(door: FrontDoor) -> viser.ViserServer:
-    """Start a viser server behind a front door that prints nothing."""
+def quiet_server(door: FrontDoor | None = None) -> viser.ViserServer:
+    """Start a viser server behind a front door, by default one that nobody passes; it prints nothing."""
     # viser has no public way to replace its buffer.
     _infra.AsyncMessageBuffer = WakingBuffer  # pyright: ignore[reportPrivateImportUsage]
     rich.get_console().quiet = True  # only viser prints to this console
-    with _listening_at(door):
+    with _listening_at(door or FrontDoor("127.0.0.1", 0, lambda visit: False, max_browsers=0)):
         server = viser.ViserServer(verbose=False)
     server.scene.world_axes.visible = False
     return server
 
 
+_listening = threading.Lock()
+
+
 @contextmanager
 def _listening_at(door: FrontDoor) -> Iterator[None]:
-    """Have viser listen at a door: it has no public way to be told how, and does so while it is constructed."""
+    """Have viser, which has no public way to be told, listen at a door while it is constructed."""
 
     def serve_at_door(handler: Any, host: str, port: int, **options: Any) -> websockets_server.serve:
         return door.serve(handler, **options)
 
-    listen = websockets_server.serve
-    setattr(websockets_server, "serve", serve_at_door)  # noqa: B010
-    try:
-        yield
-    finally:
-        setattr(websockets_server, "serve", listen)  # noqa: B010
+    with _listening:
+        listen = websockets_server.serve
+        setattr(websockets_server, "serve", serve_at_door)  # noqa: B010
+        try:
+            yield
+        finally:
+            setattr(websockets_server, "serve", listen)  # noqa: B010
 
 
 def end_upload(client: viser.ClientHandle, button: str, transfer: str) -> None:

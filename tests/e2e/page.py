@@ -50,14 +50,14 @@ class GraspPage:
         self.page = page
         self.complaints: list[str] = []
         page.set_default_timeout(WAIT)
-        page.on("console", lambda message: message.type == "error" and self._note(message.text))
+        page.on("console", lambda message: self._note(message.text if message.type == "error" else ""))
         page.on("pageerror", lambda error: self._note(str(error)))
         page.goto(address)
         if wait_for_map:
             self.map.wait_for()
 
     def _note(self, complaint: str) -> None:
-        if not any(text in complaint for text in HARMLESS):
+        if complaint and not any(text in complaint for text in HARMLESS):
             self.complaints.append(complaint)
 
     # -- what is seen -----------------------------------------------------------------------

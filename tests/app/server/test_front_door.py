@@ -170,7 +170,9 @@ def test_a_connection_has_no_second_request(port, visits):
 def test_nobody_is_greeted_over_a_websocket(port, visits):
     with own(port) as browser:
         with suppress(OSError):
-            browser.socket.sendall(head(f"{HELLO}known", Host=f"127.0.0.1:{port}", Sec_Fetch_Site="same-origin"))
+            browser.socket.sendall(
+                head(f"{HELLO}known", Host=f"127.0.0.1:{port}", Sec_Fetch_Site="same-origin")
+            )
         with pytest.raises(ConnectionClosed):
             while True:
                 browser.recv(WAIT)
@@ -271,7 +273,8 @@ def test_many_who_send_their_requests_slowly_keep_nobody_out(port, monkeypatch):
     monkeypatch.setattr(front_door, "MAX_REQUESTS", 20)
     with ExitStack() as stack:
         slow = [
-            stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=WAIT)) for _ in range(60)
+            stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=WAIT))
+            for _ in range(60)
         ]
         for s in slow:
             with suppress(OSError):

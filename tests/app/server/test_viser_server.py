@@ -6,10 +6,13 @@ import asyncio
 import dataclasses
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import pytest
 import viser
 from viser.infra import Message
+from websockets.exceptions import InvalidStatus
 
 from app.server import viser_server
 from app.server.front_door import FrontDoor
@@ -126,3 +129,23 @@ def test_servers_start_and_stop_without_a_word_and_leave_standard_output_to_othe
     quiet_server(a_door()).stop()
     assert outs == [sys.stdout, sys.stdout]
     assert capsys.readouterr().out == ""
+
+
+def test_servers_that_are_started_at_once_each_listen_at_their_own_door():
+    with ThreadPoolExecutor(4) as pool:
+        doors = [a_door() for _ in range(4)]
+        servers = list(pool.map(quiet_server, doors))
+    try:
+        assert [server.get_port() for server in servers] == [door._socket.getsockname()[1] for door in doors]
+    finally:
+        for server in servers:
+            server.stop()
+
+
+def test_without_a_door_nobody_comes_in():
+    server = quiet_server()
+    try:
+        with pytest.raises(InvalidStatus, match="503"), Wire(server.get_port()):
+            raise AssertionError
+    finally:
+        server.stop()
