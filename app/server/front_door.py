@@ -32,6 +32,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
+from websockets.typing import Data
 
 from .browser_messages import MESSAGES, BrowserMessage, Misuse, UploadButton, Uploads
 from .inbox import Inbox, TokenBucket
@@ -164,7 +165,7 @@ class BrowserConnection(ServerConnection):
         super().__init__(*args, **options)
         self.upload_buttons: dict[str, UploadButton] = {}
         self._uploads = Uploads(self.upload_buttons)
-        self._inbox: Inbox[tuple[bytes, float]] = Inbox()
+        self._inbox: Inbox[tuple[Data, float]] = Inbox()
         self._reading = TokenBucket(READ_RATE, READ_BURST)
         self._handling = TokenBucket(HANDLE_RATE, HANDLE_BURST)
         self._arrived, self._taken = asyncio.Event(), asyncio.Event()
@@ -234,7 +235,7 @@ class BrowserConnection(ServerConnection):
                     self._taken.clear()
                     await self._taken.wait()
                 key = message.key
-                self._inbox.put((bytes(data), 1.0 if key else EVENT_TOKENS), key)
+                self._inbox.put((data, 1.0 if key else EVENT_TOKENS), key)
                 self._arrived.set()
         except ConnectionClosed:
             return
