@@ -6,7 +6,7 @@ import logging
 import secrets
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from html import escape
 
@@ -33,15 +33,15 @@ def open_lobby(cache: SharedCache, host: str, port: int, max_sessions: int = 16)
     Raises:
         OSError: the port cannot be listened on.
     """
-    lobby = Lobby(cache)
-    server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions))
-    server.on_client_connect(lobby.connected)
-    server.on_client_disconnect(lobby.disconnected)
-    try:
-        yield lobby
-    finally:
-        lobby.close()
-        server.stop()
+    with closing(Lobby(cache)) as lobby:
+        server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions))
+        server.on_client_connect(lobby.connected)
+        server.on_client_disconnect(lobby.disconnected)
+        try:
+            yield lobby
+        finally:
+            lobby.close()
+            server.stop()
 
 
 class Lobby:
@@ -104,7 +104,7 @@ class Lobby:
             session.close()
 
     def close(self) -> None:
-        """Close all sessions and the pool of processes."""
+        """Close all sessions and the pool of processes; a second call does nothing."""
         with self._lock:
             self._closed = True
             sessions, self._sessions = list(self._sessions.values()), {}

@@ -271,6 +271,7 @@ def test_half_a_request_is_not_waited_for(port, monkeypatch):
 
 def test_many_who_send_their_requests_slowly_keep_nobody_out(port, monkeypatch):
     monkeypatch.setattr(front_door, "MAX_REQUESTS", 20)
+    monkeypatch.setattr(front_door, "HEAD_TIMEOUT", 10 * WAIT)
     with ExitStack() as stack:
         slow = [
             stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=WAIT))
