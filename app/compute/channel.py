@@ -26,11 +26,19 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Call:
-    """To the process: call a method of its services; a `Cancel` refers to the call by its job id."""
+    """To the process: call a method of its services.
+
+    Attributes:
+        job_id: by which a `Cancel` refers to the call.
+        method: its name.
+        args: its arguments, besides the progress.
+        cores: how many cores it may use.
+    """
 
     job_id: int
     method: str
     args: tuple[Any, ...]
+    cores: int
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from symgrasp.errors import Cancelled, NoPlanError
@@ -29,6 +30,7 @@ from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressRepo
 from .limits import MEMORY_LIMIT
 from .plan_service import OpenedPlan, PlanOutcome, PlanRequest
 from .process_pool import ProcessPool, WorkerProcess
+from .turns import Place
 
 __all__ = ["ComputeProcess", "ProcessDied"]
 
@@ -59,6 +61,7 @@ class ComputeProcess:
         pool: starts the process.
         keep: called with every computed map.
         compiling: called when the process begins to compile code.
+        waiting: called while others have to compute first.
     """
 
     def __init__(
@@ -66,8 +69,10 @@ class ComputeProcess:
         pool: ProcessPool,
         keep: Callable[[MapResult], None] = lambda _: None,
         compiling: Callable[[], None] = lambda: None,
+        waiting: Callable[[], None] = lambda: None,
     ) -> None:
-        self._pool, self._keep, self._compiling = pool, keep, compiling
+        self._pool, self._keep, self._compiling, self._waiting = pool, keep, compiling, waiting
+        self._place = Place(pool.turns)
         self._process: WorkerProcess | None = None
         self._planner: WorkerProcess | None = None
         self._requests: dict[tuple[str, str], MapRequest] = {}
@@ -163,25 +168,26 @@ class ComputeProcess:
             maps: the maps that it may compute.
             reads: name of the file that it reads, if it reads one.
         """
-        process = self._ready(progress)
-        self._requests = {(request.task, request.arm): request for request in maps}
-        self._computed = []
-        process.job_id += 1
-        try:
-            process.channel.send(Call(process.job_id, method, args))
-            return self._follow(process, progress, reads)
-        except Cancelled:
-            process.cancelled_at = time.monotonic()
-            with suppress(OSError):  # it is dead already, which the next call notices
-                process.channel.send(Cancel(process.job_id))
-            raise
-        except (EOFError, OSError) as error:
-            self._process = None
-            how = process.end(grace=1.0)  # a pipe may end a little before its process does
-            text = f"the process that computes ended unexpectedly ({how or 'it hung up'})"
-            if how == "SIGABRT":  # so libraries end that cannot raise an exception
-                text += f", perhaps because it needs {TOO_MUCH_MEMORY}"
-            raise ProcessDied(text) from error
+        with self._place.turn(partial(self._wait, progress, 0.0)):
+            process = self._ready(progress)
+            self._requests = {(request.task, request.arm): request for request in maps}
+            self._computed = []
+            process.job_id += 1
+            try:
+                process.channel.send(Call(process.job_id, method, args, self._place.cores))
+                return self._follow(process, progress, reads)
+            except Cancelled:
+                process.cancelled_at = time.monotonic()
+                with suppress(OSError):  # it is dead already, which the next call notices
+                    process.channel.send(Cancel(process.job_id))
+                raise
+            except (EOFError, OSError) as error:
+                self._process = None
+                how = process.end(grace=1.0)  # a pipe may end a little before its process does
+                text = f"the process that computes ended unexpectedly ({how or 'it hung up'})"
+                if how == "SIGABRT":  # so libraries end that cannot raise an exception
+                    text += f", perhaps because it needs {TOO_MUCH_MEMORY}"
+                raise ProcessDied(text) from error
 
     def _ready(self, progress: Progress) -> WorkerProcess:
         """Return an idle process: the present one, once a cancelled call has ended, or a new one."""
@@ -215,6 +221,13 @@ class ComputeProcess:
         """Receive messages until the call under way ends, and return its result."""
         channel, share, heard = process.channel, 0.0, time.monotonic()
         while True:
+            if self._place.is_over:
+                process.pause()
+                try:
+                    self._place.renew(partial(self._wait, progress, share))
+                finally:
+                    process.resume()
+                heard = time.monotonic()
             if not channel.poll(POLL_INTERVAL):
                 if reads and time.monotonic() - heard > READING_TIMEOUT:
                     self.close()
@@ -239,6 +252,10 @@ class ComputeProcess:
                 raise message.error
             else:
                 return message.value
+
+    def _wait(self, progress: Progress, share: float) -> None:
+        self._waiting()
+        progress(share)
 
     def _receive_map(self, computed: ComputedMap) -> None:
         self._computed.append(computed)

@@ -27,6 +27,7 @@ class Job:
         run: computes; calls its argument with the finished share, which may raise `Cancelled`.
         progress: called with the finished share.
         compiling: called when code has to be compiled.
+        waiting: called while it waits for computations of others.
         done: called with the result.
         failed: called with one line about what went wrong.
     """
@@ -34,6 +35,7 @@ class Job:
     run: Callable[[Progress], Any]
     progress: Progress
     compiling: Callable[[], None]
+    waiting: Callable[[], None]
     done: Callable[[Any], None]
     failed: Callable[[str], None]
 
@@ -74,6 +76,11 @@ class JobQueue:
         """Call `Job.compiling` of the job under way."""
         if job := self._running:
             job.compiling()
+
+    def waiting(self) -> None:
+        """Call `Job.waiting` of the job under way."""
+        if job := self._running:
+            job.waiting()
 
     def close(self) -> None:
         """Cancel everything and end the thread; may be called from any thread and more than once."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import multiprocessing
 import os
 import pickle
 import signal
@@ -13,6 +14,8 @@ from multiprocessing import connection, parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
+
+import numba
 
 from symgrasp.compiling import notify_on_compile
 from symgrasp.errors import Cancelled, SymgraspError
@@ -32,6 +35,9 @@ log = logging.getLogger(__name__)
 REPORT_INTERVAL = 0.03
 """Time (s) between two reports of the progress."""
 
+NICENESS = 10
+"""By how much its priority is lower than the server's, which has to answer at once."""
+
 
 def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
     """Answer calls until the connection is closed.
@@ -40,6 +46,9 @@ def serve(pipe: Connection, folders: tuple[Path, ...]) -> None:
         pipe: to the process that started this one.
         folders: where the files of an uploaded scene may lie.
     """
+    os.nice(NICENESS)
+    # Else numba makes a lock for processes forked from this one, which is left behind when it is killed.
+    multiprocessing.set_start_method("spawn", force=True)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the server, which closes the pipe
     limit_memory()
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -74,6 +83,7 @@ class _Server:
             message = self._channel.receive()
             if isinstance(message, Call):  # else it cancels a call that has ended
                 self._job_id, self._reported = message.job_id, 0.0
+                numba.set_num_threads(message.cores)
                 answer = self._answer(message)
                 try:
                     self._channel.send(answer)

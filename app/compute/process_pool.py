@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 import threading
-from multiprocessing.context import SpawnProcess
+from contextlib import suppress
 from pathlib import Path
 
 from .channel import Channel
 from .process_main import serve
+from .turns import Turns
 
 __all__ = ["ProcessPool", "WorkerProcess"]
 
-SPAWN = multiprocessing.get_context("spawn")
+# A process that only imports what all need, and is copied for each: they share its memory and start at once.
+PROCESSES = multiprocessing.get_context("forkserver")
+PROCESSES.set_forkserver_preload([f"{__package__}.preload"])
 
 
 class WorkerProcess:
@@ -29,11 +33,11 @@ class WorkerProcess:
     """
 
     def __init__(self, folders: tuple[Path, ...]) -> None:
-        here, there = SPAWN.Pipe()
+        here, there = PROCESSES.Pipe()
         self.channel = Channel(here)
         self.job_id = 0
         self.cancelled_at: float | None = None
-        self._process: SpawnProcess = SPAWN.Process(
+        self._process = PROCESSES.Process(
             target=serve, args=(there, folders), name="symgrasp compute", daemon=True
         )
         self._process.start()
@@ -49,6 +53,18 @@ class WorkerProcess:
     def is_alive(self) -> bool:
         """Whether the process runs."""
         return self._process.is_alive()
+
+    def pause(self) -> None:
+        """Stop the process until it is resumed."""
+        self._signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on."""
+        self._signal(signal.SIGCONT)
+
+    def _signal(self, number: int) -> None:
+        with suppress(ProcessLookupError):  # it has died, which the next message from it says
+            os.kill(self.pid, number)
 
     def end(self, grace: float = 0.0) -> str:
         """Kill the process.
@@ -68,14 +84,18 @@ class WorkerProcess:
 
 
 class ProcessPool:
-    """Starts processes and keeps a spare one, since the imports take a second or two; thread-safe.
+    """Starts processes and keeps a spare one, so that nobody waits for it; thread-safe.
 
     Args:
         folders: where the files of an uploaded scene may lie.
+
+    Attributes:
+        turns: which of them may compute.
     """
 
     def __init__(self, folders: tuple[Path, ...]) -> None:
         self._folders = folders
+        self.turns = Turns()
         self._lock = threading.Lock()
         self._spare: WorkerProcess | None = None
         self._closed = False

@@ -82,6 +82,8 @@ def status_html(state: State) -> str:
         doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %"
         if state.busy.compiling:
             doing = "Compiling, once on this machine: a minute …"
+        elif state.busy.waiting:
+            doing = f"{state.busy.label} … when other browsers have had their turn"
     elif state.is_stopped:
         doing = "Stopped." if state.is_current else "Stopped: no map for this pose yet."
     return (

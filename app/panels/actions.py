@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+import viser
+
 from ..state.plan_results import PlanKind
 from ..state.state import State
 
@@ -46,6 +48,9 @@ class Actions(Protocol):
             origin: what changed it: "inputs", "gizmo", "scrub" or "play"; widgets of that origin are not
                 written back.
         """
+
+    def limit_uploads(self, button: viser.GuiUploadButtonHandle, limit: int) -> None:
+        """Let a button take files of a size (bytes); a larger one is refused when it is announced."""
 
     def open_scene(self, name: str) -> None:
         """Open a scene by its name in the menu."""

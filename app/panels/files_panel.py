@@ -25,13 +25,10 @@ class FilesPanel(Panel):
                 "Save the scene (YAML)", viser.Icon.DOWNLOAD, actions.save_scene, color="gray",
                 hint="With the object, hands and poses as they are now",
             )  # fmt: skip
-            self.upload = gui.add_upload_button(
-                "Open a scene (YAML)", icon=viser.Icon.UPLOAD, color="gray", mime_type=".yaml,.yml",
+            self.upload = self.upload_button(
+                "Open a scene (YAML)", SCENE_LIMIT, actions.upload_scene, mime_type=".yaml,.yml",
                 hint=f"At most {SCENE_LIMIT / 1e6:g} MB",
             )  # fmt: skip
-            self.upload.on_upload(
-                lambda _: actions.upload_scene(self.upload.value.name, self.upload.value.content)
-            )
         with gui.add_folder("Share"):
             self.button(
                 "Make a link", viser.Icon.LINK, actions.make_link, color="gray",

@@ -36,32 +36,25 @@ class ObjectPanel(Panel):
             self._build_pose()
 
     def _build_choice(self) -> None:
-        gui = self.gui
         self.object_choice = self.dropdown("Object", object_options())
         self.on_select(self.object_choice, self.actions.choose_object)
         limit = (
             f"{', '.join(ending[1:].upper() for ending in MESH_ENDINGS)}; at most {UPLOAD_LIMIT / 1e6:g} MB"
         )
         self.unit = self.dropdown("Mesh unit", tuple(UNITS), hint="What one unit of an uploaded mesh is.")
-        self.tolerance = gui.add_number(
+        self.tolerance = self.gui.add_number(
             "Tolerance (mm)", 0.0, min=0.0, step=0.1,
             hint="How far an uploaded mesh may deviate from symmetry; 0 for the larger of 1.5 mm and 3 % of "
             "the radius. The object may stick out of what is planned with by that much.",
         )  # fmt: skip
-        self.upload = gui.add_upload_button(
+        self.upload = self.upload_button(
             "Upload a mesh",
-            icon=viser.Icon.UPLOAD,
-            color="gray",
+            UPLOAD_LIMIT,
+            lambda name, content: self.actions.upload_object(
+                name, content, UNITS[self.unit.value], self.tolerance.value / 1e3 or None
+            ),
             mime_type=",".join(MESH_ENDINGS),
             hint=limit,
-        )
-        self.upload.on_upload(
-            lambda _: self.actions.upload_object(
-                self.upload.value.name,
-                self.upload.value.content,
-                UNITS[self.unit.value],
-                self.tolerance.value / 1e3 or None,
-            )
         )
         self.flip = self.button(
             "Flip",

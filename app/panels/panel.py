@@ -59,6 +59,22 @@ class Panel:
         button.on_click(lambda _: action())
         return button
 
+    def upload_button(
+        self, label: str, limit: int, action: Callable[[str, bytes], None], **options: Any
+    ) -> viser.GuiUploadButtonHandle:
+        """Add a button that runs an action with name and content of a file.
+
+        Args:
+            label: on the button.
+            limit: largest file (bytes) that is taken; a larger one is refused when it is announced.
+            action: what to run.
+            options: further ones of `viser.GuiApi.add_upload_button`.
+        """
+        button = self.gui.add_upload_button(label, icon=viser.Icon.UPLOAD, color="gray", **options)
+        button.on_upload(lambda _: action(button.value.name, button.value.content))
+        self.actions.limit_uploads(button, limit)
+        return button
+
     def command(
         self, label: str, action: Callable[[], None], hotkey: Hotkey = None, modifier: Modifier = None
     ) -> viser.CommandHandle:

@@ -83,15 +83,12 @@ class PlanFilePanel(Panel):
             self.download = self.button(
                 "Download plan", viser.Icon.DOWNLOAD, lambda: plans.download(self.format.value), visible=False
             )
-            self.upload = gui.add_upload_button(
+            self.upload = self.upload_button(
                 "Open a plan",
-                icon=viser.Icon.UPLOAD,
-                color="gray",
+                PLAN_LIMIT,
+                plans.open_file,
                 mime_type=".json",
                 hint=f"JSON; at most {PLAN_LIMIT / 1e6:g} MB. It is verified before it is shown.",
-            )
-            self.upload.on_upload(
-                lambda _: plans.open_file(self.upload.value.name, self.upload.value.content)
             )
             self.report = self.html()
 

@@ -44,8 +44,15 @@ def faded(colors: np.ndarray) -> np.ndarray:
     return np.round(0.3 * colors + 0.7 * FADED_TO).astype(np.uint8)
 
 
-def to_linear(colors: np.ndarray) -> np.ndarray:
-    """Return sRGB colours (..., 3) in linear RGB, which viser's batched meshes expect; both 0 to 255."""
-    share = np.asarray(colors) / 255
+def _linear() -> np.ndarray:
+    share = np.arange(256) / 255
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.round(255 * linear).astype(np.uint8)
+
+
+_LINEAR = _linear()
+
+
+def to_linear(colors: np.ndarray) -> np.ndarray:
+    """Return sRGB colours (..., 3) in linear RGB, which viser's batched meshes expect; both 0 to 255."""
+    return _LINEAR[np.round(colors).astype(np.uint8)]

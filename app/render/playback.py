@@ -6,7 +6,6 @@ It is for display only: the way between two tasks is not checked for collisions.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from symgrasp.plan.plan import Hold, PlanTask
 from symgrasp.poses import Array, inverse
 from symgrasp.scene.scene import Scene
 
+from ..state.cached import cached
 from ..state.state import State
 from .weak_cache import cached_with_first
 
@@ -45,13 +45,13 @@ class PlaybackFrame:
     after: PlanTask
     share: float
 
-    @cached_property
+    @cached
     def joint_values(self) -> dict[str, Array]:
         """Robot name → values (n,) of all its joints."""
         start, end = (plan_joint_values(self.scene, task) for task in (self.before, self.after))
         return {name: (1 - self.share) * start[name] + self.share * end[name] for name in start}
 
-    @cached_property
+    @cached
     def T_world_object(self) -> Array:
         """Pose (4, 4) of the object: in the hand that carries it, else at the nearer task."""
         hold = self._carrier

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import viser
 
-from symgrasp.errors import SymgraspError
+from symgrasp.errors import InputError, SymgraspError
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 
@@ -20,9 +20,11 @@ from ..state import changes, job_changes
 from ..state.object_choice import OWN, ObjectChoice, check_size, from_library
 from ..state.page_link import Camera
 from ..state.state import State
+from .browser_messages import UploadButton
 from .plan_actions import PlanActions
 from .session_api import SessionApi
 from .snapshot import snapshot_html
+from .viser_server import end_upload
 
 __all__ = ["Actions", "camera_of"]
 
@@ -38,6 +40,7 @@ class Actions:
         cache: what all sessions share.
         process: computes for this session.
         address: that the page was opened at, without the query.
+        upload_buttons: uuid → a button that takes files; they are added here.
     """
 
     def __init__(
@@ -47,9 +50,10 @@ class Actions:
         cache: SharedCache,
         process: ComputeProcess,
         address: str,
+        upload_buttons: dict[str, UploadButton],
     ) -> None:
         self._session, self._client, self._cache = session, client, cache
-        self._process, self._address = process, address
+        self._process, self._address, self._upload_buttons = process, address, upload_buttons
         self.plans = PlanActions(session, process, cache)
         self.change = session.change
 
@@ -139,6 +143,17 @@ class Actions:
         self.change(stop_or_retry)
 
     # -- files ------------------------------------------------------------------------------
+
+    def limit_uploads(self, button: viser.GuiUploadButtonHandle, limit: int) -> None:
+        """Let a button take files of a size (bytes); a larger one is refused when it is announced."""
+        uuid = button._impl.uuid
+
+        def refuse(name: str, size: int, transfer: str) -> None:
+            end_upload(self._client, uuid, transfer)
+            limits = f"{size / 1e6:.1f} MB", f"a file of at most {limit / 1e6:g} MB"
+            self._fail(InputError(name, "size of the file", *limits))
+
+        self._upload_buttons[uuid] = UploadButton(limit, refuse)
 
     def save_map(self, kind: str) -> None:
         """Send the map that is shown as a picture, in a format of `app.render.map_picture.FORMATS`."""

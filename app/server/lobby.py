@@ -1,21 +1,22 @@
-"""The sessions of a server: one for each browser that has loaded the page through the proxy."""
+"""The sessions of a server: one for each browser that has loaded the page at the front door."""
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import secrets
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from html import escape
 
 import viser
+from websockets.protocol import State
 
 from ..compute.cache import SharedCache
 from ..compute.process_pool import ProcessPool
 from ..files.shown_paths import shown_paths
-from .proxy import HELLO, Proxy, Visit
+from .front_door import HELLO, BrowserConnection, FrontDoor, Visit, current_connection
 from .session import Session
 from .viser_server import quiet_server
 
@@ -27,25 +28,21 @@ STYLE = "font:13px/1.5 system-ui,sans-serif;margin:12px"
 
 
 @contextmanager
-def open_lobby(cache: SharedCache, host: str, port: int) -> Iterator[Lobby]:
+def open_lobby(cache: SharedCache, host: str, port: int, max_sessions: int = 16) -> Iterator[Lobby]:
     """Serve the page on a port while the ``with`` block runs.
 
     Raises:
         OSError: the port cannot be listened on.
     """
-    server = quiet_server()
-    lobby = Lobby(cache, lambda client_id: client_id in server.get_clients())
-    server.on_client_connect(lobby.connected)
-    server.on_client_disconnect(lobby.disconnected)
-    try:
-        proxy = Proxy(host, port, server.get_port(), lobby.visited)
+    with closing(Lobby(cache)) as lobby:
+        server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions))
+        server.on_client_connect(lobby.connected)
+        server.on_client_disconnect(lobby.disconnected)
         try:
             yield lobby
         finally:
-            proxy.close()
-    finally:
-        lobby.close()
-        server.stop()
+            lobby.close()
+            server.stop()
 
 
 class Lobby:
@@ -53,16 +50,16 @@ class Lobby:
 
     Args:
         cache: what all sessions share.
-        is_connected: called with a client id; returns whether that browser is still connected.
     """
 
-    def __init__(self, cache: SharedCache, is_connected: Callable[[int], bool]) -> None:
-        self._cache, self._is_connected = cache, is_connected
+    def __init__(self, cache: SharedCache) -> None:
+        self._cache = cache
         self._pool = ProcessPool(cache.folders)
         self._lock = threading.Condition()
-        self._waiting: dict[str, tuple[viser.ClientHandle, viser.GuiHtmlHandle]] = {}
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._waiting: dict[str, _Waiting] = {}
         self._sessions: dict[int, Session] = {}
+        self._closed = False
+        threading.Thread(target=self._pool.prepare, daemon=True).start()
 
     def wait_until_empty(self, timeout: float | None = None) -> bool:
         """Wait, for so long (s) at most, until there is no session; return whether there is none."""
@@ -74,7 +71,6 @@ class Lobby:
 
         It is asked to load the picture with a new token.
         """
-        self._loop = asyncio.get_running_loop()
         token = secrets.token_urlsafe(24)
         client.gui.set_panel_label("symgrasp")
         client.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -82,18 +78,19 @@ class Lobby:
             placeholder = client.gui.add_html(
                 f'<div style="{STYLE}">Loading …<img src="{HELLO}{token}" alt="" width="1" height="1"></div>'
             )
-            self._waiting[token] = client, placeholder
+            self._waiting[token] = _Waiting(client, current_connection(), placeholder)
 
     def visited(self, visit: Visit) -> bool:
-        """Handle a browser that loaded its picture through the proxy: open its session.
+        """Handle a browser that loaded its picture: open its session.
 
         Returns:
             Whether the token belongs to a browser that waits for its session.
         """
         with self._lock:
-            if (waiting := self._waiting.pop(visit.token, None)) is None:
+            if self._closed or (waiting := self._waiting.pop(visit.token, None)) is None:
                 return False
-        threading.Thread(target=self._open, args=(*waiting, visit), daemon=True).start()
+        waiting.connection.stay()
+        threading.Thread(target=self._open, args=(waiting, visit), daemon=True).start()
         return True
 
     def disconnected(self, client: viser.ClientHandle) -> None:
@@ -102,14 +99,15 @@ class Lobby:
             session = self._sessions.pop(client.client_id, None)
             self._lock.notify_all()
             self._waiting = {
-                token: waiting for token, waiting in self._waiting.items() if waiting[0] is not client
+                token: waiting for token, waiting in self._waiting.items() if waiting.client is not client
             }
         if session:
             session.close()
 
     def close(self) -> None:
-        """Close all sessions and the pool of processes."""
+        """Close all sessions and the pool of processes; a second call does nothing."""
         with self._lock:
+            self._closed = True
             sessions, self._sessions = list(self._sessions.values()), {}
             self._waiting.clear()
             self._lock.notify_all()
@@ -117,12 +115,11 @@ class Lobby:
             session.close()
         self._pool.close()
 
-    def _open(self, client: viser.ClientHandle, placeholder: viser.GuiHtmlHandle, visit: Visit) -> None:
+    def _open(self, waiting: _Waiting, visit: Visit) -> None:
+        client = waiting.client
         try:
-            placeholder.remove()
-            self._pool.prepare()
-            assert self._loop  # a client has connected
-            session = Session(client, self._cache, self._pool, visit, self._loop)
+            waiting.placeholder.remove()
+            session = Session(client, waiting.connection, self._cache, self._pool, visit)
         except Exception as error:
             log.exception("a session could not be opened")
             client.gui.reset()
@@ -133,5 +130,14 @@ class Lobby:
             return
         with self._lock:
             self._sessions[client.client_id] = session
-        if not self._is_connected(client.client_id):  # it disconnected while its session was opened
+        if waiting.connection.state is not State.OPEN:  # it disconnected while its session was opened
             self.disconnected(client)
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    """A browser that has not loaded its picture yet, and what it shows until then."""
+
+    client: viser.ClientHandle
+    connection: BrowserConnection
+    placeholder: viser.GuiHtmlHandle

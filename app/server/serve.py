@@ -18,23 +18,26 @@ from .lobby import open_lobby
 __all__ = ["serve"]
 
 
-def serve(scene: str, host: str, port: int) -> None:
+def serve(scene: str, host: str, port: int, max_sessions: int = 16) -> None:
     """Serve the page until interrupted; the address is printed once it listens.
 
     Args:
         scene: the scene to open with, a shipped name or a file.
         host: address to listen on.
         port: port to listen on; never another one.
+        max_sessions: how many browsers may use it at the same time.
 
     Raises:
-        InputError: the scene is unusable or the port is not free.
+        InputError: the scene is unusable, the port is not free, or no browser may use it.
     """
+    if max_sessions < 1:
+        raise InputError("command line", "--max-sessions", max_sessions, "a whole number of at least 1")
     _check_free(host, port)
     cache = _warm_cache(scene)
     # A browser may disconnect while something is drawn for it.
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     try:
-        with open_lobby(cache, host, port):
+        with open_lobby(cache, host, port, max_sessions):
             shown = f"[{host}]" if ":" in host else host
             print(f"symgrasp: http://{shown}:{port}", flush=True)
             threading.Event().wait()

@@ -32,8 +32,8 @@ from ..state.requests import CompareRequest, ExplainRequest, MapRequest, Request
 from ..state.state import State
 from ..state.undo import remember
 from .actions import Actions, camera_of
+from .front_door import BrowserConnection, Visit
 from .playback_clock import PlaybackClock
-from .proxy import Visit
 
 __all__ = ["Session"]
 
@@ -55,10 +55,10 @@ class Session:
 
     Args:
         client: the browser.
+        connection: to it.
         cache: what all sessions share.
         pool: starts the process that computes.
         visit: the address it opened, which may say what to show first.
-        loop: viser's event loop.
 
     Attributes:
         state: what is shown; None before the first scene is loaded.
@@ -67,12 +67,12 @@ class Session:
     def __init__(
         self,
         client: viser.ClientHandle,
+        connection: BrowserConnection,
         cache: SharedCache,
         pool: ProcessPool,
         visit: Visit,
-        loop: asyncio.AbstractEventLoop,
     ) -> None:
-        self.client, self.cache, self.visit, self._loop = client, cache, visit, loop
+        self.client, self.cache, self.visit, self._connection = client, cache, visit, connection
         self.state: State | None = None
         self._job_ids = itertools.count(1)
         self._changed = threading.Condition(threading.Lock())
@@ -81,7 +81,9 @@ class Session:
         self._writing = False
         self._closed = False
         self._playback = PlaybackClock()
-        self.process = ComputeProcess(pool, cache.keep, lambda: self.jobs.compiling())
+        self.process = ComputeProcess(
+            pool, cache.keep, lambda: self.jobs.compiling(), lambda: self.jobs.waiting()
+        )
         self.jobs = JobQueue(f"jobs {client.client_id}", self.process.close)
         try:
             self._build_page()
@@ -92,7 +94,8 @@ class Session:
     def _build_page(self) -> None:
         """Add everything to the page, start the drawing thread, and open the first scene."""
         client = self.client
-        self.actions = Actions(self, client, self.cache, self.process, self.visit.address)
+        buttons = self._connection.upload_buttons
+        self.actions = Actions(self, client, self.cache, self.process, self.visit.address, buttons)
         self.layout = Layout(client, self.actions, self.cache.names)
         self.scene_view = SceneView(
             client,
@@ -227,6 +230,7 @@ class Session:
             run,
             progress,
             compiling=lambda: self.change(lambda s: job_changes.compiling(s, job_id)),
+            waiting=lambda: self.change(lambda s: job_changes.waiting(s, job_id)),
             done=done,
             failed=lambda problem: self._failed(job_id, problem),
         )
@@ -294,7 +298,7 @@ class Session:
         try:
             self.layout.show(state)
             if write_inputs:
-                asyncio.run_coroutine_threadsafe(self._inputs_written(state), self._loop).result()
+                asyncio.run_coroutine_threadsafe(self._inputs_written(state), self._connection.loop).result()
             self.scene_view.show(state, move_gizmo=move_gizmo)
         except Exception as error:  # must not end the drawing thread
             log.exception("a picture could not be drawn")

@@ -1,15 +1,23 @@
-"""The viser server behind the proxy, without console output and with a fix of its message buffer."""
+"""The viser server behind the front door, without console output and with a fix of its message buffer."""
 
 from __future__ import annotations
 
 import asyncio
 import dataclasses
 import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import rich
 import viser
+from viser import _messages
 from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
+from websockets.asyncio import server as websockets_server
+
+from .front_door import FrontDoor
 
 __all__ = ["AsyncMessageBuffer", "WakingBuffer", "any_port", "quiet_server"]
 
@@ -52,11 +60,46 @@ def any_port() -> int:
         return probe.getsockname()[1]
 
 
-def quiet_server() -> viser.ViserServer:
-    """Start a viser server on a loopback address that prints nothing."""
+def quiet_server(door: FrontDoor | None = None) -> viser.ViserServer:
+    """Start a viser server behind a front door, by default one that nobody passes; it prints nothing."""
     # viser has no public way to replace its buffer.
     _infra.AsyncMessageBuffer = WakingBuffer  # pyright: ignore[reportPrivateImportUsage]
     rich.get_console().quiet = True  # only viser prints to this console
-    server = viser.ViserServer(host="127.0.0.1", port=any_port(), verbose=False)
+    with _listening_at(door or FrontDoor("127.0.0.1", 0, lambda visit: False, max_browsers=0)):
+        server = viser.ViserServer(verbose=False)
     server.scene.world_axes.visible = False
     return server
+
+
+_listening = threading.Lock()
+
+
+@contextmanager
+def _listening_at(door: FrontDoor) -> Iterator[None]:
+    """Have viser, which has no public way to be told, listen at a door while it is constructed."""
+
+    def serve_at_door(handler: Any, host: str, port: int, **options: Any) -> websockets_server.serve:
+        return door.serve(handler, **options)
+
+    with _listening:
+        listen = websockets_server.serve
+        setattr(websockets_server, "serve", serve_at_door)  # noqa: B010
+        try:
+            yield
+        finally:
+            setattr(websockets_server, "serve", listen)  # noqa: B010
+
+
+def end_upload(client: viser.ClientHandle, button: str, transfer: str) -> None:
+    """Have a browser forget a file that is not received: end its progress bar, and free the button.
+
+    Args:
+        client: the browser.
+        button: uuid of the button.
+        transfer: uuid of the transfer.
+    """
+    # viser's client takes an upload for running until as many bytes are received as it has, and for
+    # successful if it is exactly as many.
+    queue = client.gui._websock_interface.queue_message
+    queue(_messages.FileTransferPartAck(button, transfer, transferred_bytes=2, total_bytes=1))
+    queue(_messages.RemoveNotificationMessage(f"upload-{transfer}"))

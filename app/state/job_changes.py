@@ -18,6 +18,7 @@ __all__ = [
     "retried",
     "started",
     "stopped",
+    "waiting",
 ]
 
 
@@ -54,7 +55,8 @@ def progressed(state: State, job_id: int, share: float, late: bool = False) -> S
     late = late or busy.late
     if (share, late) == (busy.share, busy.late):
         return state
-    return replace(state, busy=replace(busy, share=share, late=late))
+    waiting = busy.waiting and share == busy.share
+    return replace(state, busy=replace(busy, share=share, late=late, waiting=waiting))
 
 
 def compiling(state: State, job_id: int) -> State:
@@ -63,6 +65,14 @@ def compiling(state: State, job_id: int) -> State:
     if busy is None or busy.job_id != job_id:
         return state
     return replace(state, busy=replace(busy, late=True, compiling=True))
+
+
+def waiting(state: State, job_id: int) -> State:
+    """Record that a computation waits until others have had their turn."""
+    busy = state.busy
+    if busy is None or busy.job_id != job_id or busy.waiting:
+        return state
+    return replace(state, busy=replace(busy, waiting=True))
 
 
 def map_arrived(state: State, job_id: int, result: MapResult) -> State:

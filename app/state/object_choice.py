@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from symgrasp.errors import InputError, MeshError, one_of
@@ -59,9 +60,15 @@ class ObjectChoice:
         return replace(self, profile=Profile.measured(measurement), measurement=measurement)
 
 
+@cache
+def _library() -> tuple[str, ...]:
+    """Return the names of the library's objects, which every picture of a state needs."""
+    return tuple(library_objects())
+
+
 def object_options(uploaded: ObjectChoice | None = None) -> tuple[str, ...]:
     """Return all options: the scene's own object, the library, and the uploaded one if any."""
-    return (OWN, *library_objects(), *([uploaded.option] if uploaded else []))
+    return (OWN, *_library(), *([uploaded.option] if uploaded else []))
 
 
 def from_library(choice: str) -> ObjectChoice:

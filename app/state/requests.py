@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 from symgrasp.feasibility.cell import Cell
@@ -13,6 +12,7 @@ from symgrasp.poses import Array
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
+from .cached import cached
 from .object_pose import ObjectPose, with_poses
 
 __all__ = [
@@ -51,12 +51,12 @@ class MapRequest:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
         return self.__dict__.copy()
 
-    @cached_property
+    @cached
     def T_world_object(self) -> Array:
         """The base pose (4, 4)."""
         return self.pose.matrix() if self.pose else self.scene.task(self.task).T_world_object
 
-    @cached_property
+    @cached
     def key(self) -> MapKey:
         """The key of the map, without the task's name and the scene's other tasks."""
         return self.scene.map_sha256, self.arm, self.T_world_object.tobytes()
@@ -180,6 +180,7 @@ class Busy:
         share: how much of it is done, 0 to 1.
         late: whether it takes so long that the page shows it and newer requests interrupt it.
         compiling: whether code has to be compiled for it.
+        waiting: whether computations of others go first.
     """
 
     job_id: int
@@ -188,6 +189,7 @@ class Busy:
     share: float = 0.0
     late: bool = False
     compiling: bool = False
+    waiting: bool = False
 
     def goes_before(self, request: Request) -> bool:
         """Return whether a request waits for this computation instead of taking its place.

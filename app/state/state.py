@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.explain import CandidateResult, Explanation
@@ -20,6 +19,7 @@ from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.poses import Array, rotation_z
 from symgrasp.scene.scene import Scene
 
+from .cached import cached
 from .display import Display
 from .history import History
 from .map_view_state import MapViewState
@@ -134,12 +134,12 @@ class State:
         uploaded = self.uploaded_scene
         return uploaded.scene if uploaded and uploaded.option == self.scene_name else None
 
-    @cached_property
+    @cached
     def base(self) -> ObjectPose:
         """The object's base pose, without δ."""
         return self.request.pose or ObjectPose.of(self.request.T_world_object)
 
-    @cached_property
+    @cached
     def T_world_object(self) -> Array:
         """Pose (4, 4) of the object, turned by δ."""
         return self.request.T_world_object @ rotation_z(self.delta)
@@ -150,7 +150,7 @@ class State:
 
     # -- what is computed -------------------------------------------------------------------
 
-    @cached_property
+    @cached
     def request(self) -> MapRequest:
         """The request for the map of the chosen task and arm at the base pose."""
         return MapRequest(self.scene, self.arm, self.task, self.poses.get(self.task))
@@ -203,7 +203,7 @@ class State:
 
     # -- the map and the picked grasp -------------------------------------------------------
 
-    @cached_property
+    @cached
     def map(self) -> FeasibilityMap | None:
         """The newest map, shifted by δ."""
         return self.result.map.shift(self.delta) if self.result else None
@@ -213,7 +213,7 @@ class State:
         """A phrase for each obstacle that the object is inside of."""
         return self.result.contacts if self.result and self.is_current else ()
 
-    @cached_property
+    @cached
     def cell(self) -> Cell | None:
         """The cell of `map` that contains the picked grasp."""
         if self.pick is None or self.map is None:
@@ -224,7 +224,7 @@ class State:
             roll = self.map_view.roll.roll(self.map, row, column)
         return Cell(roll, row, column)
 
-    @cached_property
+    @cached
     def base_cell(self) -> Cell | None:
         """The cell of the unshifted map with the same tool pose as `cell`."""
         if self.cell is None or self.result is None:
@@ -267,12 +267,12 @@ class State:
         """The plan that is chosen, also while something else is shown."""
         return self.plan_results.plan
 
-    @cached_property
+    @cached
     def shown_task(self) -> PlanTask | None:
         """The task of the plan that is shown."""
         return self.plan.plan.tasks[self.step] if self.plan and self.step is not None else None
 
-    @cached_property
+    @cached
     def climb_step(self) -> ClimbStep | None:
         """The step of the hill climbing that is shown, None while something else is."""
         climb, frame = self.plan_results.climb, self.plan_results.frame

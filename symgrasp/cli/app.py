@@ -17,6 +17,12 @@ def add_parser(commands: Commands) -> None:
     add_scene(command, optional=True)
     command.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     command.add_argument("--port", type=int, default=8080, help="port to listen on (default: %(default)s)")
+    command.add_argument(
+        "--max-sessions",
+        type=int,
+        default=16,
+        help="how many browsers may use it at the same time (default: %(default)s)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -26,7 +32,8 @@ def run(args: argparse.Namespace) -> int:
     handler = logging.StreamHandler()
     handler.setFormatter(_PlainFormatter("symgrasp: %(message)s"))
     logging.basicConfig(level=logging.WARNING, handlers=[handler])
-    page_module("server.serve").serve(args.scene, host=args.host, port=args.port)
+    serve = page_module("server.serve").serve
+    serve(args.scene, host=args.host, port=args.port, max_sessions=args.max_sessions)
     return 0
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 import viser
@@ -15,7 +15,7 @@ import zstandard
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
-from app.server.proxy import HELLO
+from app.server.front_door import HELLO
 
 WAIT = 60.0
 
@@ -27,7 +27,7 @@ CAMERA = {
 
 
 class Wire:
-    """One visitor; comes in through the proxy and keeps what it is shown.
+    """One visitor; comes in at the front door and keeps what it is shown.
 
     Attributes:
         widgets: uuid → the properties of everything in the panels.
@@ -47,7 +47,7 @@ class Wire:
         )
         self._send(CAMERA)
 
-    def __enter__(self) -> Wire:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(

@@ -27,7 +27,7 @@ class Log:
             return lambda value: self.heard.put((name + kind, value))
 
         compiling = lambda: hears("compiling")(None)  # noqa: E731
-        return Job(run, hears("progress"), compiling, hears("done"), hears("failed"))
+        return Job(run, hears("progress"), compiling, lambda: None, hears("done"), hears("failed"))
 
     def next(self) -> tuple[str, Any]:
         return self.heard.get(timeout=WAIT)

@@ -60,3 +60,13 @@ def test_the_plan_is_summed_up():
     assert "2 arms hold the object together in lift" in solution_html(with_plan("log_two_robots", "bimanual"))
     assert load_small("bottle_on_table").name in title_html(opened())
     assert "of an earlier pose" in title_html(changes.moved(opened(), x=0.5))
+
+
+def test_a_computation_that_waits_for_others_says_so_until_it_goes_on():
+    state = job_changes.started(State.of(load_small("soda_can"), ""), 7, "Computing the map")
+    late = job_changes.progressed(state, 7, 0.2, late=True)
+    waiting = job_changes.waiting(late, 7)
+    assert "Computing the map … 20 %" in status_html(late)
+    assert "Computing the map … when other browsers have had their turn" in status_html(waiting)
+    assert job_changes.waiting(late, 8) == late  # of another job
+    assert "Computing the map … 30 %" in status_html(job_changes.progressed(waiting, 7, 0.3))

@@ -31,6 +31,11 @@ def test_a_port_that_is_none_is_an_error(port):
         serve("bottle_on_table", "127.0.0.1", port)
 
 
+def test_a_server_for_nobody_is_an_error():
+    with pytest.raises(InputError, match="--max-sessions: 0: expected a whole number of at least 1"):
+        serve("bottle_on_table", "127.0.0.1", any_port(), max_sessions=0)
+
+
 def test_an_unknown_host_is_an_error():
     with pytest.raises(InputError, match="--host"):
         serve("bottle_on_table", "no.such.host.invalid", 8080)

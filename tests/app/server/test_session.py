@@ -43,7 +43,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 @dataclass
 class Server:
-    """The page being served: its maps, its lobby and the port of its proxy."""
+    """The page being served: its maps, its lobby and the port of its front door."""
 
     cache: SharedCache
     lobby: Lobby
@@ -196,7 +196,7 @@ def test_a_change_looks_a_map_up_once_and_computes_it_only_if_it_is_not_known(se
         assert (looked_up, len(submitted)) == ([False, True], 1)
 
 
-def test_whoever_has_not_come_through_the_proxy_gets_no_session(server):
+def test_whoever_has_not_loaded_the_picture_gets_no_session(server):
     class Stranger(Wire):
         def greet(self, path: str) -> None:
             self.met = path

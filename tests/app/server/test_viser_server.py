@@ -6,14 +6,22 @@ import asyncio
 import dataclasses
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import pytest
 import viser
 from viser.infra import Message
+from websockets.exceptions import InvalidStatus
 
 from app.server import viser_server
-from app.server.viser_server import AsyncMessageBuffer, WakingBuffer, quiet_server
+from app.server.front_door import FrontDoor
+from app.server.viser_server import AsyncMessageBuffer, WakingBuffer, any_port, quiet_server
 from tests.app.wire import Wire
+
+
+def a_door() -> FrontDoor:
+    return FrontDoor("127.0.0.1", any_port(), lambda visit: True, 16)
 
 
 @dataclasses.dataclass
@@ -84,7 +92,7 @@ def test_every_browser_is_served_from_such_a_buffer(monkeypatch):
             super().push(message)
 
     monkeypatch.setattr(viser_server, "WakingBuffer", Watched)
-    server = quiet_server()
+    server = quiet_server(a_door())
     server.scene.add_frame("/everybody")
 
     @server.on_client_connect
@@ -97,7 +105,7 @@ def test_every_browser_is_served_from_such_a_buffer(monkeypatch):
     finally:
         server.stop()
     monkeypatch.undo()
-    quiet_server().stop()  # the next one has viser make the buffers of the application again
+    quiet_server(a_door()).stop()  # the next one has viser make the buffers of the application again
     to_all = {id(buffer) for buffer, message in pushed if "/everybody" in str(message)}
     to_one = {id(buffer) for buffer, message in pushed if "hello" in str(message)}
     assert len(to_all) == len(to_one) == 1
@@ -118,6 +126,26 @@ def test_servers_start_and_stop_without_a_word_and_leave_standard_output_to_othe
             super().stop()
 
     monkeypatch.setattr(viser, "ViserServer", Watched)
-    quiet_server().stop()
+    quiet_server(a_door()).stop()
     assert outs == [sys.stdout, sys.stdout]
     assert capsys.readouterr().out == ""
+
+
+def test_servers_that_are_started_at_once_each_listen_at_their_own_door():
+    with ThreadPoolExecutor(4) as pool:
+        doors = [a_door() for _ in range(4)]
+        servers = list(pool.map(quiet_server, doors))
+    try:
+        assert [server.get_port() for server in servers] == [door._socket.getsockname()[1] for door in doors]
+    finally:
+        for server in servers:
+            server.stop()
+
+
+def test_without_a_door_nobody_comes_in():
+    server = quiet_server()
+    try:
+        with pytest.raises(InvalidStatus, match="503"), Wire(server.get_port()):
+            raise AssertionError
+    finally:
+        server.stop()
