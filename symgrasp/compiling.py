@@ -70,10 +70,13 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     numba's own cache checks only the file that a function stands in. Compiled functions contain copies
     of those that they call, so after a change in one file, callers in other files would run old code.
-    Where the folder of the cache cannot be written, nothing is cached.
+    Where the folder of the cache cannot be written, nothing is cached. With ``NUMBA_DISABLE_JIT`` set,
+    functions are interpreted.
     """
 
     def compile_later(function: Callable[..., Any]) -> Any:
+        if _config.DISABLE_JIT:
+            return function
         before = _config.CACHE_DIR
         _config.CACHE_DIR = _cache_dir(before)
         folder = _config.CACHE_DIR

@@ -17,6 +17,10 @@ from .lobby import open_lobby
 
 __all__ = ["serve"]
 
+SIGNAL_INTERVAL = 0.5
+"""Time (s) after which Ctrl-C is noticed at the latest: the system may hand the signal to any thread, but
+only the main thread acts on it, once it runs."""
+
 
 def serve(scene: str, host: str, port: int, max_sessions: int = 16) -> None:
     """Serve the page until interrupted; the address is printed once it listens.
@@ -40,7 +44,9 @@ def serve(scene: str, host: str, port: int, max_sessions: int = 16) -> None:
         with open_lobby(cache, host, port, max_sessions):
             shown = f"[{host}]" if ":" in host else host
             print(f"symgrasp: http://{shown}:{port}", flush=True)
-            threading.Event().wait()
+            forever = threading.Event()
+            while not forever.wait(SIGNAL_INTERVAL):
+                pass
     except OSError as error:  # the port was taken since the check
         raise _busy(port, (error.strerror or str(error)).lower()) from error
     except KeyboardInterrupt:

@@ -82,7 +82,7 @@ def test_the_server_parses_no_upload_itself(visitor, actions, content, no_parser
     assert "the uploaded one" in title(
         visitor.wait_for(lambda html: "the uploaded one" in html and ready(html))
     )
-    actions.upload_object("can.stl", stl(), 1.0)
+    actions.upload_object("can.stl", stl(), 1.0, None)
     visitor.wait_for(lambda html: shows(visitor, "can.stl (upload)") and ready(html))
     found = planned("pick_pour_place", "sequential").plan
     assert found
@@ -112,10 +112,10 @@ def test_a_hostile_file_is_one_line_and_the_session_goes_on(visitor, actions, co
 
 @pytest.mark.parametrize("name", ["eats", "aborts"])
 def test_a_mesh_that_ends_its_parser_leaves_the_session_as_it_was(visitor, actions, name):
-    actions.upload_object(name, b"", 1.0)
+    actions.upload_object(name, b"", 1.0, None)
     html = visitor.wait_for("more memory than a session may use (4 GB)")
     assert "what you set is kept" in html
-    actions.upload_object("can.stl", stl(), 1.0)
+    actions.upload_object("can.stl", stl(), 1.0, None)
     visitor.wait_for(lambda html: shows(visitor, "can.stl (upload)") and ready(html))
 
 
