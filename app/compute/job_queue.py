@@ -121,6 +121,8 @@ class JobQueue:
         except SymgraspError as error:
             self._notify(job, job.failed, str(error))
         except Exception as error:  # whatever a library raises must not end the thread
+            if self._closed:  # nobody waits, and what the job used may be gone already
+                return
             died = isinstance(error, ProcessDied)
             log.error("a computation failed", exc_info=None if died else error)
             self._finish()

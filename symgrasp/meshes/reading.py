@@ -108,14 +108,15 @@ def _parts(path: Path, field: str, *, upright: bool, materials: bool) -> list[tr
     declared = _declared(path, field)
     kind = path.suffix.lower()[1:]
     try:
-        scene = trimesh.load_scene(
-            io.BytesIO(declared.content),
-            file_type=kind,
-            resolver=FilePathResolver(str(path)) if materials else None,
-            skip_materials=not materials,
-            process=False,
-        )
-        parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+        with np.errstate(all="ignore"):  # numbers that are not finite are refused below
+            scene = trimesh.load_scene(
+                io.BytesIO(declared.content),
+                file_type=kind,
+                resolver=FilePathResolver(str(path)) if materials else None,
+                skip_materials=not materials,
+                process=False,
+            )
+            parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
     except Exception as error:  # trimesh raises whatever its many parsers raise
         raise MeshError(path, field, str(error), f"a {kind.upper()} file that can be read") from error
     count = sum(len(part.faces) for part in parts)

@@ -57,7 +57,8 @@ class RobotModel:
         self.path = Path(path)
         self.urdf = assemble(self.path, mounts)
         try:
-            urdf = yourdfpy.URDF.load(io.BytesIO(self.urdf), build_scene_graph=False, load_meshes=False)
+            with np.errstate(all="ignore"):  # numbers that are not finite are refused below
+                urdf = yourdfpy.URDF.load(io.BytesIO(self.urdf), build_scene_graph=False, load_meshes=False)
             self.name = str(urdf.robot.name)
             root = _root_link(urdf)
         except Exception as error:  # the parser raises whatever its XML library raises
@@ -93,7 +94,7 @@ class RobotModel:
         """Return joints and link names in the order of a breadth-first walk from the root.
 
         Raises:
-            UrdfError: a joint is not connected to the root, or of an unknown type.
+            UrdfError: a joint is not connected to the root, of an unknown type, or moves no link.
         """
         links = [root]
         joints: list[Joint] = []
@@ -107,6 +108,9 @@ class RobotModel:
             for j in ready:
                 if j.type != "fixed" and j.type not in MOVING:
                     raise UrdfError(self.path, f"joint {j.name}", j.type, one_of((*MOVING, "fixed")))
+                if j.child not in self._shapes:
+                    expected = one_of(self._shapes, j.child)
+                    raise UrdfError(self.path, f"joint {j.name}: child", j.child, expected)
                 links.append(j.child)
                 joints.append(self._joint(j, by_name, links))
             remaining = [j for j in remaining if j.parent not in known]
@@ -116,15 +120,17 @@ class RobotModel:
         """Convert a joint of the URDF; ``by_name`` holds all of them.
 
         Raises:
-            UrdfError: its axis, limits or mimic reference are unusable.
+            UrdfError: its origin, axis, limits or mimic reference are unusable.
         """
         origin = np.eye(4) if j.origin is None else np.asarray(j.origin, dtype=float)
+        if not np.isfinite(origin).all():
+            raise UrdfError(self.path, f"joint {j.name}: origin", origin[:3, 3].tolist(), "finite numbers")
         axis = np.array([1.0, 0.0, 0.0] if j.axis is None else j.axis, dtype=float)
         source, ratio, offset = -1, 1.0, 0.0
         lower, upper = -np.inf, np.inf
         if j.type in MOVING:
             length = np.linalg.norm(axis)
-            if length < 1e-9:
+            if not 1e-9 < length < np.inf:
                 raise UrdfError(self.path, f"joint {j.name}: axis", axis.tolist(), "a direction")
             axis = axis / length
             followed, ratio, offset = self._followed(j, by_name)

@@ -153,8 +153,24 @@ def test_a_hand_that_is_not_on_the_robot(panda, change, message):
             "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>",
             "lower and an upper limit",
         ),
+        (
+            "<robot name='r'><link name='base'/><joint name='j' type='fixed'><parent link='base'/>"
+            "<child link='b'/></joint></robot>",
+            "joint j: child: 'b'.*'base'",
+        ),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='fixed'>"
+            "<parent link='a'/><child link='b'/><origin xyz='0 nan 0'/></joint></robot>",
+            "joint j: origin: .*finite",
+        ),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'>"
+            "<parent link='a'/><child link='b'/><axis xyz='0 1e400 0'/></joint></robot>",
+            "joint j: axis",
+        ),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_unusable_urdfs(tmp_path, text, message, capfd):
     path = tmp_path / "robot.urdf"
     path.write_text(text)

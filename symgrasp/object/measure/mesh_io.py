@@ -45,7 +45,8 @@ def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
         raise MeshError(path, "scale", scale, "a number above zero: metres in one unit of the file")
     mesh = read_mesh(path, "content")
     mesh = trimesh.Trimesh(scale * mesh.vertices, mesh.faces, process=False)
-    mesh.merge_vertices(digits_vertex=7)
+    with np.errstate(invalid="ignore"):  # coordinates too large for it are refused below
+        mesh.merge_vertices(digits_vertex=7)
     mesh.update_faces(mesh.unique_faces())  # exporters write a face twice to show both of its sides
     mesh.update_faces(mesh.area_faces > 0)
     if not len(mesh.faces):
