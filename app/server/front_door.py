@@ -22,6 +22,7 @@ import ipaddress
 import logging
 import re
 import socket
+import sys
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -274,8 +275,9 @@ class FrontDoor:
         self._loopback = _is_loopback(host)
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         self._socket = socket.create_server(address[:2], family=family)
-        # The machine acknowledges for a browser that is slowed down, whose answers to pings come late.
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1000 * GONE_TIMEOUT))
+        if sys.platform == "linux":
+            # The machine acknowledges for a browser that is slowed down, whose answers to pings come late.
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1000 * GONE_TIMEOUT))
         self._browsers: set[BrowserConnection] = set()
 
     def serve(
