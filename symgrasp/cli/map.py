@@ -43,9 +43,10 @@ def run(args: argparse.Namespace) -> int:
     if args.out and args.out.suffix not in ENDINGS:
         raise InputError("command line", "--out", str(args.out), "an ending: " + one_of(ENDINGS))
 
+    scene, task, arm = chosen(args)
+
     from symgrasp.feasibility.create import create_map
 
-    scene, task, arm = chosen(args)
     with progress_of(f"map of {task.name}") as progress:
         the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress)
     cells = the_map.reason.size

@@ -149,9 +149,11 @@ def checked_scene(name: str) -> Scene:
         SymgraspError: the scene is unusable, or the object collides with something in a task.
     """
     from symgrasp.scene.scene import Scene
-    from symgrasp.world import check_tasks
 
     scene = Scene.load(name)
+
+    from symgrasp.world import check_tasks  # PyBullet, which a scene that is refused does not need
+
     check_tasks(scene)
     return scene
 
