@@ -122,6 +122,7 @@ class JobQueue:
             self._notify(job, job.failed, str(error))
         except Exception as error:  # whatever a library raises must not end the thread
             if self._closed:  # nobody waits, and what the job used may be gone already
+                log.info("a computation failed as its session ended", exc_info=error)
                 return
             died = isinstance(error, ProcessDied)
             log.error("a computation failed", exc_info=None if died else error)

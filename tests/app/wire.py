@@ -32,20 +32,21 @@ class Wire:
     Attributes:
         widgets: uuid → the properties of everything in the panels.
         commands: label → uuid of the commands in the palette.
+        socket: the connection.
     """
 
     def __init__(self, port: int, query: str = "") -> None:
         self.port, self.query = port, query
         self.widgets: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, str] = {}
-        self._socket = connect(
+        self.socket = connect(
             f"ws://127.0.0.1:{port}",
             origin=Origin(f"http://127.0.0.1:{port}"),
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
             max_size=None,
             open_timeout=WAIT,
         )
-        self._send(CAMERA)
+        self.send(CAMERA)
 
     def __enter__(self) -> Self:
         return self
@@ -53,7 +54,7 @@ class Wire:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._socket.close()
+        self.socket.close()
 
     def html(self) -> str:
         """Everything that is written in the panels."""
@@ -79,23 +80,24 @@ class Wire:
             self._read()
         uuid = found[0]
         self.widgets[uuid]["value"] = value  # what the page sends for an instant before, it sends no more
-        self._send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
+        self.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
 
     def look_from(self, x: float, y: float, z: float) -> None:
         """Move the camera."""
-        self._send({**CAMERA, "position": (x, y, z)})
+        self.send({**CAMERA, "position": (x, y, z)})
 
     def trigger(self, command: str) -> None:
         """Choose a command in the palette, once it is there."""
         while command not in self.commands:
             self._read()
-        self._send({"type": "CommandTriggerMessage", "uuid": self.commands[command]})
+        self.send({"type": "CommandTriggerMessage", "uuid": self.commands[command]})
 
-    def _send(self, message: dict[str, Any]) -> None:
-        self._socket.send(msgspec.msgpack.encode(message))
+    def send(self, message: dict[str, Any]) -> None:
+        """Send a message of viser's protocol."""
+        self.socket.send(msgspec.msgpack.encode(message))
 
     def _read(self, timeout: float = WAIT) -> None:
-        data = self._socket.recv(timeout)
+        data = self.socket.recv(timeout)
         assert isinstance(data, bytes)
         size = int.from_bytes(data[8:16], "little")
         inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])

@@ -316,7 +316,7 @@ class Presser(Wire):
 
     def press_after(self, *messages: bytes, presses: int = 1) -> None:
         for message in messages:
-            self._socket.send(message)
+            self.socket.send(message)
         self.set("button", True)
         self.wait_for(f"pressed {presses} times")
 

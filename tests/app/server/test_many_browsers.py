@@ -64,7 +64,7 @@ class Flooder(Wire):
         try:
             while not stop.is_set():
                 for message in messages:
-                    self._socket.send(message)
+                    self.socket.send(message)
                 self.sent += len(messages)
         except (ConnectionClosed, OSError):
             self.closed = not stop.is_set()
@@ -83,7 +83,7 @@ def flooding(browser: Flooder, messages: list[bytes]) -> Iterator[None]:
         yield
     finally:
         stop.set()
-        browser._socket.socket.shutdown(socket.SHUT_RDWR)
+        browser.socket.socket.shutdown(socket.SHUT_RDWR)
         for thread in threads:
             thread.join(60)
 
@@ -91,7 +91,7 @@ def flooding(browser: Flooder, messages: list[bytes]) -> Iterator[None]:
 def read_on(browser: Wire) -> None:
     try:
         while True:
-            browser._socket.recv()
+            browser.socket.recv()
     except (ConnectionClosed, OSError):
         pass
 
@@ -190,7 +190,7 @@ def test_a_file_that_is_too_large_is_refused_when_it_is_announced(port):
         browser.wait_for(ready)
         for label, limit in {"Upload a mesh": 20, "Open a scene (YAML)": 1, "Open a plan": 5}.items():
             uuid = next(uuid for uuid, w in browser.widgets.items() if w.get("label") == label)
-            browser._send(
+            browser.send(
                 {
                     "type": "FileTransferStartUpload", "source_component_uuid": uuid, "transfer_uuid": label,
                     "filename": f"large {limit}", "mime_type": "", "part_count": 1000,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 import trimesh
@@ -13,7 +14,9 @@ from app.compute import map_service, process_pool
 from app.compute.cache import SharedCache
 from app.files import scene_files
 from app.scene3d.visual_meshes import check_visuals
+from app.server import lobby
 from app.server.actions import Actions
+from app.server.session import Session
 from app.state import object_choice
 from symgrasp.object.measure import measurement
 from symgrasp.plan.plan import Plan
@@ -37,17 +40,29 @@ def server(monkeypatch) -> Iterator[Server]:
 
 
 @pytest.fixture
-def visitor(server) -> Iterator[Wire]:
+def visitor(server, sessions) -> Iterator[Wire]:
     with server.visit() as visitor:
         visitor.wait_for(ready)
         yield visitor
 
 
 @pytest.fixture
-def actions(server, visitor) -> Actions:
+def sessions(monkeypatch) -> list[Session]:
+    """The sessions that are opened, in order."""
+    opened: list[Session] = []
+
+    def recorded(*arguments: Any) -> Session:
+        opened.append(Session(*arguments))
+        return opened[-1]
+
+    monkeypatch.setattr(lobby, "Session", recorded)
+    return opened
+
+
+@pytest.fixture
+def actions(sessions, visitor) -> Actions:
     """What the visitor's widgets ask for."""
-    (session,) = server.lobby._sessions.values()
-    return session.actions
+    return sessions[-1].actions
 
 
 def shows(visitor: Wire, value: str) -> bool:
@@ -119,12 +134,12 @@ def test_a_mesh_that_ends_its_parser_leaves_the_session_as_it_was(visitor, actio
     visitor.wait_for(lambda html: shows(visitor, "can.stl (upload)") and ready(html))
 
 
-def test_no_message_shows_where_the_server_has_its_files(content, tmp_path):
+def test_no_message_shows_where_the_server_has_its_files(content, tmp_path, sessions):
     (tmp_path / "chain.urdf").write_text(chain_urdf(2000))
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump(content))
     with start_server(str(tmp_path / "mine.yaml")) as server, server.visit() as visitor:
         visitor.wait_for(ready)
-        (session,) = server.lobby._sessions.values()
+        (session,) = sessions
         content["robots"][0]["urdf"] = "chain.urdf"
         session.actions.upload_scene("other.yaml", yaml.safe_dump(content).encode())
         html = visitor.wait_for("at most 1,000 of them")
@@ -136,7 +151,7 @@ def test_no_message_shows_where_the_server_has_its_files(content, tmp_path):
         assert str(tmp_path) not in html
 
 
-def test_an_opened_plan_takes_the_maps_that_the_server_has(server, visitor, actions, monkeypatch):
+def test_an_opened_plan_takes_the_maps_that_the_server_has(server, sessions, visitor, actions, monkeypatch):
     results = planned("pick_pour_place", "sequential")
     assert results.plan
     for result in results.maps.values():
@@ -147,8 +162,9 @@ def test_an_opened_plan_takes_the_maps_that_the_server_has(server, visitor, acti
     html = visitor.wait_for(lambda html: "plan.json" in html and ready(html))
     assert "pick_pour_place" in title(html)
     assert kept == []
-    (session,) = server.lobby._sessions.values()
-    shown = session.state.plan_results.maps
+    state = sessions[-1].state
+    assert state
+    shown = state.plan_results.maps
     assert {key: result.map for key, result in shown.items()} == {
         key: result.map for key, result in results.maps.items()
     }
