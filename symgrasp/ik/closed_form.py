@@ -91,6 +91,15 @@ class ClosedFormIK:
                 lower, upper = -np.pi, np.pi
             self.phi = lower + (np.arange(samples) + 0.5) * (upper - lower) / samples
 
+    @property
+    def complete(self) -> bool:
+        """Whether every configuration at the redundancy samples is found, up to rounding.
+
+        A closed form finds all of them: what it does not reach is unreachable. A search may miss one: what it
+        does not reach is *not found*.
+        """
+        return True
+
     @cached_property
     def _solvers(self) -> list[HPRobot]:
         """EAIK's solvers, one for each redundancy sample."""
