@@ -1,0 +1,148 @@
+"""Robots that Python packages ship, and which of their joints and links are an arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["CATALOGUE", "CatalogueArm", "CatalogueRobot"]
+
+PYBULLET = "package://pybullet_data"
+EXAMPLES = "package://example-robot-data/robots"
+
+
+@dataclass(frozen=True)
+class CatalogueArm:
+    """An arm of a robot of the catalogue.
+
+    Attributes:
+        name: its name.
+        joints: its first and its last joint.
+        tool: the link that its hand is on.
+        hand: the named hand (see `symgrasp.robot.hand.HANDS`); None for one that is in the URDF and can only
+            be measured.
+        mount: where a named hand with a URDF of its own sits on the tool: position (m) and roll, pitch and
+            yaw (degrees).
+    """
+
+    name: str
+    joints: tuple[str, str]
+    tool: str
+    hand: str | None = None
+    mount: tuple[tuple[float, float, float], tuple[float, float, float]] = ((0, 0, 0), (0, 0, 0))
+
+
+@dataclass(frozen=True)
+class CatalogueRobot:
+    """A robot of the catalogue.
+
+    Attributes:
+        name: its name in scenes and on the command line.
+        title: what people call it.
+        package: the package on PyPI that ships it.
+        urdf: its URDF, as scene files refer to it.
+        arms: its arms, the one to look at first coming first.
+    """
+
+    name: str
+    title: str
+    package: str
+    urdf: str
+    arms: tuple[CatalogueArm, ...]
+
+
+def _pybullet(name: str, title: str, urdf: str, *arms: CatalogueArm) -> CatalogueRobot:
+    return CatalogueRobot(name, title, "pybullet", f"{PYBULLET}/{urdf}", arms)
+
+
+def _example(name: str, title: str, urdf: str, *arms: CatalogueArm) -> CatalogueRobot:
+    return CatalogueRobot(name, title, "example-robot-data", f"{EXAMPLES}/{urdf}", arms)
+
+
+def _arm(
+    first: str, last: str, tool: str, hand: str | None = None, *, name: str = "arm", rpy_deg=(0, 0, 0), z=0.0
+) -> CatalogueArm:
+    return CatalogueArm(name, (first, last), tool, hand, ((0, 0, z), rpy_deg))
+
+
+def _arms(first: str, last: str, tool: str, sides: tuple[str, str] = ("left", "right")) -> list[CatalogueArm]:
+    """Return two arms that differ in a word of their names, or in an initial."""
+    return [
+        CatalogueArm(name, (first.format(side), last.format(side)), tool.format(side))
+        for name, side in zip(("left", "right"), sides, strict=True)
+    ]
+
+
+def _ur(name: str, title: str) -> CatalogueRobot:
+    arm = _arm("shoulder_pan_joint", "wrist_3_joint", "tool0", "wsg50")
+    return _example(name, title, f"ur_description/urdf/{name}_robot.urdf", arm)
+
+
+CATALOGUE: tuple[CatalogueRobot, ...] = (
+    _pybullet(
+        "panda", "Franka Emika Panda", "franka_panda/panda.urdf",
+        _arm("panda_joint1", "panda_joint7", "panda_grasptarget", "franka"),
+    ),
+    _pybullet(
+        "iiwa", "KUKA LBR iiwa 7", "kuka_iiwa/model.urdf",
+        _arm("lbr_iiwa_joint_1", "lbr_iiwa_joint_7", "lbr_iiwa_link_7", "wsg50", z=0.045),
+    ),
+    _pybullet("xarm6", "UFACTORY xArm6", "xarm/xarm6_robot.urdf", _arm("joint1", "joint6", "link6", "wsg50")),
+    _example(
+        "xarm7", "UFACTORY xArm7", "xarm_description/urdf/xarm7.urdf",
+        _arm("joint1", "joint7", "link_eef", "wsg50"),
+    ),
+    _ur("ur3", "Universal Robots UR3"),
+    _ur("ur5", "Universal Robots UR5"),
+    _ur("ur10", "Universal Robots UR10"),
+    _example("z1", "Unitree Z1", "z1_description/urdf/z1.urdf", _arm("joint1", "joint6", "gripperStator")),
+    _example(
+        "j2s6", "Kinova Jaco 2, 6 joints", "kinova_description/robots/kinova.urdf",
+        _arm("j2s6s200_joint_1", "j2s6s200_joint_6", "j2s6s200_end_effector"),
+    ),
+    _example(
+        "so101", "SO-101", "so_arm_description/urdf/so101.urdf",
+        _arm("shoulder_pan", "wrist_roll", "gripper_frame_link"),
+    ),
+    _example(
+        "pr2", "Willow Garage PR2", "pr2_description/urdf/pr2.urdf",
+        *_arms("{}_shoulder_pan_joint", "{}_wrist_roll_joint", "{}_gripper_tool_frame", ("l", "r")),
+    ),
+    _example(
+        "talos", "PAL TALOS", "talos_data/robots/talos_full_v2.urdf",
+        *_arms("arm_{}_1_joint", "arm_{}_7_joint", "gripper_{}_base_link"),
+    ),
+    _example(
+        "tiago", "PAL TIAGo", "tiago_description/robots/tiago_no_hand.urdf",
+        _arm("arm_1_joint", "arm_7_joint", "wrist_ft_tool_link", "wsg50"),
+    ),
+    _example(
+        "tiago_dual", "PAL TIAGo, two arms", "tiago_description/robots/tiago_dual.urdf",
+        *_arms("arm_{}_1_joint", "arm_{}_7_joint", "hand_{}_grasping_frame"),
+    ),
+    _example(
+        "tiago_pro", "PAL TIAGo Pro", "tiago_pro_description/robots/tiago_pro.urdf",
+        *_arms("arm_{}_1_joint", "arm_{}_7_joint", "gripper_{}_base_link"),
+    ),
+    _example(
+        "icub", "iCub", "icub_description/robots/icub.urdf",
+        *_arms("{}_shoulder_pitch", "{}_wrist_yaw", "{}_gripper", ("l", "r")),
+    ),
+    _example(
+        "romeo", "SoftBank Romeo", "romeo_description/urdf/romeo.urdf",
+        _arm("LShoulderPitch", "LWristPitch", "l_gripper", name="left"),
+        _arm("RShoulderPitch", "RWristPitch", "r_gripper", name="right"),
+    ),
+    _example(
+        "baxter", "Rethink Baxter", "baxter_description/urdf/baxter.urdf",
+        *_arms("{}_s0", "{}_w2", "{}_gripper_base_link"),
+    ),
+    _example(
+        "g1", "Unitree G1", "g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf",
+        *_arms("{}_shoulder_pitch_joint", "{}_wrist_yaw_joint", "{}_hand_palm_link"),
+    ),
+    _example(
+        "alex", "IHMC Alex", "alex_description/urdf/alex_sake_hands.urdf",
+        *_arms("{}ShoulderPitch", "{}GripperYaw", "{}SakePalmLink", ("Left", "Right")),
+    ),
+)  # fmt: skip
+"""The robots, single arms first."""
