@@ -1,4 +1,4 @@
-"""Files: resolving references between them, parsing YAML, and writing atomically."""
+"""Files: parsing YAML, and writing atomically."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
-from urllib.parse import unquote
 
 import yaml
 
@@ -27,10 +25,8 @@ __all__ = [
     "SCENES_DIR",
     "check_size",
     "file_sha256",
-    "package_dir",
     "parse_yaml",
     "read_file",
-    "resolve",
     "temporary_folder",
     "write_atomically",
 ]
@@ -48,60 +44,6 @@ SCENES = "static_scenes"
 
 SCENES_DIR = (_PACKAGE if (_PACKAGE / SCENES).is_dir() else _PACKAGE.parent) / SCENES
 """The shipped scenes and their meshes: inside this package where it is installed, beside it in a checkout."""
-
-
-def package_dir(name: str) -> Path | None:
-    """Return the folder of an importable Python package without importing it, or None.
-
-    ``static_scenes``, which files refer to as a package, is the folder of the shipped scenes wherever
-    that is.
-    """
-    if name == SCENES:
-        return SCENES_DIR
-    if "." in name:  # finding a subpackage would import its parent
-        return None
-    try:
-        spec = find_spec(name)
-    except (ImportError, ValueError):
-        return None
-    if spec is None or not spec.submodule_search_locations:
-        return None
-    return Path(next(iter(spec.submodule_search_locations)))
-
-
-def resolve(reference: str, folder: Path) -> Path | None:
-    """Resolve a reference to a file.
-
-    Args:
-        reference: ``package://<package>/<path>``, ``file://<path>``, or a path relative to
-            ``folder``; as it is, or with ``%20`` for a space and the like. Where no Python package of
-            that name holds the file, the folders above ``folder`` are searched for
-            ``<package>/<path>``, as ROS packages are laid out.
-        folder: folder of the file that holds the reference.
-
-    Returns:
-        The existing file, or None.
-    """
-    candidates = [path for text in (reference, unquote(reference)) for path in _candidates(text, folder)]
-    return next((path for path in candidates if _is_file(path)), None)
-
-
-def _candidates(reference: str, folder: Path) -> list[Path]:
-    """Return the paths that a reference may stand for, in the order in which they are tried."""
-    if not reference.startswith("package://"):
-        return [folder / reference.removeprefix("file://")]
-    rest = reference.removeprefix("package://")
-    package, _, inner = rest.partition("/")
-    root = package_dir(package)
-    inside = [root / inner] if root else []
-    return [*inside, *(parent / rest for parent in (folder, *folder.parents))]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name that is too long, or has a null character
-        return False
 
 
 def file_sha256(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""References to files; and files that are made to break their reader, which are refused first."""
+"""Files that are made to break their reader are refused before they are read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from symgrasp.files import DEEPEST, LARGEST_YAML, LONGEST, MOST_VALUES, parse_yaml, read_file, resolve
+from symgrasp.files import DEEPEST, LARGEST_YAML, LONGEST, MOST_VALUES, parse_yaml, read_file
 from tests.hostile import doubling_yaml
 
 
@@ -69,33 +69,3 @@ def test_no_more_of_a_file_is_read_than_it_may_hold(tmp_path):
     if endless.exists():
         with pytest.raises(ValueError, match="more than 1 MB"):
             read_file(endless, LARGEST_YAML)
-
-
-@pytest.mark.parametrize(
-    "reference",
-    [
-        "my robot/arm.urdf", "my%20robot/arm.urdf", "file://my%20robot/arm.urdf",
-        "file://{here}/my robot/arm.urdf",
-        "file://{here}/my%20robot/arm.urdf", "{here}/my%20robot/arm.urdf", "package://my%20robot/arm.urdf",
-    ],
-)  # fmt: skip
-def test_references_with_spaces(tmp_path, reference):
-    (tmp_path / "my robot").mkdir()
-    path = tmp_path / "my robot/arm.urdf"
-    path.touch()
-    found = resolve(reference.format(here=tmp_path), tmp_path)
-    assert found == path
-
-
-def test_a_name_that_holds_a_percent_sign_comes_first(tmp_path):
-    for name in ("a%20b.stl", "a b.stl"):
-        (tmp_path / name).touch()
-    assert resolve("a%20b.stl", tmp_path) == tmp_path / "a%20b.stl"
-    assert resolve("a b.stl", tmp_path) == tmp_path / "a b.stl"
-
-
-@pytest.mark.parametrize(
-    "reference", ["", "missing.stl", "file:///missing.stl", "%00", "x" * 5000, "package://"]
-)
-def test_what_is_not_there(tmp_path, reference):
-    assert resolve(reference, tmp_path) is None

@@ -10,8 +10,9 @@ import pytest
 from docs.imports import MODULES, imported, room_of
 
 ROOMS = [
-    "symgrasp.errors", "symgrasp.progress", "symgrasp.files", "symgrasp.page", "symgrasp.compiling",
-    "symgrasp.poses", "symgrasp.meshes", "symgrasp.reason", "symgrasp.object", "symgrasp.robot",
+    "symgrasp.errors", "symgrasp.progress", "symgrasp.files", "symgrasp.references", "symgrasp.page",
+    "symgrasp.compiling", "symgrasp.poses", "symgrasp.meshes", "symgrasp.reason", "symgrasp.object",
+    "symgrasp.robot",
     "symgrasp.ik", "symgrasp.scene", "symgrasp.world", "symgrasp.engine", "symgrasp.feasibility",
     "symgrasp.plan", "symgrasp.planners", "symgrasp.bench", "symgrasp.cli", "symgrasp.__main__",
     "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute", "app.panels",

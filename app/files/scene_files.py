@@ -1,8 +1,9 @@
 """Scenes as files of the page: saving a changed scene, and reading an uploaded one safely.
 
 An uploaded scene is not trusted: it must not make the server read arbitrary files. It may refer to
-files that installed Python packages ship (``package://…``) and to files in the server's own folders
-of scenes; anything else is an error, which does not reveal whether there is such a file.
+files of installed packages (``package://…``; not to what merely lies in a folder above) and to files in
+the server's own folders of scenes; anything else is an error, which does not reveal whether there is
+such a file.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import yaml
 from pydantic import ValidationError
 
 from symgrasp.errors import SceneError
-from symgrasp.files import LARGEST_YAML, SCENES_DIR, package_dir, parse_yaml, resolve
+from symgrasp.files import LARGEST_YAML, SCENES_DIR, parse_yaml
+from symgrasp.references import package_dirs, portable, resolve
 from symgrasp.scene.format import SceneFile, describe_error
 from symgrasp.scene.scene import Scene
 
@@ -84,7 +86,7 @@ def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> UploadedSc
         raise SceneError(source, *describe_error(error, data)) from None
     roots = [folder.resolve() for folder in folders]
     for field, holder, key in _references(plain):
-        holder[key] = str(_allowed(source, field, holder[key], roots))
+        holder[key] = _allowed(source, field, holder[key], roots)
     return UploadedScene(f"{source} (upload)", Scene.from_content(plain, source))
 
 
@@ -108,22 +110,15 @@ def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable
         _allowed(source, field, reference, roots)
 
 
-def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> Path | str:
-    """Return the path of an allowed reference; one into a package is returned unchanged."""
-    if reference.startswith("package://"):
-        package = package_dir(reference.removeprefix("package://").partition("/")[0])
-        # A folder in the working directory would pass for a namespace package: require code in it.
-        if package and ((package / "__init__.py").is_file() or package.resolve() == SCENES_DIR):
-            path = _inside(resolve(reference, package), [package.resolve()])
-            if path:
-                return reference
-    else:
-        for root in roots:
-            if path := _inside(resolve(reference, root), roots):
-                return path
-    expected = (
-        "a file that a Python package ships (package://<package>/<path>), or one of the server's scenes"
-    )
+def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> str:
+    """Return an allowed reference, made valid from any folder."""
+    packages = package_dirs(reference)
+    for root in packages or roots:
+        found = resolve(reference, root)
+        path = _inside(found, [root.resolve()] if packages else roots)
+        if found and path:
+            return portable(reference, found) or str(path)
+    expected = "a file of an installed package (package://<package>/<path>), or one of the server's scenes"
     raise SceneError(source, field, reference, expected)
 
 

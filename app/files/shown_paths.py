@@ -25,7 +25,10 @@ def shown_paths(text: str) -> str:
     (``package://…``), any other by its name alone.
     """
     packages = [Path(entry) for entry in sys.path if entry.endswith("-packages")]
-    references = {SCENES_DIR: f"package://{SCENES_DIR.name}/"} | dict.fromkeys(packages, "package://")
+    data = [folder / "cmeel.prefix" / "share" for folder in packages]
+    references = {SCENES_DIR: f"package://{SCENES_DIR.name}/"} | dict.fromkeys(
+        (*data, *packages), "package://"
+    )
     for folder, reference in references.items():
         for path in dict.fromkeys((folder, folder.resolve())):
             text = text.replace(f"{path}{os.sep}", reference)

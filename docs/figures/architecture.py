@@ -31,7 +31,8 @@ class Place(NamedTuple):
 PLACES = {
     "symgrasp.compiling": Place(0, 0), "symgrasp.poses": Place(2, 0), "symgrasp.files": Place(3, 0),
     "symgrasp.errors": Place(4, 0), "symgrasp.progress": Place(6, 0), "symgrasp.meshes": Place(4, 1),
-    "symgrasp.page": Place(5, 1), "symgrasp.object": Place(2, 2), "symgrasp.robot": Place(2, 3),
+    "symgrasp.page": Place(5, 1), "symgrasp.references": Place(3, 2.7),
+    "symgrasp.object": Place(2, 2), "symgrasp.robot": Place(2, 3),
     "symgrasp.ik": Place(1, 4), "symgrasp.scene": Place(2, 4), "symgrasp.reason": Place(3, 4),
     "symgrasp.world": Place(2, 5), "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),
     "symgrasp.plan": Place(2, 8), "symgrasp.planners": Place(2, 9), "symgrasp.bench": Place(2, 10),

@@ -25,6 +25,7 @@ __all__ = [
     "Commands",
     "add_command",
     "add_out",
+    "add_packages",
     "add_plan",
     "add_scene",
     "add_task_and_arm",
@@ -73,11 +74,30 @@ def add_scene(command: argparse.ArgumentParser, *, optional: bool = False) -> No
     command.add_argument(
         "scene", metavar="SCENE", help=text, nargs="?" if optional else None, default=DEFAULT_SCENE
     )
+    add_packages(command)
+
+
+def add_packages(command: argparse.ArgumentParser) -> None:
+    """Add ``--package``, which names the folders of packages that files refer to."""
+    text = "folder of what files refer to as package://NAME/…; may be given several times"
+    command.add_argument("--package", metavar="NAME=DIR", type=_package, action="append", help=text)
+
+
+def _package(text: str) -> str:
+    """Read a value of ``--package``, which counts from then on."""
+    from symgrasp.references import give_packages
+
+    try:
+        give_packages([text])
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
 
 
 def add_plan(command: argparse.ArgumentParser) -> None:
     """Add the argument PLAN, a file that is read."""
     command.add_argument("plan", metavar="PLAN", type=Path, help="a plan file")
+    add_packages(command)
 
 
 def add_task_and_arm(command: argparse.ArgumentParser) -> None:

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from symgrasp.errors import UrdfError, one_of
-from symgrasp.files import read_file, resolve
+from symgrasp.files import read_file
 from symgrasp.poses import Array, from_position_quat, rpy
+from symgrasp.references import resolve, sought
 
 __all__ = ["Frame", "Mount", "assemble"]
 
@@ -101,7 +102,8 @@ def _read(path: Path) -> ET.Element:
             reference = mesh.get("filename", "")
             file = resolve(reference, path.parent)
             if file is None:
-                raise UrdfError(path, f"link {link.get('name')}", reference, "an existing mesh file")
+                expected = sought(reference, path.parent, "mesh")
+                raise UrdfError(path, f"link {link.get('name')}", reference, expected)
             mesh.set("filename", str(file.resolve()))
     return robot
 

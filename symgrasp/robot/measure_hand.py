@@ -11,9 +11,9 @@ import yaml
 from scipy.spatial import ConvexHull
 
 from symgrasp.errors import UrdfError, printable
-from symgrasp.files import resolve
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, from_rotation, inverse, quat_wxyz, rpy
+from symgrasp.references import resolve, sought
 from symgrasp.robot.assembly import Frame
 from symgrasp.robot.gripper import (
     PAD_HALF_HEIGHT,
@@ -63,7 +63,7 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
 
     Args:
         urdf: the hand's URDF, or that of a robot with the hand on it: loaded, a path, or
-            ``package://<python package>/<path>``.
+            ``package://<package>/<path>``.
         tool: a link fixed to the palm, needed where a robot has several hands. Where its origin lies
             in front of the palm, it becomes that of the tool frame; the axes are measured.
 
@@ -98,7 +98,7 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
 def _load(reference: str | Path) -> RobotModel:
     path = resolve(str(reference), Path())
     if path is None:
-        raise UrdfError(reference, "urdf", str(reference), "an existing URDF file")
+        raise UrdfError(reference, "urdf", str(reference), sought(str(reference), Path(), "URDF"))
     return RobotModel(path)
 
 

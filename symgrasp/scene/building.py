@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from symgrasp.errors import InputError, MeshError, SceneError, one_of
-from symgrasp.files import file_sha256, resolve
+from symgrasp.files import file_sha256
 from symgrasp.object.library import library_objects, load_object
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array
+from symgrasp.references import portable, resolve, sought
 from symgrasp.robot.assembly import Mount
 from symgrasp.robot.hand import HANDS, Hand
 from symgrasp.robot.model import RobotModel
@@ -132,12 +133,11 @@ class SceneBuilder:
         return hand.model_copy(update={"urdf": self._reference(f"{field}.urdf", hand.urdf, "URDF")})
 
     def _reference(self, field: str, reference: str, kind: str) -> str:
-        """Return a file reference made absolute; raise SceneError if there is no such file."""
+        """Return a file reference made valid from any folder; raise SceneError if there is no such file."""
         path = resolve(reference, self.folder)
         if path is None:
-            expected = "package://<python package>/<path>, or a path relative to the scene"
-            raise SceneError(self.source, field, reference, f"an existing {kind} file: {expected}")
-        return reference if reference.startswith("package://") else str(path.resolve())
+            raise SceneError(self.source, field, reference, sought(reference, self.folder, kind))
+        return portable(reference, path) or str(path.resolve())
 
     def _path(self, reference: str) -> Path:
         """Return the file of a reference that `_reference` has checked."""

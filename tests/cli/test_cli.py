@@ -13,11 +13,13 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+import yaml
 
 from docs.schemas import schemas
 from symgrasp.cli import export
 from symgrasp.cli.main import main
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.files import SCENES_DIR
 from symgrasp.object.library import load_object
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan, plan_schema
@@ -313,3 +315,27 @@ def test_long_values_are_shortened_in_the_middle(tmp_path, capsys):
     assert line.startswith("symgrasp: " + str(path)[:20])
     assert "…" in line
     assert "expected" in line
+
+
+@pytest.mark.parametrize("command", ["map", "explain", "plan", "verify", "export", "hand", "app"])
+def test_every_command_that_reads_a_scene_or_a_urdf_takes_packages(command, capsys, tmp_path):
+    with pytest.raises(SystemExit):
+        main([command, "--package", f"arms={tmp_path / 'missing'}"])
+    assert "missing': expected NAME=DIR, with an existing folder" in capsys.readouterr().err
+
+
+def test_a_package_that_an_option_names(content, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("SYMGRASP_PACKAGES", "")
+    content["map"] = {"heights": 2, "angles": 4, "redundancy": 2}
+    content["obstacles"].append(
+        {"name": "rock", "mesh": "package:///stones/a%20rock.obj", "pose": {"position": [0, 3, 0]}}
+    )
+    (tmp_path / "a rock.obj").write_bytes((SCENES_DIR / "bowl.obj").read_bytes())
+    scene = tmp_path / "scene" / "scene.yaml"
+    scene.parent.mkdir()
+    scene.write_text(yaml.safe_dump(content))
+    assert main(["map", str(scene)]) == 2
+    assert "no package 'stones' in --package NAME=DIR" in capsys.readouterr().err
+    assert main(["map", str(scene), "--package", f"stones={tmp_path}"]) == 0
+    (found,) = (o for o in Scene.load(scene).file.obstacles if o.name == "rock")
+    assert found.mesh == str(tmp_path / "a rock.obj")

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symgrasp.errors import MeshError
-from symgrasp.files import package_dir
 from symgrasp.object.measure.axis import find_axis
 from symgrasp.object.measure.measurement import SIMPLIFY_TOLERANCE, Measurement, measure_mesh
 from symgrasp.object.measure.meridian import column_angles, cut, envelope
@@ -20,6 +19,7 @@ from symgrasp.object.measure.mesh_io import read_single_object
 from symgrasp.object.measure.outline import distance_outside, simplify
 from symgrasp.object.profile import Profile
 from symgrasp.poses import from_position_quat, from_position_rpy, inverse
+from symgrasp.references import package_dir
 
 MUG = Path(package_dir("pybullet_data") or "") / "objects/mug.obj"
 

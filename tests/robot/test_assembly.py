@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from symgrasp.errors import UrdfError
-from symgrasp.files import resolve
 from symgrasp.poses import from_position_rpy, quat_wxyz
+from symgrasp.references import resolve
 from symgrasp.robot import assembly
 from symgrasp.robot.assembly import (
     DEEPEST,
@@ -125,3 +125,14 @@ def test_meshes_become_absolute_and_colours_stay_apart(tmp_path):
     used = [m.get("name") for m in robot.iterfind("link/visual/material")]
     assert len(set(used)) == 2
     assert [c.get("rgba") for name in used if (c := colors[name]) is not None] == ["1 0 0 1", "0 1 0 1"]
+
+
+@pytest.mark.parametrize("robot", ["talos_data/robots/talos_reduced", "ur_description/urdf/ur5_robot"])
+def test_robots_of_a_data_package_find_their_meshes(robot):
+    """The first refers to them with three slashes."""
+    path = resolve(f"package://example-robot-data/robots/{robot}.urdf", Path())
+    assert path is not None
+    model = RobotModel(path)
+    meshes = [shape.path for link in model.colliding_links() for shape in model.shapes(link)]
+    assert all(mesh is None or mesh.is_file() for mesh in meshes)
+    assert any(meshes)

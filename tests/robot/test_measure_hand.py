@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from symgrasp.cli.main import main
 from symgrasp.errors import UrdfError
-from symgrasp.files import resolve
 from symgrasp.poses import from_rotation, rpy
+from symgrasp.references import resolve
 from symgrasp.robot.hand import HANDS, Hand
 from symgrasp.robot.measure_hand import hand_yaml, measure_hand
 from symgrasp.robot.model import RobotModel

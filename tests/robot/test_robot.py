@@ -7,7 +7,7 @@ import pytest
 import yourdfpy
 
 from symgrasp.errors import UrdfError
-from symgrasp.files import package_dir
+from symgrasp.references import package_dir
 from symgrasp.robot.hand import HANDS, Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot

@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 from symgrasp.errors import MeshError, UrdfError
-from symgrasp.files import package_dir
 from symgrasp.meshes import MESH_ENDINGS
+from symgrasp.references import package_dir
 from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import link_names, load_urdf
 from symgrasp.world.shapes import link_shapes

@@ -109,8 +109,7 @@ def test_an_uploaded_scene_reads_no_other_file_and_does_not_say_whether_there_is
     with pytest.raises(SymgraspError) as error:
         read_scene("mine.yaml", yaml.safe_dump(content).encode(), (secret, SCENES_DIR))
     assert str(error.value).endswith(
-        "expected a file that a Python package ships (package://<package>/<path>), "
-        "or one of the server's scenes"
+        "expected a file of an installed package (package://<package>/<path>), or one of the server's scenes"
     )
 
 

@@ -11,6 +11,8 @@ from app.files.shown_paths import shown_paths
 from symgrasp.errors import MeshError, UrdfError
 from symgrasp.files import SCENES_DIR
 
+SITE = next(entry for entry in sys.path if entry.endswith("-packages"))
+
 
 @pytest.mark.parametrize(
     ("text", "shown"),
@@ -20,6 +22,7 @@ from symgrasp.files import SCENES_DIR
         ("/home/My Files/a robot.urdf: links", "a robot.urdf: links"),
         ("mesh file:///srv/data/a.stl (/srv/data/b.stl)", "mesh a.stl (b.stl)"),
         (r"C:\Users\me\a.stl: content", "a.stl: content"),
+        (f"{SITE}/cmeel.prefix/share/arms/a.urdf: link a", "package://arms/a.urdf: link a"),
         (f"{SCENES_DIR}/hands/pr2.urdf: link a", "package://static_scenes/hands/pr2.urdf: link a"),
     ],
 )  # fmt: skip
