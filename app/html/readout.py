@@ -15,6 +15,7 @@ __all__ = [
     "count_text",
     "grasp_html",
     "notes_html",
+    "scene_notes_html",
     "sequence_html",
     "solution_html",
     "status_html",
@@ -97,6 +98,14 @@ def notes_html(state: State) -> str:
     """Show the last problem and the obstacles that the object is inside of."""
     notes = [_note(state.problem, "error")] if state.problem else []
     return "".join(notes + [_note(contact, "warning") for contact in state.contacts])
+
+
+def scene_notes_html(state: State) -> str:
+    """Show what the scene's file does not say and was guessed."""
+    notes = "".join(f"<li>{escape(note)}</li>" for note in state.scene.notes)
+    return (
+        f'<div class="sg sg-note" role="note">Not in the scene file:<ul>{notes}</ul></div>' if notes else ""
+    )
 
 
 def sequence_html(state: State) -> str:

@@ -6,6 +6,7 @@ import viser
 
 from symgrasp.robot.hand import HANDS
 
+from ..html.readout import scene_notes_html
 from ..state import changes
 from ..state.state import State
 from .actions import Actions
@@ -34,6 +35,7 @@ class ScenePanel(Panel):
             self.arm = self.dropdown("Arm")
             self.hand = self.dropdown("Hand", MOUNTABLE, visible=False)
             self.flat_map = gui.add_checkbox("Flat map", True)
+            self.notes = self.html()
         self.on_select(self.scene, actions.open_scene)
         self.on_select(self.hand, actions.choose_hand)
         self.on(self.task, lambda s, v: changes.choose_task(s, v))
@@ -41,7 +43,7 @@ class ScenePanel(Panel):
         self.on(self.flat_map, lambda s, v: changes.switched(s, flat_map=v))
 
     def show(self, state: State) -> None:
-        """Offer the tasks and arms of the scene, and the uploaded scene."""
+        """Offer the tasks and arms of the scene, and the uploaded scene; say what was guessed of it."""
         scenes = (*self._scenes, *([state.uploaded_scene.option] if state.uploaded_scene else []))
         if self.scene.options != scenes:
             self.scene.options = scenes
@@ -49,6 +51,7 @@ class ScenePanel(Panel):
             self.task.options = tasks
         if self.arm.options != (arms := state.scene.task(state.task).arms):
             self.arm.options = arms
+        self.notes.show(scene_notes_html(state))
 
     def write_inputs(self, state: State) -> None:
         """Set what is chosen."""

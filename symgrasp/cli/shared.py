@@ -175,6 +175,8 @@ def checked_scene(name: str) -> Scene:
     from symgrasp.world import check_tasks  # PyBullet, which a scene that is refused does not need
 
     check_tasks(scene)
+    for note in scene.notes:
+        warn(f"{scene.name}: {note}")
     return scene
 
 

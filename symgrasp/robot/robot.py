@@ -49,7 +49,7 @@ class Arm:
         robot: the robot that it belongs to.
         tool: the tool link.
         hand: the hand at the tool.
-        shared: joints of the chain that belong to another arm as well.
+        shared: joints of the chain that are not the arm's: shared with another arm, or of the torso.
 
     Raises:
         UrdfError: the tool, a hand link or a hand joint is not in the URDF, or the chain has
@@ -83,13 +83,22 @@ class Arm:
         joints = [
             j
             for j in model.chain(tool)
-            if j.source >= 0 and j.kind != "prismatic" and j.name not in shared and j.name not in hand.joints
+            if j.name in model.joint_names
+            and j.kind != "prismatic"
+            and j.name not in shared
+            and j.name not in hand.joints
         ]
         if len(joints) not in (6, 7):
             names = [j.name for j in joints]
             raise UrdfError(model.path, f"arm {name}", names, f"6 or 7 revolute joints, not {len(joints)}")
         self.joint_names = tuple(j.name for j in joints)
         self.indices = np.array([model.joint_names.index(n) for n in self.joint_names])
+        for j in model.chain(tool):
+            if j.source in self.indices and j.name not in self.joint_names:
+                followed = model.joint_names[j.source]
+                raise UrdfError(
+                    model.path, f"joint {j.name}: mimic", followed, "an arm of independent joints"
+                )
         self.lower, self.upper = model.lower[self.indices], model.upper[self.indices]
         self.H, self.P, self.R0 = self._screws(joints)
 

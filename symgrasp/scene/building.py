@@ -1,4 +1,4 @@
-"""Building robots, arms, obstacles and tasks from a scene file, with every name and file resolved."""
+"""Building object, obstacles and tasks from a scene file, with every name and file resolved."""
 
 from __future__ import annotations
 
@@ -6,19 +6,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from symgrasp.errors import InputError, MeshError, SceneError, one_of
+from symgrasp.errors import MeshError, SceneError, one_of
 from symgrasp.files import file_sha256
 from symgrasp.object.library import library_objects, load_object
 from symgrasp.object.profile import Profile
-from symgrasp.poses import Array
 from symgrasp.references import portable, resolve, sought
-from symgrasp.robot.assembly import Mount
-from symgrasp.robot.hand import HANDS, Hand
-from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.format import (
     SHAPES,
-    ArmFile,
     HandFile,
     ObjectFile,
     ObstacleFile,
@@ -27,6 +22,7 @@ from symgrasp.scene.format import (
     TaskFile,
 )
 from symgrasp.scene.parts import Obstacle, SceneParts, Task
+from symgrasp.scene.robots import RobotBuilder
 
 __all__ = ["SceneBuilder"]
 
@@ -42,7 +38,7 @@ class SceneBuilder:
 
     def __init__(self, file: SceneFile, source: str, folder: Path) -> None:
         self.file, self.source, self.folder = file, source, folder
-        self._models: dict[tuple[Path, tuple[Mount, ...]], RobotModel] = {}
+        self._robots = RobotBuilder(source, folder)
 
     def build(self) -> SceneParts:
         """Resolve names and files, load robots and object, and check what the format alone cannot.
@@ -62,18 +58,22 @@ class SceneBuilder:
         self._unique("robots, obstacles and object", names)
         robots: dict[str, Robot] = {}
         arms: dict[str, Arm] = {}
+        entries, notes = [], []
         for i, entry in enumerate(file.robots):
-            robot, own = self._robot(i, entry)
-            robots[robot.name] = robot
-            self._unique("arms", [*arms, *(arm.name for arm in own)])
-            arms |= {arm.name: arm for arm in own}
+            built = self._robots.build(i, entry)
+            robots[built.robot.name] = built.robot
+            self._unique("arms", [*arms, *(arm.name for arm in built.arms)])
+            arms |= {arm.name: arm for arm in built.arms}
+            entries.append(built.file)
+            notes += built.notes
         return SceneParts(
-            file,
+            file.model_copy(update={"robots": tuple(entries)}),
             robots,
             arms,
             profile,
             tuple(self._obstacle(o) for o in file.obstacles),
             {t.name: self._task(i, t, arms) for i, t in enumerate(file.tasks)},
+            tuple(notes),
         )
 
     def _unique(self, field: str, names: Iterable[str]) -> None:
@@ -145,125 +145,6 @@ class SceneBuilder:
         assert path is not None  # checked by _reference
         return path
 
-    def _robot(self, i: int, entry: RobotFile) -> tuple[Robot, list[Arm]]:
-        """Return the robot with index i in the file, and its arms."""
-        field = f"robots[{i}]"
-        fields = [field] if entry.arms is None else [f"{field}.arms[{k}]" for k in range(len(entry.arms))]
-        files = entry.arm_files()
-        hands = [self._hand(f, a) for f, a in zip(fields, files, strict=True)]
-        mounts, tools = [], []
-        for f, a, hand in zip(fields, files, hands, strict=True):
-            mounts += self._mount(f, a, hand, entry)
-            tools.append(self._tool(f, a, hand))
-            if a.tool is None and hand.tool is not None and not hand.tool.is_link:
-                mounts.append(Mount(hand.tool, None, tools[-1]))
-        model = self._model(self._path(entry.urdf), tuple(mounts))
-        chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
-        shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
-        home = self._home(i, entry, model, chains, shared, hands)
-        robot = Robot(entry.name, model, entry.base.matrix(), home)
-        parts = zip(files, tools, hands, strict=True)
-        return robot, [Arm(a.name, robot, tool, hand, shared) for a, tool, hand in parts]
-
-    def _model(self, path: Path, mounts: tuple[Mount, ...]) -> RobotModel:
-        """Return the model of a URDF with mounts, shared by robots that are alike."""
-        if (path, mounts) not in self._models:
-            self._models[path, mounts] = RobotModel(path, mounts)
-        return self._models[path, mounts]
-
-    def _mount(self, field: str, arm: ArmFile, hand: Hand, robot: RobotFile) -> list[Mount]:
-        """Return the mount of the arm's hand; none where the hand is part of the robot's URDF."""
-        if arm.mount is None:
-            return []
-        if hand.urdf is None:
-            raise SceneError(self.source, f"{field}.mount", hand.name, "a hand with a urdf of its own")
-        bare = self._model(self._path(robot.urdf), ())
-        if arm.mount.link not in bare.link_names:
-            expected = f"a link of {bare.path.name}: " + one_of(bare.link_names, arm.mount.link)
-            raise SceneError(self.source, f"{field}.mount.link", arm.mount.link, expected)
-        return [Mount(arm.mount.frame(), self._path(hand.urdf), arm.mount.prefix)]
-
-    def _tool(self, field: str, arm: ArmFile, hand: Hand) -> str:
-        """Return the name of the link that is the arm's tool frame."""
-        if arm.tool is not None:
-            return arm.tool
-        if hand.tool is None:
-            raise SceneError(
-                self.source, f"{field}.tool", None, f"a link; hand {hand.name} names none itself"
-            )
-        return hand.tool.link if hand.tool.is_link else f"{arm.name}_tool"
-
-    def _chain(self, field: str, tool: str, model: RobotModel) -> list[str]:
-        """Return the names of the revolute joints from the root to the tool link."""
-        if tool not in model.link_names:
-            expected = f"a link of {model.path.name}: " + one_of(model.link_names, tool)
-            raise SceneError(self.source, f"{field}.tool", tool, expected)
-        return [j.name for j in model.chain(tool) if j.source >= 0 and j.kind != "prismatic"]
-
-    def _hand(self, field: str, arm: ArmFile) -> Hand:
-        """Return an arm's hand, with the prefix of its mount."""
-        if isinstance(arm.hand, str):
-            if arm.hand not in HANDS:
-                raise SceneError(self.source, f"{field}.hand", arm.hand, one_of(HANDS, arm.hand))
-            hand = HANDS[arm.hand]
-        else:
-            tool = arm.hand.tool
-            fields = {**dict(arm.hand), "tool": tool and tool.frame()}
-            try:
-                hand = Hand(**fields)
-            except InputError as error:
-                where = f"{field}.hand.{error.field}"
-                raise SceneError(self.source, where, error.value, error.expected) from None
-        return hand.prefixed(arm.mount.prefix) if arm.mount else hand
-
-    def _home(
-        self,
-        i: int,
-        entry: RobotFile,
-        model: RobotModel,
-        chains: list[list[str]],
-        shared: frozenset[str],
-        hands: list[Hand],
-    ) -> Array:
-        """Return the parked values (n,) of all joints of a robot.
-
-        Args:
-            i: index of the robot in the file.
-            entry: the robot in the file.
-            model: its URDF.
-            chains: joint names of each arm.
-            shared: names of the joints that several arms share.
-            hands: the hand of each arm, open unless the file says otherwise.
-        """
-        field = f"robots[{i}].home"
-        values = model.default_values()
-        for hand in hands:
-            for name, value in hand.joint_values(hand.max_opening).items():
-                if name in model.joint_names:
-                    values[model.joint_names.index(name)] = value
-        order = [n for chain in chains for n in chain if n not in shared]
-        given: Mapping[str, float]
-        if entry.home is None:
-            given = {}
-        elif isinstance(entry.home, dict):
-            given = entry.home
-        elif len(entry.home) != len(order):
-            raise SceneError(
-                self.source, field, list(entry.home), f"{len(order)} values, for " + ", ".join(order)
-            )
-        else:
-            given = dict(zip(order, entry.home, strict=True))
-        for name, value in given.items():
-            if name not in model.joint_names:
-                raise SceneError(self.source, field, name, one_of(model.joint_names, name))
-            k = model.joint_names.index(name)
-            if not model.lower[k] <= value <= model.upper[k]:
-                limits = f"{name} within [{model.lower[k]:g}, {model.upper[k]:g}]"
-                raise SceneError(self.source, field, value, limits)
-            values[k] = value
-        values.setflags(write=False)
-        return values
-
     def _obstacle(self, o: ObstacleFile) -> Obstacle:
         kind = next(k for k in SHAPES if getattr(o, k) is not None)
         size: tuple[float, ...] = ()
@@ -277,7 +158,7 @@ class SceneBuilder:
             size = (o.sphere.radius,)
         elif o.urdf is not None:
             path = self._path(o.urdf)
-            model = self._model(path, ())
+            model = self._robots.model(path)
             digest = model.sha256
         else:
             size = 3 * (1.0 if o.scale is None else o.scale,)

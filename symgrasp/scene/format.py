@@ -129,10 +129,15 @@ class MountFile(FrameFile):
 
 
 class ArmFile(_Strict):
-    """An arm of a robot that has several; the tool is the hand's own unless given."""
+    """An arm of a robot that has several; the tool is the hand's own unless given.
+
+    ``joints`` names the first and the last joint of the arm; see `symgrasp.robot.arm_joints` for which they
+    are otherwise. All others rest at home.
+    """
 
     name: Name
     tool: str | None = None
+    joints: tuple[str, str] | None = None
     hand: NamedOrInline
     mount: MountFile | None = None
 
@@ -144,6 +149,7 @@ class RobotFile(_Strict):
     urdf: str
     base: PoseFile = PoseFile()
     tool: str | None = None
+    joints: tuple[str, str] | None = None
     hand: NamedOrInline | None = None
     mount: MountFile | None = None
     arms: Annotated[tuple[ArmFile, ...], Field(min_length=1, max_length=MOST_ARMS)] | None = None
@@ -152,8 +158,8 @@ class RobotFile(_Strict):
     @model_validator(mode="after")
     def _tool_or_arms(self) -> RobotFile:
         single = self.hand is not None
-        if single == (self.arms is not None) or (not single and (self.tool or self.mount)):
-            raise ValueError("either tool and hand, or arms")
+        if single == (self.arms is not None) or (not single and (self.tool or self.mount or self.joints)):
+            raise ValueError("either tool, joints and hand, or arms")
         return self
 
     def arm_files(self) -> tuple[ArmFile, ...]:
@@ -161,7 +167,9 @@ class RobotFile(_Strict):
         if self.arms is not None:
             return self.arms
         assert self.hand is not None
-        return (ArmFile(name=self.name, tool=self.tool, hand=self.hand, mount=self.mount),)
+        return (
+            ArmFile(name=self.name, tool=self.tool, joints=self.joints, hand=self.hand, mount=self.mount),
+        )
 
 
 class ObjectFile(_Strict):

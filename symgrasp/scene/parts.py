@@ -81,3 +81,4 @@ class SceneParts(NamedTuple):
     profile: Profile
     obstacles: tuple[Obstacle, ...]
     tasks: Mapping[str, Task]
+    notes: tuple[str, ...]

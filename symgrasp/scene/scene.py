@@ -46,6 +46,7 @@ class Scene:
         profile: the object's r(h).
         obstacles: the obstacles.
         tasks: name → task, in order.
+        notes: what the file did not say and was guessed, in words; `file` says it all.
     """
 
     source: str
@@ -55,6 +56,7 @@ class Scene:
     profile: Profile
     obstacles: tuple[Obstacle, ...]
     tasks: Mapping[str, Task]
+    notes: tuple[str, ...] = ()
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""

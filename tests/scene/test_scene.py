@@ -190,7 +190,7 @@ BAD = [
     (robot({"urdf": "package://no_such_package/a.urdf"}), SceneError, "robots[0].urdf", "existing URDF"),
     (robot({"tool": "panda_grasp"}), SceneError, "robots[0].tool", "did you mean 'panda_grasptarget'"),
     (robot({"hand": "frank"}), SceneError, "robots[0].hand", "did you mean 'franka'"),
-    (robot({"hand": None}), SceneError, "robots[0]", "either tool and hand, or arms"),
+    (robot({"hand": None}), SceneError, "robots[0]", "either tool, joints and hand, or arms"),
     (robot({"hand": {"name": "mine"}}), SceneError, "robots[0].hand.links", "required"),
     (robot({"hand": {**HAND, "max_opening": 0.0001, "min_opening": 0.05}}), SceneError,
      "robots[0].hand.max_opening", "more than 0.05"),

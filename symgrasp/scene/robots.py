@@ -1,0 +1,203 @@
+"""Building robots and their arms from a scene file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from symgrasp.errors import InputError, SceneError, UrdfError, one_of
+from symgrasp.poses import Array
+from symgrasp.references import resolve
+from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
+from symgrasp.robot.assembly import Mount
+from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.model import RobotModel
+from symgrasp.robot.robot import Arm, Robot
+from symgrasp.scene.format import ArmFile, RobotFile
+
+__all__ = ["BuiltRobot", "RobotBuilder"]
+
+
+class BuiltRobot(NamedTuple):
+    """A robot, and what the file did not say of it.
+
+    Attributes:
+        file: its entry in the file, with what was guessed.
+        robot: the robot.
+        arms: its arms.
+        notes: what was guessed, in words.
+    """
+
+    file: RobotFile
+    robot: Robot
+    arms: list[Arm]
+    notes: list[str]
+
+
+class RobotBuilder:
+    """Builds the robots of a scene.
+
+    Args:
+        source: name of the scene file for error messages.
+        folder: the folder that file references are relative to.
+    """
+
+    def __init__(self, source: str, folder: Path) -> None:
+        self._source, self._folder = source, folder
+        self._models: dict[tuple[Path, tuple[Mount, ...]], RobotModel] = {}
+
+    def build(self, i: int, entry: RobotFile) -> BuiltRobot:
+        """Return the robot with index i in the file, and its arms.
+
+        Args:
+            i: the index, for error messages.
+            entry: the robot in the file, whose references have been checked.
+
+        Raises:
+            SceneError: a name is unknown, or a value is out of range.
+            UrdfError: the URDF is unusable, or it is not clear which joints are an arm's.
+        """
+        field = f"robots[{i}]"
+        fields = [field] if entry.arms is None else [f"{field}.arms[{k}]" for k in range(len(entry.arms))]
+        files = entry.arm_files()
+        hands = [self._hand(f, a) for f, a in zip(fields, files, strict=True)]
+        mounts, tools = [], []
+        for f, a, hand in zip(fields, files, hands, strict=True):
+            mounts += self._mount(f, a, hand, entry)
+            tools.append(self._tool(f, a, hand))
+            if a.tool is None and hand.tool is not None and not hand.tool.is_link:
+                mounts.append(Mount(hand.tool, None, tools[-1]))
+        model = self.model(self._path(entry.urdf), tuple(mounts))
+        chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
+        shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
+        joints, notes = [], []
+        for k, (f, a, hand) in enumerate(zip(fields, files, hands, strict=True)):
+            joints.append(self._joints(f, a, tools[k], model, shared, hand))
+            resting = [n for n in chains[k] if n not in (*joints[k], *shared, *hand.joints)]
+            if a.joints is None and resting:
+                ends = (joints[k][0], joints[k][-1])
+                files = (*files[:k], a.model_copy(update={"joints": ends}), *files[k + 1 :])
+                notes.append(f"{a.name}: joints: [{', '.join(ends)}]; {', '.join(resting)} rest at home")
+        home = self._home(f"{field}.home", entry, model, [name for names in joints for name in names], hands)
+        robot = Robot(entry.name, model, entry.base.matrix(), home)
+        arms = [
+            Arm(a.name, robot, tool, hand, frozenset(chain) - frozenset(names))
+            for a, tool, hand, chain, names in zip(files, tools, hands, chains, joints, strict=True)
+        ]
+        guessed = {"joints": files[0].joints} if entry.arms is None else {"arms": files}
+        return BuiltRobot(entry.model_copy(update=guessed), robot, arms, notes)
+
+    def model(self, path: Path, mounts: tuple[Mount, ...] = ()) -> RobotModel:
+        """Return the model of a URDF with mounts, shared by robots and obstacles that are alike."""
+        if (path, mounts) not in self._models:
+            self._models[path, mounts] = RobotModel(path, mounts)
+        return self._models[path, mounts]
+
+    def _path(self, reference: str) -> Path:
+        """Return the file of a reference that has been checked."""
+        path = resolve(reference, self._folder)
+        assert path is not None
+        return path
+
+    def _mount(self, field: str, arm: ArmFile, hand: Hand, robot: RobotFile) -> list[Mount]:
+        """Return the mount of the arm's hand; none where the hand is part of the robot's URDF."""
+        if arm.mount is None:
+            return []
+        if hand.urdf is None:
+            raise SceneError(self._source, f"{field}.mount", hand.name, "a hand with a urdf of its own")
+        bare = self.model(self._path(robot.urdf))
+        if arm.mount.link not in bare.link_names:
+            expected = f"a link of {bare.path.name}: " + one_of(bare.link_names, arm.mount.link)
+            raise SceneError(self._source, f"{field}.mount.link", arm.mount.link, expected)
+        return [Mount(arm.mount.frame(), self._path(hand.urdf), arm.mount.prefix)]
+
+    def _tool(self, field: str, arm: ArmFile, hand: Hand) -> str:
+        """Return the name of the link that is the arm's tool frame."""
+        if arm.tool is not None:
+            return arm.tool
+        if hand.tool is None:
+            raise SceneError(
+                self._source, f"{field}.tool", None, f"a link; hand {hand.name} names none itself"
+            )
+        return hand.tool.link if hand.tool.is_link else f"{arm.name}_tool"
+
+    def _chain(self, field: str, tool: str, model: RobotModel) -> list[str]:
+        """Return the names of the revolute joints from the root to the tool link."""
+        if tool not in model.link_names:
+            expected = f"a link of {model.path.name}: " + one_of(model.link_names, tool)
+            raise SceneError(self._source, f"{field}.tool", tool, expected)
+        return revolute_joints(model, tool)
+
+    def _joints(
+        self, field: str, arm: ArmFile, tool: str, model: RobotModel, shared: frozenset[str], hand: Hand
+    ) -> list[str]:
+        """Return the names of an arm's joints: as the file names them, or guessed."""
+        if arm.joints is None:
+            return guess_arm_joints(model, tool, shared | frozenset(hand.joints))
+        field = f"{field}.joints"
+        try:
+            names = joints_between(model, tool, *arm.joints)
+        except UrdfError as error:
+            raise SceneError(self._source, field, error.value, error.expected) from None
+        for name in names:
+            if name in shared or name in hand.joints:
+                raise SceneError(
+                    self._source, field, name, "joints that move neither another arm nor fingers"
+                )
+        return names
+
+    def _hand(self, field: str, arm: ArmFile) -> Hand:
+        """Return an arm's hand, with the prefix of its mount."""
+        if isinstance(arm.hand, str):
+            if arm.hand not in HANDS:
+                raise SceneError(self._source, f"{field}.hand", arm.hand, one_of(HANDS, arm.hand))
+            hand = HANDS[arm.hand]
+        else:
+            tool = arm.hand.tool
+            fields = {**dict(arm.hand), "tool": tool and tool.frame()}
+            try:
+                hand = Hand(**fields)
+            except InputError as error:
+                where = f"{field}.hand.{error.field}"
+                raise SceneError(self._source, where, error.value, error.expected) from None
+        return hand.prefixed(arm.mount.prefix) if arm.mount else hand
+
+    def _home(
+        self, field: str, entry: RobotFile, model: RobotModel, order: list[str], hands: Iterable[Hand]
+    ) -> Array:
+        """Return the parked values (n,) of all joints of a robot.
+
+        Args:
+            field: where the file has them, for error messages.
+            entry: the robot in the file.
+            model: its URDF.
+            order: the joints of all its arms, for which the file may list values.
+            hands: the hand of each arm, open unless the file says otherwise.
+        """
+        values = model.default_values()
+        for hand in hands:
+            for name, value in hand.joint_values(hand.max_opening).items():
+                if name in model.joint_names:
+                    values[model.joint_names.index(name)] = value
+        given: Mapping[str, float]
+        if entry.home is None:
+            given = {}
+        elif isinstance(entry.home, dict):
+            given = entry.home
+        elif len(entry.home) != len(order):
+            raise SceneError(
+                self._source, field, list(entry.home), f"{len(order)} values, for " + ", ".join(order)
+            )
+        else:
+            given = dict(zip(order, entry.home, strict=True))
+        for name, value in given.items():
+            if name not in model.joint_names:
+                raise SceneError(self._source, field, name, one_of(model.joint_names, name))
+            k = model.joint_names.index(name)
+            if not model.lower[k] <= value <= model.upper[k]:
+                limits = f"{name} within [{model.lower[k]:g}, {model.upper[k]:g}]"
+                raise SceneError(self._source, field, value, limits)
+            values[k] = value
+        values.setflags(write=False)
+        return values
