@@ -11,24 +11,33 @@ class Reason(IntEnum):
     """The furthest stage of the checks that any candidate configuration of a cell reached, in their order.
 
     A candidate that passes all checks makes the cell `FEASIBLE`; otherwise the cell carries the check that
-    its most successful candidate failed.
+    its most successful candidate failed. Without a candidate it is `UNREACHABLE` where the inverse kinematics
+    finds every configuration, and `NOT_FOUND` where it searches for them and may miss one.
+
+    The numbers are in the order of the checks, and change when a reason is added: files name the reasons.
     """
 
     HAND_TOO_SMALL = 0
     SURFACE_TOO_STEEP = 1
     UNREACHABLE = 2
-    JOINT_LIMITS = 3
-    SELF_COLLISION = 4
-    OBJECT_COLLISION = 5
-    SCENE_COLLISION = 6
-    ROBOT_COLLISION = 7
-    APPROACH_BLOCKED = 8
-    FEASIBLE = 9
+    NOT_FOUND = 3
+    JOINT_LIMITS = 4
+    SELF_COLLISION = 5
+    OBJECT_COLLISION = 6
+    SCENE_COLLISION = 7
+    ROBOT_COLLISION = 8
+    APPROACH_BLOCKED = 9
+    FEASIBLE = 10
 
     @property
     def label(self) -> str:
         """The reason in a few words."""
         return _LABELS[self]
+
+    @property
+    def legend(self) -> str:
+        """The reason as legends have it, with what it rests on where that is no proof."""
+        return f"{self.label} by the search, no proof" if self is Reason.NOT_FOUND else self.label
 
     @property
     def color(self) -> str:
@@ -40,6 +49,7 @@ _LABELS = {
     Reason.HAND_TOO_SMALL: "hand too small",
     Reason.SURFACE_TOO_STEEP: "surface too steep",
     Reason.UNREACHABLE: "out of reach",
+    Reason.NOT_FOUND: "not found",
     Reason.JOINT_LIMITS: "joint limits",
     Reason.SELF_COLLISION: "hits itself",
     Reason.OBJECT_COLLISION: "hits the object",
@@ -53,6 +63,7 @@ _COLORS = {
     Reason.HAND_TOO_SMALL: "#3b3b3b",
     Reason.SURFACE_TOO_STEEP: "#7f7f7f",
     Reason.UNREACHABLE: "#d4d4d4",
+    Reason.NOT_FOUND: "#c3a596",
     Reason.JOINT_LIMITS: "#b9a7d6",
     Reason.SELF_COLLISION: "#6a3d9a",
     Reason.OBJECT_COLLISION: "#2171b5",

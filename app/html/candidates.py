@@ -33,7 +33,12 @@ def candidates_html(state: State) -> str:
         )
     samples = len(explanation.phi)
     if not explanation.candidates:
-        text = f"Out of reach: no configuration of the arm gets there, at any of {samples} redundancy values."
+        where = f"at any of {samples} redundancy values"
+        text = (
+            f"Not found: the search met no configuration that gets there, {where}; that is no proof."
+            if explanation.reason == Reason.NOT_FOUND
+            else f"Out of reach: no configuration of the arm gets there, {where}."
+        )
         return f'<div class="sg">{text}</div>'
     counts = " · ".join(f"{count} {escape(reason.label)}" for reason, count in explanation.counts().items())
     reached = samples - explanation.unreachable

@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     h, theta = 100 * scene.manifold.h[row], math.degrees(scene.manifold.theta[column])
     say(
         f"{scene.name}: {task.name} with {arm.name}, the cell at "
-        f"h = {h:.1f} cm, θ = {theta:.1f}°, roll {args.roll}°: {found.reason.label}"
+        f"h = {h:.1f} cm, θ = {theta:.1f}°, roll {args.roll}°: {found.reason.legend}"
     )
     if found.reason < Reason.UNREACHABLE:
         say("no candidates: the hand rules the cell out, whatever the arm does")

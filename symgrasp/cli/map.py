@@ -46,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     scene, task, arm = chosen(args)
 
     from symgrasp.feasibility.create import create_map
+    from symgrasp.reason import Reason
 
     with progress_of(f"map of {task.name}") as progress:
         the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress)
@@ -53,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
     say(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
     for reason, count in the_map.counts().items():
         say(f"  {reason.label:20} {count:6}  {100 * count / cells:5.1f} %")
+    if Reason.NOT_FOUND in the_map.counts():
+        say("  (not found: by a search for configurations, which is no proof that there is none)")
     if args.out:
         write_out(args.out, _content(the_map, args.out.suffix))
     return 0

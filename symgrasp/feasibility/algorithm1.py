@@ -45,7 +45,7 @@ def create_map_reference(
     settings = world.scene.settings
     ik = solver_for(arm, settings.redundancy)
     radii = manifold.profile.radius(manifold.h)
-    draft = MapDraft(arm, manifold, np.array([arm.hand.opening(float(r)) for r in radii]), ik.phi)
+    draft = MapDraft(arm, manifold, np.array([arm.hand.opening(float(r)) for r in radii]), ik)
     T_base_tool = inverse(arm.robot.T_world_base) @ manifold.tool_poses(
         task.T_world_object, arm.hand.finger_depth
     )
@@ -69,14 +69,16 @@ def create_map_reference(
 
 def _decide(draft: MapDraft, cell: Cell, candidates: Iterable[Candidate]) -> None:
     """Record a cell as feasible, or why the furthest of its candidates fails."""
-    reason, best = furthest(candidates)
+    reason, best = furthest(candidates, draft.no_candidate)
     if best is not None and reason == Reason.FEASIBLE:
         draft.record_feasible(cell, best.q, best.sample, best.branch)
     else:
         draft.record_failure(cell, reason, best.collision if best else None)
 
 
-def furthest(candidates: Iterable[Candidate]) -> tuple[Reason, Candidate | None]:
+def furthest(
+    candidates: Iterable[Candidate], no_candidate: Reason = Reason.UNREACHABLE
+) -> tuple[Reason, Candidate | None]:
     """Return the furthest stage of the candidates of a cell, and the one that reached it.
 
     The first feasible one ends the search; of those that collide at the same stage, the one that
@@ -84,11 +86,12 @@ def furthest(candidates: Iterable[Candidate]) -> tuple[Reason, Candidate | None]
 
     Args:
         candidates: the candidates, in the order in which they are tried.
+        no_candidate: the stage where there is none.
 
     Returns:
         The stage, and its candidate: None where there is no candidate at all.
     """
-    reached, best = Reason.UNREACHABLE, None
+    reached, best = no_candidate, None
     for candidate in candidates:
         if candidate.reason == Reason.FEASIBLE:
             return candidate.reason, candidate

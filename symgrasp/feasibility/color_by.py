@@ -106,7 +106,7 @@ def color_map(color_by: ColorBy, reason: np.ndarray, values: Array) -> ColoredMa
     if color_by is ColorBy.REASON:
         colors = np.array([_channels(r.color) for r in Reason], dtype=np.uint8)
         counts = np.bincount(reason.ravel(), minlength=len(Reason))
-        swatches = [Swatch(r.color, r.label, int(counts[r])) for r in reversed(Reason) if counts[r]]
+        swatches = [Swatch(r.color, r.legend, int(counts[r])) for r in reversed(Reason) if counts[r]]
         return ColoredMap(reason.astype(np.uint8), colors, tuple(swatches))
     feasible = reason == Reason.FEASIBLE
     count = int(np.count_nonzero(feasible))

@@ -109,7 +109,7 @@ class ExactEngine:
         if not np.array_equal(grid.h, self.manifold.h):
             raise ValueError("the exact engine was built for a grid with other heights")
         self._place_object(task.T_world_object)
-        draft = MapDraft(self.arm, grid, self._opening, self.ik.phi)
+        draft = MapDraft(self.arm, grid, self._opening, self.ik)
         for row, misfit in enumerate(self._misfit):
             if misfit is not None:
                 draft.reason[:, row] = misfit

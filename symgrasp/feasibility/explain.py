@@ -13,6 +13,7 @@ import numpy as np
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
 from symgrasp.feasibility.fit import fit
+from symgrasp.feasibility.map_draft import without_candidates
 from symgrasp.ik import ClosedFormIK
 from symgrasp.ik.retreat import retreated
 from symgrasp.object.manifold import Manifold
@@ -30,6 +31,7 @@ class RetreatFailure(StrEnum):
     """Why an arm cannot follow the retreat any further at the same φ."""
 
     REACH = "out of reach"
+    NOT_FOUND = "not found"
     LIMITS = "joint limits"
     BRANCH = "only by changing branch"
 
@@ -121,7 +123,7 @@ class Explanation:
         cell: the cell.
         reason: what Algorithm 1 says of it.
         candidates: its candidates, best first: the furthest stage, then the closest to being free.
-            Empty where the hand rules the cell out, and out of reach.
+            Empty where the hand rules the cell out, and where no configuration reaches it or is found.
         phi: (K,) redundancy samples (rad), with candidates or without.
         opening: opening of the hand (m).
         T_world_tool: tool pose (4, 4).
@@ -137,7 +139,7 @@ class Explanation:
     def __str__(self) -> str:
         """The reason, how many candidates have which, and a line for each."""
         counts = ", ".join(f"{count} {reason.label}" for reason, count in self.counts().items())
-        lines = [f"{self.reason.label}: {len(self.candidates)} candidates{counts and ': ' + counts}"]
+        lines = [f"{self.reason.legend}: {len(self.candidates)} candidates{counts and ': ' + counts}"]
         for c in self.candidates:
             phi = math.degrees(c.phi)
             lines.append(f"  φ {phi:7.1f}°  branch {c.branch}  {c.reason.label:18}  {c.why}")
@@ -150,7 +152,7 @@ class Explanation:
 
     @property
     def unreachable(self) -> int:
-        """Number of redundancy samples at which no configuration reaches the tool pose."""
+        """Number of redundancy samples at which no configuration that reaches the tool pose was found."""
         if self.reason < Reason.UNREACHABLE:
             return 0
         return len(self.phi) - len({c.sample for c in self.candidates})
@@ -193,7 +195,7 @@ def explain_cell(
             world.set_object(task.T_world_object)
             checker = CandidateChecker(world, arm, ik, world.scene.settings.approach)
             candidates = sorted(_results(checker, T_base_tool, opening, progress), key=CandidateResult._rank)
-        reason = candidates[0].reason if candidates else Reason.UNREACHABLE
+        reason = candidates[0].reason if candidates else without_candidates(ik)
     if progress and not candidates:
         progress(1.0)
     return Explanation(cell, reason, tuple(candidates), ik.phi, opening, tools[cell])
@@ -272,5 +274,5 @@ def _failure(ik: ClosedFormIK, T_base_tool: Array, sample: int) -> RetreatFailur
     """Return why no configuration at a tool pose (4, 4) continues the one before."""
     solutions = ik.solve_sample(T_base_tool, sample)
     if not len(solutions.q):
-        return RetreatFailure.REACH
+        return RetreatFailure.REACH if ik.complete else RetreatFailure.NOT_FOUND
     return RetreatFailure.BRANCH if solutions.inside.any() else RetreatFailure.LIMITS

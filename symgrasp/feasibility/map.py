@@ -31,7 +31,14 @@ if TYPE_CHECKING:
 
 __all__ = ["FeasibilityMap"]
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
+"""Version of the files that are written. Those of version 2 can be read too: they do not name the reasons."""
+
+VERSION_2_REASONS = (
+    "HAND_TOO_SMALL", "SURFACE_TOO_STEEP", "UNREACHABLE", "JOINT_LIMITS", "SELF_COLLISION",
+    "OBJECT_COLLISION", "SCENE_COLLISION", "ROBOT_COLLISION", "APPROACH_BLOCKED", "FEASIBLE",
+)  # fmt: skip
+"""What the numbers 0, 1, … of the reasons meant in files of version 2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +119,7 @@ class FeasibilityMap:
     def why(self, cell: Cell | tuple[int, int, int]) -> str:
         """Say in one line whether a cell is feasible, and if not, why."""
         cell = Cell(*cell)
-        text = Reason(int(self.reason[cell])).label
+        text = Reason(int(self.reason[cell])).legend
         first, second = self.pair[cell]
         if first < 0:
             return text
@@ -230,6 +237,7 @@ class FeasibilityMap:
             "angles": self.manifold.angles,
             "theta_start": self.manifold.theta_start,
             "bodies": list(self.bodies),
+            "reasons": [r.name for r in Reason],
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -246,7 +254,6 @@ class FeasibilityMap:
             "h": self.manifold.h.tolist(),
             "theta": self.manifold.theta.tolist(),
             "opening": self.opening.tolist(),
-            "reasons": [r.name for r in Reason],
             "reason": self.reason.tolist(),
             "clearance": _listed(self.clearance),
             "margin_along": self.margins[..., 0].tolist(),
@@ -281,8 +288,8 @@ class FeasibilityMap:
             raise MapError(path, "file", str(path), "an existing map file") from None
         except Exception as error:  # zipfile, zlib, numpy and json each raise their own
             raise MapError(path, "file", str(error), "a map written by symgrasp") from error
-        if meta.get("version") != FORMAT_VERSION:
-            raise MapError(path, "version", meta.get("version"), str(FORMAT_VERSION))
+        if meta.get("version") not in (2, FORMAT_VERSION):
+            raise MapError(path, "version", meta.get("version"), f"2 or {FORMAT_VERSION}")
         try:
             manifold = Manifold(
                 Profile(data.pop("profile"), str(path)), meta["heights"], meta["angles"], meta["theta_start"]
@@ -291,10 +298,26 @@ class FeasibilityMap:
             for name in ("reason", "sample", "branch", "clearance", "depth"):
                 if data[name].shape != shape:
                     raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
+            reasons = VERSION_2_REASONS if meta["version"] == 2 else meta["reasons"]
+            data["reason"] = _renumbered(data["reason"], reasons)
             names = {key: meta[key] for key in ("scene", "arm", "task")}
             return FeasibilityMap(**names, manifold=manifold, bodies=tuple(meta["bodies"]), **data)
-        except (KeyError, ProfileError) as error:
+        except (KeyError, IndexError, TypeError, ProfileError) as error:
             raise MapError(path, "meta", str(error), "a map written by symgrasp") from error
+
+
+def _renumbered(reason: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Return the reasons of a file as numbers of `Reason`.
+
+    Args:
+        reason: as numbers of the file.
+        names: what the numbers 0, 1, … mean in the file.
+
+    Raises:
+        KeyError: there is no reason of such a name.
+        IndexError: a number has no name.
+    """
+    return np.array([Reason[name] for name in names], dtype=np.uint8)[reason]
 
 
 def _listed(values: Array) -> list[Any]:

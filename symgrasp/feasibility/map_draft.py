@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.ik import ClosedFormIK
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
@@ -12,32 +13,39 @@ from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.world import Collision
 
-__all__ = ["Index", "MapDraft"]
+__all__ = ["Index", "MapDraft", "without_candidates"]
 
 Index = tuple[int, ...] | tuple[np.ndarray, ...]
 """One cell (roll, row, column), or m cells as three integer arrays (m,)."""
 
 
+def without_candidates(ik: ClosedFormIK) -> Reason:
+    """Return the reason of a cell without a candidate: out of reach, or not found by a search."""
+    return Reason.UNREACHABLE if ik.complete else Reason.NOT_FOUND
+
+
 class MapDraft:
-    """A map that is filled cell by cell; every cell starts as `Reason.UNREACHABLE`.
+    """A map that is filled cell by cell; every cell starts as one without a candidate.
 
     Args:
         arm: the arm.
         manifold: the grid.
         opening: (H,) opening of the hand (m) at each height.
-        phi: (K,) redundancy samples (rad).
+        ik: its inverse kinematics.
 
     Attributes:
         manifold: the grid.
         opening: (H,) opening of the hand (m) at each height.
+        no_candidate: the reason of a cell without a candidate, see `without_candidates`.
         reason: (R, H, A) uint8 of `Reason`.
     """
 
-    def __init__(self, arm: Arm, manifold: Manifold, opening: Array, phi: Array) -> None:
+    def __init__(self, arm: Arm, manifold: Manifold, opening: Array, ik: ClosedFormIK) -> None:
         shape = (len(ROLLS), manifold.heights, manifold.angles)
         self.manifold, self.opening = manifold, opening
-        self._arm, self._phi = arm, phi
-        self.reason = np.full(shape, Reason.UNREACHABLE, dtype=np.uint8)
+        self._arm, self._phi = arm, ik.phi
+        self.no_candidate = without_candidates(ik)
+        self.reason = np.full(shape, self.no_candidate, dtype=np.uint8)
         self._q = np.full((*shape, arm.dof), np.nan)
         self._sample = np.full(shape, -1, dtype=np.int16)
         self._branch = np.full(shape, -1, dtype=np.int16)

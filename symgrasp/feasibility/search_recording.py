@@ -59,7 +59,7 @@ def record_search(
         return tuple(part[chosen] for part in cells)
 
     status = found.status
-    draft.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, Reason.UNREACHABLE)
+    draft.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, draft.no_candidate)
     feasible = status == search.FEASIBLE
     sample, branch = found.solution[feasible].T
     draft.record_feasible(those(feasible), found.q[feasible], sample, branch, found.clearance[feasible])

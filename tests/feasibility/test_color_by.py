@@ -60,6 +60,15 @@ def test_the_colour_blind_can_tell_the_colours_apart(bottle_map, eyes):
     assert np.linalg.norm(seen[1:] - seen[0], axis=1).min() > 15  # from "not feasible"
 
 
+@pytest.mark.parametrize("eyes", SEEN)
+def test_what_was_not_found_looks_like_no_other_reason(eyes):
+    """It stands beside "out of reach" on maps, and means less."""
+    channels = [[int(reason.color[k : k + 2], 16) for k in (1, 3, 5)] for reason in Reason]
+    seen = lab(np.array(channels), eyes)
+    apart = np.linalg.norm(seen - seen[Reason.NOT_FOUND], axis=1)
+    assert np.delete(apart, Reason.NOT_FOUND).min() > 15
+
+
 @pytest.mark.parametrize("color_by", ColorBy)
 def test_every_cell_is_counted_and_coloured_as_the_legend_says(bottle_map, color_by):
     values = bottle_map.values(color_by)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from IPython.core.formatters import DisplayFormatter
 from symgrasp.errors import Cancelled, MapError
 from symgrasp.feasibility import exact
 from symgrasp.feasibility.cell import Cell
-from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.create import MapMaker, create_map, explain
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import ClosedFormIK
 from symgrasp.object.manifold import ROLLS
@@ -18,6 +19,8 @@ from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import SHIPPED, load_small, write_scene
+
+DATA = Path(__file__).parents[1] / "data"
 
 
 def turned(scene: Scene, task: str, T: np.ndarray) -> Scene:
@@ -274,6 +277,48 @@ def test_npz_round_trip(bottle_map, tmp_path):
     cell = Cell(*map(int, np.argwhere(~back.feasible)[0]))
     assert back.why(cell) == again.why(cell)
     assert list(tmp_path.iterdir()) == [path]
+
+
+OLD_COUNTS = {
+    Reason.JOINT_LIMITS: 202, Reason.SURFACE_TOO_STEEP: 144, Reason.UNREACHABLE: 134, Reason.FEASIBLE: 50,
+    Reason.SCENE_COLLISION: 46,
+}  # fmt: skip
+"""What the program that wrote ``map_version_2.npz`` said of it; its reasons had other numbers."""
+
+
+def test_reasons_of_older_files_keep_their_meaning():
+    old = FeasibilityMap.load(DATA / "map_version_2.npz")
+    assert old.counts() == OLD_COUNTS
+    assert old.feasible.sum() == np.isfinite(old.clearance).sum()
+    for cell in np.argwhere(old.pair[..., 0] >= 0):
+        assert old.why(Cell(*cell)).startswith("hits an obstacle: ")
+
+
+@pytest.mark.parametrize("reasons", [["FEASIBLE"], ["NO_SUCH_REASON"] * 20, None, 5])
+def test_reasons_that_a_file_does_not_name(bottle_map, tmp_path, monkeypatch, reasons):
+    path = tmp_path / "map.npz"
+    meta = {**bottle_map._meta(), "reasons": reasons}
+    monkeypatch.setattr(FeasibilityMap, "_meta", lambda self: meta)
+    bottle_map.save(path)
+    with pytest.raises(MapError, match="written by symgrasp"):
+        FeasibilityMap.load(path)
+
+
+@pytest.mark.parametrize("method", ["exact", "reference"])
+def test_what_a_search_does_not_reach_is_not_found(monkeypatch, method):
+    """The same map but for the word: a search may have missed a configuration."""
+    scene = load_small("soda_can", 6, 12, 2)
+    proven = create_map(scene, method=method)
+    monkeypatch.setattr(ClosedFormIK, "complete", False)
+    searched = create_map(scene, method=method)
+    renamed = np.where(proven.reason == Reason.UNREACHABLE, Reason.NOT_FOUND, proven.reason)
+    assert (renamed == Reason.NOT_FOUND).any()
+    np.testing.assert_array_equal(searched.reason, renamed)
+    cell = Cell(*map(int, np.argwhere(renamed == Reason.NOT_FOUND)[0]))
+    assert "no proof" in searched.why(cell)
+    h, theta = scene.manifold.h[cell.row], scene.manifold.theta[cell.column]
+    found = explain(scene, h, theta, ROLLS[cell.roll])
+    assert found.reason == Reason.NOT_FOUND and "no proof" in str(found)
 
 
 def test_files_that_are_no_maps(bottle_map, tmp_path):

@@ -165,7 +165,7 @@ def test_retreats_end_for_every_cause():
                         expected = RetreatFailure.REACH if not len(inside) else RetreatFailure.LIMITS
                         assert v.failure == (RetreatFailure.BRANCH if inside.any() else expected)
                     assert "after" in v.why
-    assert causes == {None, *RetreatFailure}
+    assert causes == {None, *RetreatFailure} - {RetreatFailure.NOT_FOUND}  # a closed form finds all
 
 
 def test_the_world_stays_as_it_was():
