@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["Progress"]
+__all__ = ["Progress", "part_of"]
 
 Progress = Callable[[float], None]
 """Called with the finished share (0 to 1) of a computation; may raise `Cancelled` to stop it."""
+
+
+def part_of(progress: Progress | None, index: int, count: int) -> Progress | None:
+    """Return the progress of one of ``count`` equal parts of a computation, that with this index."""
+    if progress is None:
+        return None
+    return lambda share: progress((index + share) / count)

@@ -11,7 +11,7 @@ import coal  # pyright: ignore[reportMissingImports]
 import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
 
-from symgrasp.ik import ClosedFormIK
+from symgrasp.ik import Solver
 from symgrasp.poses import Array, axis_frame
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.robot import Arm
@@ -33,7 +33,7 @@ class BruteForce:
         T_world_object: object pose (4, 4).
     """
 
-    def __init__(self, world: BulletWorld, arm: Arm, ik: ClosedFormIK, T_world_object: Array) -> None:
+    def __init__(self, world: BulletWorld, arm: Arm, ik: Solver, T_world_object: Array) -> None:
         self.arm, self.ik = arm, ik
         self._rounding = not any(
             shape.kind == "mesh" for o in world.scene.obstacles for _, shape in o.shapes()

@@ -19,7 +19,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.object.manifold import ROLLS, grasp_to_tool
 from symgrasp.planners.bimanual import Climb, hill_climb
-from symgrasp.planners.configurations import ConfigurationFinder
+from symgrasp.planners.configurations import ConfigurationFinder, witnesses
 from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch
@@ -252,11 +252,10 @@ def _climb_as_printed(
     world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap], seed: int
 ) -> tuple[Cell, ...] | None:
     """Return what Algorithm 3 finds, with the collisions of the whole robots counted at every step."""
-    configurations = ConfigurationFinder(world, arms, maps)
 
     def count(cells: Sequence[Cell]) -> int:
         world.set_object(maps[0].T_world_object)
-        world.set_arms(configurations.witnesses(cells))
+        world.set_arms(witnesses(arms, maps, cells))
         return len(world.collisions(arms))
 
     always: Callable[[Sequence[Cell]], bool] = lambda cells: True  # noqa: E731

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.ik import ClosedFormIK
+from symgrasp.ik import Solver
 from symgrasp.ik.retreat import RETREAT_TURN, retreat_distances, retreated
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
@@ -73,7 +73,7 @@ class CandidateChecker:
         self,
         world: BulletWorld,
         arm: Arm,
-        ik: ClosedFormIK,
+        ik: Solver,
         approach: float,
         near: Callable[[Array, Array], NearBodies] | None = None,
     ) -> None:

@@ -14,9 +14,10 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import ClosedFormIK, solver_for
+from symgrasp.feasibility.torso_maps import at_torso, merged
+from symgrasp.ik import Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold, wrap
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -43,8 +44,8 @@ class MapMaker:
 
     def __init__(self, world: BulletWorld) -> None:
         self.world, self.scene = world, world.scene
-        self._engines: dict[str, ExactEngine | None] = {}
-        self._solvers: dict[str, ClosedFormIK] = {}
+        self._engines: dict[tuple[str, int | None], ExactEngine | None] = {}
+        self._solvers: dict[str, Solver] = {}
 
     def map(
         self,
@@ -58,10 +59,38 @@ class MapMaker:
         """Compute a map; see `create_map`. The task need not be one of the scene's."""
         the_arm, the_task = self._chosen(arm, task)
         grid = manifold or self.scene.manifold
-        engine = self._engine(the_arm, grid) if method == "exact" else None
+        if method == "reference":
+            return create_map_reference(self.world, the_arm, the_task, grid, progress)
+        if the_arm.robot.torso is not None:
+            return merged(self.maps_by_torso(the_arm.name, the_task, manifold=grid, progress=progress))
+        return self._map(the_arm, None, the_task, grid, progress)
+
+    def maps_by_torso(
+        self,
+        arm: str,
+        task: Task | str,
+        *,
+        manifold: Manifold | None = None,
+        progress: Progress | None = None,
+    ) -> list[FeasibilityMap]:
+        """Compute the map of an arm for every sample of its robot's torso; see `map` for the arguments."""
+        the_arm, the_task = self._chosen(arm, task)
+        grid = manifold or self.scene.manifold
+        assert the_arm.robot.torso is not None
+        maps = []
+        for t in range(len(the_arm.robot.torso)):
+            tell = part_of(progress, t, len(the_arm.robot.torso))
+            maps.append(at_torso(self._map(the_arm.at(t), t, the_task, grid, tell), the_arm, t))
+        return maps
+
+    def _map(
+        self, arm: Arm, torso: int | None, task: Task, grid: Manifold, progress: Progress | None
+    ) -> FeasibilityMap:
+        """Compute the map of an arm without a torso, or with its torso at a sample."""
+        engine = self._engine(arm, torso, grid)
         if engine:
-            return engine.map(the_task, grid, progress)
-        return create_map_reference(self.world, the_arm, the_task, grid, progress)
+            return engine.map(task, grid, progress)
+        return create_map_reference(self.world, arm, task, grid, progress)
 
     def explain(
         self,
@@ -92,14 +121,14 @@ class MapMaker:
         chosen = task if isinstance(task, Task) else self.scene.task(task)
         return self.scene.arm(arm or chosen.arms[0]), chosen
 
-    def _engine(self, arm: Arm, grid: Manifold) -> ExactEngine | None:
+    def _engine(self, arm: Arm, torso: int | None, grid: Manifold) -> ExactEngine | None:
         """Return an arm's engine for a grid's heights, or None where the engine does not know the arm."""
-        known = self._engines.get(arm.name)
+        known = self._engines.get((arm.name, torso))
         if known and not np.array_equal(known.manifold.h, grid.h):
             known = None
         if known is None and ExactEngine.knows(arm):
             known = ExactEngine(self.world, arm, grid)
-        self._engines[arm.name] = known
+        self._engines[arm.name, torso] = known
         return known
 
 

@@ -14,7 +14,7 @@ from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map_draft import without_candidates
-from symgrasp.ik import ClosedFormIK
+from symgrasp.ik import Solver
 from symgrasp.ik.retreat import retreated
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, inverse
@@ -166,7 +166,7 @@ class Explanation:
 def explain_cell(
     world: BulletWorld,
     arm: Arm,
-    ik: ClosedFormIK,
+    ik: Solver,
     task: Task,
     manifold: Manifold,
     cell: Cell,
@@ -270,7 +270,7 @@ def _violations(arm: Arm, q: Array) -> tuple[LimitViolation, ...]:
     return tuple(sorted(found, key=lambda joint: -joint.excess))
 
 
-def _failure(ik: ClosedFormIK, T_base_tool: Array, sample: int) -> RetreatFailure:
+def _failure(ik: Solver, T_base_tool: Array, sample: int) -> RetreatFailure:
     """Return why no configuration at a tool pose (4, 4) continues the one before."""
     solutions = ik.solve_sample(T_base_tool, sample)
     if not len(solutions.q):

@@ -55,7 +55,7 @@ class FeasibilityMap:
         manifold: the grid.
         reason: (R, H, A) uint8 of `Reason`.
         q: (R, H, A, n) joint values of the witnesses, NaN where infeasible.
-        sample: (R, H, A) int16 redundancy sample of the witness, -1 where infeasible.
+        sample: (R, H, A) int32 redundancy sample of the witness, -1 where infeasible.
         branch: (R, H, A) int16 branch of the witness, -1 where infeasible.
         clearance: (R, H, A) distance (m) that all bodies which must not touch have at the witness at
             least, at most `CLEARANCE_LIMIT`; NaN where infeasible. The reference, which only asks

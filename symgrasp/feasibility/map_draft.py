@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import ClosedFormIK
+from symgrasp.ik import Solver
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
@@ -19,7 +19,7 @@ Index = tuple[int, ...] | tuple[np.ndarray, ...]
 """One cell (roll, row, column), or m cells as three integer arrays (m,)."""
 
 
-def without_candidates(ik: ClosedFormIK) -> Reason:
+def without_candidates(ik: Solver) -> Reason:
     """Return the reason of a cell without a candidate: out of reach, or not found by a search."""
     return Reason.UNREACHABLE if ik.complete else Reason.NOT_FOUND
 
@@ -40,14 +40,14 @@ class MapDraft:
         reason: (R, H, A) uint8 of `Reason`.
     """
 
-    def __init__(self, arm: Arm, manifold: Manifold, opening: Array, ik: ClosedFormIK) -> None:
+    def __init__(self, arm: Arm, manifold: Manifold, opening: Array, ik: Solver) -> None:
         shape = (len(ROLLS), manifold.heights, manifold.angles)
         self.manifold, self.opening = manifold, opening
         self._arm, self._phi = arm, ik.phi
         self.no_candidate = without_candidates(ik)
         self.reason = np.full(shape, self.no_candidate, dtype=np.uint8)
         self._q = np.full((*shape, arm.dof), np.nan)
-        self._sample = np.full(shape, -1, dtype=np.int16)
+        self._sample = np.full(shape, -1, dtype=np.int32)
         self._branch = np.full(shape, -1, dtype=np.int16)
         self._clearance = np.full(shape, np.nan)
         self._pair = np.full((*shape, 2), -1, dtype=np.int16)

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
 
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility.candidates import CandidateChecker
-from symgrasp.ik import ClosedFormIK
+from symgrasp.ik import ClosedFormIK, over_torso
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Hold, Plan, PlanTask, Pose
 from symgrasp.poses import Array, from_position_quat, inverse, pose_error, rotation_z
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
@@ -62,7 +62,7 @@ class Report:
         result = "the plan holds" if self.holds else f"{len(self.failures)} do not hold"
         return "\n".join([*self.failures, f"{self.checks} statements checked: {result}"])
 
-    def expect(self, ok: bool | np.bool_, failure: str) -> bool:
+    def expect(self, ok: object, failure: str) -> bool:
         """Note one statement; ``failure`` says what is wrong where it does not hold."""
         self.checks += 1
         if not ok:
@@ -112,8 +112,9 @@ def verify(plan: Plan | str | Path, progress: Progress | None = None) -> Report:
         if not report.failures:  # margins are those of grasps that hold
             for done, (k, task, hold) in enumerate(holds, start=len(plan.tasks)):
                 who = f"tasks[{k}] ({task.name}): {hold.arm}"
-                tell = (lambda share, done=done: progress((done + share) / parts)) if progress else None
-                _check_margins(hold, task.object_pose_turned.array(), who, world, report, tell)
+                tell = part_of(progress, done, parts)
+                shares = sum(other.robot == hold.robot for other in task.holds) > 1
+                _check_margins(hold, shares, task.object_pose_turned.array(), who, world, report, tell)
     if progress:
         progress(1.0)
     return report
@@ -223,6 +224,7 @@ def _check_holds(task: PlanTask, where: str, scene: Scene, world: BulletWorld, r
         _check_arm(hold, arm, q, who, report)
         _check_grasp(hold, arm, T, who, scene, report)
         configurations.append((arm, q, hold.opening))
+    _check_torsos(configurations, where, report)
     world.set_object(T)
     world.set_arms(configurations)
     arms = [arm for arm, *_ in configurations]
@@ -232,6 +234,15 @@ def _check_holds(task: PlanTask, where: str, scene: Scene, world: BulletWorld, r
         real = world.clearance(arm, CLEARANCE_LIMIT)
         text = f"{where}: {arm.name}: clearance is {1e3 * real:.3f} mm, not {1e3 * hold.clearance:.3f} mm"
         report.expect(hold.clearance <= real + CLEARANCE_TOLERANCE, text)
+
+
+def _check_torsos(configurations: Sequence[tuple[Arm, Array, float]], where: str, report: Report) -> None:
+    """Check that arms of one body have the same torso."""
+    for (arm, q, _), (other, p, _) in combinations(configurations, 2):
+        if arm.robot is other.robot and arm.robot.torso is not None:
+            names = arm.robot.torso.joint_names
+            text = f"{where}: {arm.name} and {other.name} of {arm.robot.name} differ in {', '.join(names)}"
+            report.expect(np.abs(q - p)[: len(names)].max() <= TOLERANCE, text)
 
 
 def _check_arm(hold: Hold, arm: Arm, q: Array, who: str, report: Report) -> None:
@@ -280,12 +291,27 @@ def _tool_of(arm: Arm, T: Array, h: float, theta: float, flipped: bool, radius: 
 
 
 def _check_margins(
-    hold: Hold, T: Array, who: str, world: BulletWorld, report: Report, progress: Progress | None
+    hold: Hold,
+    shares: bool,
+    T: Array,
+    who: str,
+    world: BulletWorld,
+    report: Report,
+    progress: Progress | None,
 ) -> None:
-    """Check that a grasp closer by a cell than each margin is still feasible, one arm at a time."""
+    """Check that a grasp closer by a cell than each margin is still feasible, one arm at a time.
+
+    The torso may move for it, unless the arm shares it with another one.
+    """
     scene = world.scene
     arm, grid, g = scene.arm(hold.arm), scene.manifold, hold.grasp
-    ik = ClosedFormIK(arm, scene.settings.redundancy)  # EAIK: maps are mostly made with another solver
+    torso = None
+    if shares and arm.robot.torso is not None:
+        torso = arm.robot.torso.samples_at([hold.joints[name] for name in arm.robot.torso.joint_names])
+        if not report.expect(torso, f"{who}: the torso is at none of the values that maps try"):
+            return
+    # EAIK: maps are mostly made with another solver
+    ik = over_torso(arm, lambda alone: ClosedFormIK(alone, scene.settings.redundancy), torso)
     checker = CandidateChecker(world, arm, ik, scene.settings.approach)
     for name in scene.robots:
         world.park(name)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import product
+from types import MappingProxyType
 
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
@@ -39,29 +40,56 @@ class ConfigurationFinder:
         world: a world of the scene; the object is placed by `find`.
         arms: the arms.
         maps: one map an arm, in the same order, of one task.
+        by_torso: arm → its maps at the samples of the torso that it shares with another arm of the task.
     """
 
-    def __init__(self, world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap]) -> None:
+    def __init__(
+        self,
+        world: BulletWorld,
+        arms: Sequence[Arm],
+        maps: Sequence[FeasibilityMap],
+        by_torso: Mapping[str, Sequence[FeasibilityMap]] = MappingProxyType({}),
+    ) -> None:
         self.world, self.arms, self.maps = world, arms, maps
+        self._by_torso = by_torso
         self.body_checks = 0
         self._checker = cache(self._make_checker)
         self._free = cache(self._feasible)
 
-    def witnesses(self, cells: Sequence[Cell]) -> list[ArmConfiguration]:
-        """Return every arm at the witness of its cell."""
-        return witnesses(self.arms, self.maps, cells)
+    def maps_at(self, torso: Mapping[str, int]) -> list[FeasibilityMap]:
+        """Return the maps of the arms, with the torso that some share at a sample.
 
-    def find(self, cells: Sequence[Cell], *, every: bool = True) -> list[ArmConfiguration] | None:
+        Args:
+            torso: arm → sample, for those that share a torso.
+        """
+        return [
+            self._by_torso[arm.name][torso[arm.name]] if arm.name in torso else m
+            for arm, m in zip(self.arms, self.maps, strict=True)
+        ]
+
+    def find(
+        self,
+        cells: Sequence[Cell],
+        torso: Mapping[str, int] = MappingProxyType({}),
+        *,
+        every: bool = True,
+    ) -> list[ArmConfiguration] | None:
         """Return configurations, one an arm, that are free together, or None if there are none.
 
         Args:
             cells: a feasible cell for every arm.
+            torso: arm → sample of its torso, for those that share one.
             every: try all combinations of feasible configurations, not the witnesses alone.
         """
-        if self.are_free_together(self.witnesses(cells)):
-            return self.witnesses(cells)
+        found = witnesses(self.arms, self.maps_at(torso), cells)
+        if self.are_free_together(found):
+            return found
         if every:
-            for configurations in product(*(self._free(k, cell) for k, cell in enumerate(cells))):
+            choices = (
+                self._free(k, cell, torso.get(arm.name))
+                for k, (arm, cell) in enumerate(zip(self.arms, cells, strict=True))
+            )
+            for configurations in product(*choices):
                 if self.are_free_together(configurations):
                     return list(configurations)
         return None
@@ -73,7 +101,7 @@ class ConfigurationFinder:
         self.world.set_arms(configurations)
         return not self.world.collisions(self.arms)
 
-    def _feasible(self, k: int, cell: Cell) -> list[ArmConfiguration]:
+    def _feasible(self, k: int, cell: Cell, torso: int | None) -> list[ArmConfiguration]:
         """Return every feasible configuration of an arm at a cell, the other robots at home."""
         arm, m = self.arms[k], self.maps[k]
         for robot in self.world.scene.robots:
@@ -83,10 +111,11 @@ class ConfigurationFinder:
         standoff = arm.hand.standoff(float(m.manifold.profile.radius(h)))
         tool = grasp_to_tool(m.T_world_object, h, theta, ROLLS[cell.roll], standoff)
         opening = float(m.opening[cell.row])
-        candidates = self._checker(k).candidates(inverse(arm.robot.T_world_base) @ tool, opening)
+        candidates = self._checker(k, torso).candidates(inverse(arm.robot.T_world_base) @ tool, opening)
         return [ArmConfiguration(arm, c.q, opening) for c in candidates if c.reason == Reason.FEASIBLE]
 
-    def _make_checker(self, k: int) -> CandidateChecker:
+    def _make_checker(self, k: int, torso: int | None) -> CandidateChecker:
         settings = self.world.scene.settings
         arm = self.arms[k]
-        return CandidateChecker(self.world, arm, solver_for(arm, settings.redundancy), settings.approach)
+        ik = solver_for(arm, settings.redundancy, None if torso is None else [torso])
+        return CandidateChecker(self.world, arm, ik, settings.approach)

@@ -9,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.planners.configurations import ConfigurationFinder
 from symgrasp.planners.holding import Holding, HoldingSearch
+from symgrasp.planners.stations import Turn
 from symgrasp.progress import Progress
 from symgrasp.robot.configuration import ArmConfiguration
 
@@ -24,11 +26,13 @@ class Step(NamedTuple):
         turn: columns that the object is turned by.
         configurations: of the task's arms, free together.
         cells: where on its map each arm's grasp is then.
+        maps: the map of each arm, that at the value of its torso where it shares one.
     """
 
     turn: int
     configurations: Sequence[ArmConfiguration]
     cells: Sequence[Cell]
+    maps: Sequence[FeasibilityMap]
 
 
 class FreePlacement(NamedTuple):
@@ -128,7 +132,7 @@ class FreePlacements:
                 if turn.margin < reached:
                     reached = turn.margin
                     yield reached, None
-                found = [self._step(k, holding.cells, turn.columns) for k in members]
+                found = [self._step(k, holding.cells, turn) for k in members]
                 free = [step for step in found if step]
                 if len(free) == len(members):
                     steps += free
@@ -137,14 +141,21 @@ class FreePlacements:
                 return
         yield reached, steps
 
-    def _step(self, k: int, grasps: Sequence[Cell], turn: int) -> Step | None:
+    def _step(self, k: int, grasps: Sequence[Cell], turn: Turn) -> Step | None:
         """Return task k with the object at a turn, or None if nothing is free there."""
         finder = self._finders[k]
         angles = finder.maps[0].manifold.angles
         held = {run.arm: cell for run, cell in zip(self._search.holds, grasps, strict=True) if k in run.tasks}
-        cells = [held[arm.name].turned(turn, angles) for arm in finder.arms]
-        configurations = finder.find(cells)
-        return Step(turn, configurations, cells) if configurations else None
+        cells = [held[arm.name].turned(turn.columns, angles) for arm in finder.arms]
+        torso = {
+            arm: sample
+            for t, sample in turn.torsos.items()
+            if self._search.torsos[t].visit == k
+            for arm in self._search.torsos[t].maps
+        }
+        configurations = finder.find(cells, torso)
+        maps = finder.maps_at(torso)
+        return Step(turn.columns, configurations, cells, maps) if configurations else None
 
 
 def _near(a: Sequence[Cell], b: Sequence[Cell], angles: int) -> bool:

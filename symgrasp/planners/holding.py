@@ -23,10 +23,11 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.planners.gaps import GapTable, PrintGaps
 from symgrasp.planners.placements import Problem, explore
-from symgrasp.planners.sequential import check_same_grid, surface_margin
+from symgrasp.planners.sequential import check_same_grid
+from symgrasp.planners.stations import SharedTorso, Station, Turn, best_turns
 from symgrasp.poses import Array
 
-__all__ = ["HoldRun", "Holding", "HoldingSearch", "Turn", "hold_runs", "turn_groups"]
+__all__ = ["HoldRun", "Holding", "HoldingSearch", "hold_runs", "turn_groups"]
 
 LOWEST = -0.5
 """Below the score of every placement, above that of none: `PASSING` counts, `OVERLAP` does not."""
@@ -58,20 +59,6 @@ class Holding(NamedTuple):
 
     cells: tuple[Cell, ...]
     score: float
-
-
-class Turn(NamedTuple):
-    """A turn of the object at which all arms of a group of tasks can hold it.
-
-    Attributes:
-        columns: by how many columns.
-        margin: the smallest margin (m) of those arms.
-        clearance: their smallest clearance (m).
-    """
-
-    columns: int
-    margin: float
-    clearance: float
 
 
 def hold_runs(tasks: Sequence[Collection[str]]) -> list[HoldRun]:
@@ -112,6 +99,7 @@ class HoldingSearch:
         visits: for every visit of a task, in order, arm → its map there; all over the same grid. A task
             is visited twice where the object is grasped anew in it.
         gaps: the gaps between the prints of the holds' arms, in the order of the holds.
+        torsos: the torsos that several arms share in a visit.
 
     Raises:
         InputError: the grids differ.
@@ -119,28 +107,41 @@ class HoldingSearch:
     Attributes:
         holds: the holds, in the order in which they begin.
         groups: the tasks, as indices, in groups that have one turn.
+        torsos: the torsos that several arms share in a visit.
     """
 
     def __init__(
         self,
         visits: Sequence[Mapping[str, FeasibilityMap]],
         gaps: PrintGaps,
+        torsos: Sequence[SharedTorso] = (),
     ) -> None:
         maps = [m for visit in visits for m in visit.values()]
         check_same_grid(maps)
         self.holds, self.groups, self.gaps = hold_runs(visits), turn_groups(visits), gaps
-        self._visits = visits
+        self.torsos = torsos
         self._shape = maps[0].feasible.shape
-        # By group and hold: margins (L, A) by line and column, the smallest of its tasks'.
-        self._margins: dict[tuple[int, int], Array] = {}
-        for g, group in enumerate(self.groups):
-            for k in group:
-                for h, hold in enumerate(self.holds):
-                    if k in hold.tasks:
-                        m = visits[k][hold.arm]
-                        margin = np.where(m.feasible, surface_margin(m), -1.0).reshape(-1, self._shape[2])
-                        known = self._margins.get((g, h))
-                        self._margins[g, h] = margin if known is None else np.minimum(known, margin)
+        self._stations = [
+            station for g in range(len(self.groups)) for station in self._stations_of(g, visits)
+        ]
+
+    def _stations_of(self, g: int, visits: Sequence[Mapping[str, FeasibilityMap]]) -> Iterator[Station]:
+        """Yield the stations of a group of tasks: one for each shared torso, one for all other arms."""
+        alone: dict[int, list[list[FeasibilityMap]]] = {}
+        for k in self.groups[g]:
+            own = [t for t, torso in enumerate(self.torsos) if torso.visit == k]
+            for t in own:
+                shared = self.torsos[t].maps
+                yield Station(g, t, {self._hold(k, arm): [shared[arm]] for arm in shared})
+            for arm, m in visits[k].items():
+                if not any(arm in self.torsos[t].maps for t in own):
+                    alone.setdefault(self._hold(k, arm), []).append([m])
+        if alone:
+            yield Station(g, None, alone)
+
+    def _hold(self, task: int, arm: str) -> int:
+        """Return the hold of an arm in a task."""
+        return next(h for h, hold in enumerate(self.holds) if hold.arm == arm and task in hold.tasks)
 
     def best_first(self) -> Iterator[Holding]:
         """Yield every choice of grasps that is feasible at some turn of each task, the hands apart.
@@ -158,43 +159,16 @@ class HoldingSearch:
             yield from self._below(0.0, self._problem(self.gaps.passing))
 
     def turns(self, cells: Sequence[Cell], group: int, enough: float = np.inf) -> list[Turn]:
-        """Return the turns at which all arms of a group of tasks are feasible, best margin first.
-
-        Margins from ``enough`` (m) on count as equal; of equal ones, the larger clearance comes first.
-        """
-        margin = np.min(self._turned(self._margins, cells, group), axis=0)
-        clearance = np.min(self._turned(self._clearances, cells, group), axis=0)
-        valid = np.flatnonzero(margin >= 0)
-        order = np.lexsort((-margin[valid], -clearance[valid], -np.minimum(margin[valid], enough)))
-        return [Turn(int(k), float(margin[k]), float(clearance[k])) for k in valid[order]]
-
-    def _turned(
-        self, values: Mapping[tuple[int, int], Array], cells: Sequence[Cell], group: int
-    ) -> list[Array]:
-        """Return for each hold in a group its values (A,) by the turn."""
-        heights = self._shape[1]
-        return [
-            np.roll(values[group, h][cell.roll * heights + cell.row], -cell.column)
-            for h, cell in enumerate(cells)
-            if (group, h) in values
-        ]
-
-    @cached_property
-    def _clearances(self) -> dict[tuple[int, int], Array]:
-        """By group and hold: clearances (L, A) by line and column."""
-        found: dict[tuple[int, int], Array] = {}
-        for g, h in self._margins:
-            tasks = [k for k in self.groups[g] if k in self.holds[h].tasks]
-            own = [self._visits[k][self.holds[h].arm].clearance.reshape(-1, self._shape[2]) for k in tasks]
-            found[g, h] = np.min(own, axis=0)
-        return found
+        """Return the turns at which all arms of a group of tasks are feasible; see `best_turns`."""
+        stations = [station for station in self._stations if station.group == group]
+        return best_turns(stations, cells, self._shape[1], enough)
 
     @cached_property
     def _alone(self) -> Array:
         """(n, L) what each line of each hold reaches at most."""
         return np.array(
             [
-                np.min([m.max(axis=1) for (_, other), m in self._margins.items() if other == h], axis=0)
+                np.min([s.margins[h].max(axis=(0, 2)) for s in self._stations if h in s.margins], axis=0)
                 for h in range(len(self.holds))
             ]
         )
@@ -205,8 +179,8 @@ class HoldingSearch:
         lines = np.flatnonzero(alone >= 0)
         clearance = [
             min(
-                np.max(self._clearances[key][line], where=margins[line] >= alone[line], initial=0.0)
-                for key, margins in self._margins.items()
+                np.max(s.clearances[0][0, line], where=s.margins[0][0, line] >= alone[line], initial=0.0)
+                for s in self._stations
             )
             for line in lines
         ]
@@ -252,14 +226,17 @@ class HoldingSearch:
     def _problem(self, gaps_of: Callable[[int, int], GapTable]) -> Problem:
         n, (_, _, angles) = len(self.holds), self._shape
         lines = self._alone.shape[1]
-        shared = [g for g in range(len(self.groups)) if sum(other == g for other, _ in self._margins) > 1]
-        part = np.full((n, len(shared)), -1)
+        of_group = {g: [s for s in self._stations if s.group == g] for g in range(len(self.groups))}
+        several = [own for own in of_group.values() if sum(len(s.margins) for s in own) > 1]
+        stations = [s for own in several for s in own]
+        part = np.full((n, len(stations)), -1)
         margins = []
-        for column, group in enumerate(shared):
-            for h in range(n):
-                if (group, h) in self._margins:
-                    part[h, column] = len(margins)
-                    margins.append(self._margins[group, h])
+        values = max((len(m) for s in stations for m in s.margins.values()), default=1)
+        for column, station in enumerate(stations):
+            for h, margin in station.margins.items():
+                part[h, column] = len(margins)
+                missing = np.full((values - len(margin), lines, angles), -1.0)
+                margins.append(np.concatenate([margin, missing]))
         table, rows, gaps, first = np.full((n, n), -1), [], [], 0
         for pair in self._meetings:
             found = gaps_of(*pair)
@@ -270,8 +247,9 @@ class HoldingSearch:
         return Problem(
             order=np.argsort(-self._alone, axis=1, kind="stable"),
             alone=self._alone,
+            group=np.array([k for k, own in enumerate(several) for _ in own], dtype=np.int64),
             part=part,
-            margins=np.array(margins).reshape(-1, lines, angles),
+            margins=np.array(margins).reshape(-1, values, lines, angles),
             table=table,
             row=np.array(rows, dtype=np.int64).reshape(-1, lines, lines),
             gaps=np.concatenate([np.empty((0, angles)), *gaps]),

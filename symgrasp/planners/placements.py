@@ -8,6 +8,10 @@ of tasks with one turn the margins of all holds in it, at the best turn.
 Sets of columns are words of bits. For a floor that the score must exceed, a pair of lines allows
 the columns at which their gap exceeds it, and a group the turns at which the margins do; a hold is
 placed where all earlier ones allow it, and given up as soon as a later one has no place left.
+
+Where arms of a group share a torso they must have one value of it as well: they are a *station* of the
+group, with a set of turns for each value. The turns left to a group are those that each of its stations has
+at some value.
 """
 
 from __future__ import annotations
@@ -28,13 +32,14 @@ WORD = 64
 
 
 class Problem(NamedTuple):
-    """What is to be placed: n holds, L lines, A angles, G groups of tasks that several holds share.
+    """What is to be placed: n holds, L lines, A angles, S stations, T values of a torso at most.
 
     Attributes:
         order: (n, L) the lines of each hold, most promising first.
         alone: (n, L) what a line reaches at most, whatever the others do; below 0 if infeasible.
-        part: (n, G) where in ``margins`` a hold's margins in a group are, -1 if it is not in it.
-        margins: (P, L, A) margins (m), below 0 where infeasible.
+        group: (S,) group of each station, from 0 on; groups of a single hold have none.
+        part: (n, S) where in ``margins`` a hold's margins in a station are, -1 if it is not in it.
+        margins: (P, T, L, A) margins (m), below 0 where infeasible.
         table: (n, n) which of the tables of gaps two holds a < b have, -1 if they never meet.
         row: (T, L, L) where in ``gaps`` a pair of lines is.
         gaps: (K, A) gaps (m) by the later hold's column less the earlier one's.
@@ -42,6 +47,7 @@ class Problem(NamedTuple):
 
     order: np.ndarray
     alone: Array
+    group: np.ndarray
     part: np.ndarray
     margins: Array
     table: np.ndarray
@@ -50,7 +56,7 @@ class Problem(NamedTuple):
 
 
 class _Sets(NamedTuple):
-    """The columns above the floor, of every line's margins (P · L) and every row of gaps (K).
+    """The columns above the floor, of every line's margins (P · T · L) and every row of gaps (K).
 
     Each set is written twice in a row, so that it can be read from any column; it is made when it
     is first asked for, and again when the floor has changed.
@@ -77,21 +83,22 @@ def explore(problem, floor, ceiling, improve, cells):
         How many were found (at most m, or 1 where the best is sought), and the last one's score.
     """
     holds, lines = problem.order.shape
-    angles, groups = problem.gaps.shape[1], problem.part.shape[1]
+    angles, stations, torsos = problem.gaps.shape[1], problem.part.shape[1], problem.margins.shape[1]
     words = (angles + WORD - 1) // WORD
     sets, made = _new_sets(problem, words), 0
     # By depth: where in its order a hold is, and the columns of that line still to be tried; the
-    # columns that earlier holds allow it; the turns that they leave each group; what they reach.
+    # columns that earlier holds allow it; the turns that they leave each station; what they reach.
     at = np.full(holds, -1)
     columns = np.zeros((holds, words), np.uint64)
     allowed = np.empty((holds, holds, lines, words), np.uint64)
-    turns = np.empty((holds + 1, groups, words), np.uint64)
+    turns = np.empty((holds + 1, stations, torsos, words), np.uint64)
+    left = np.empty(words, np.uint64)
     reached = np.full(holds + 1, np.inf)
     place = np.zeros((holds, 2), np.int64)
     for w in range(words):
         allowed[0, 0, :, w] = 1 if w == 0 else 0
         allowed[0, 1:, :, w] = _full(angles, w)
-        turns[0, :, w] = _full(angles, w)
+        turns[0, :, :, w] = _full(angles, w)
     count, score, depth = 0, floor, 0
     while depth >= 0:
         column = _take_first(columns[depth])
@@ -107,14 +114,14 @@ def explore(problem, floor, ceiling, improve, cells):
         line = problem.order[depth, at[depth]]
         place[depth, 0], place[depth, 1] = line, column
         here = min(reached[depth], problem.alone[depth, line], _gap(problem, place, depth))
-        if here <= floor or not _turn(problem, sets, made, floor, place, depth, turns):
+        if here <= floor or not _turn(problem, sets, made, floor, place, depth, turns, left):
             continue
         if depth < holds - 1:
             reached[depth + 1] = here
             if _narrow(problem, sets, made, floor, place, depth, allowed):
                 depth += 1
             continue
-        here = min(here, _together(problem, place, turns[holds]))
+        here = min(here, _together(problem, place, turns[holds], left))
         if not floor < here < ceiling:
             continue
         score = here
@@ -123,7 +130,7 @@ def explore(problem, floor, ceiling, improve, cells):
             floor = here
             made += 1
             for d in range(holds):  # above the new floor fewer turns are left
-                _turn(problem, sets, made, floor, place, d, turns)
+                _turn(problem, sets, made, floor, place, d, turns, left)
         else:
             count += 1
             if count == len(cells):
@@ -144,21 +151,49 @@ def _gap(problem, place, depth):
 
 
 @njit(**PLAIN)
-def _turn(problem, sets, made, floor, place, depth, turns):
-    """Leave each group the turns at which the hold is above the floor as well; tell whether all have one."""
+def _turn(problem, sets, made, floor, place, depth, turns, left):
+    """Leave each station the turns at which the hold is above the floor as well.
+
+    Returns:
+        Whether all groups have a turn left; ``left`` (words,) is scratch.
+    """
     line, column = place[depth]
-    for g in range(problem.part.shape[1]):
-        part = problem.part[depth, g]
+    _, torsos, lines, _ = problem.margins.shape
+    for s in range(len(problem.group)):
+        part = problem.part[depth, s]
         if part < 0:
-            turns[depth + 1, g] = turns[depth, g]
+            turns[depth + 1, s] = turns[depth, s]
             continue
-        i = part * problem.order.shape[1] + line
-        if sets.margins_made[i] != made:
-            _fill(sets.margins[i], problem.margins[part, line], floor)
-            sets.margins_made[i] = made
-        if not _meet(turns[depth, g], sets.margins[i], column, turns[depth + 1, g]):
+        any_left = False
+        for t in range(torsos):
+            i = (part * torsos + t) * lines + line
+            if sets.margins_made[i] != made:
+                _fill(sets.margins[i], problem.margins[part, t, line], floor)
+                sets.margins_made[i] = made
+            any_left |= _meet(turns[depth, s, t], sets.margins[i], column, turns[depth + 1, s, t])
+        if not any_left:
+            return False
+    for s in range(len(problem.group)):
+        first = s == 0 or problem.group[s] != problem.group[s - 1]
+        if first and not _turns_left(problem, turns[depth + 1], problem.group[s], left):
             return False
     return True
+
+
+@njit(**PLAIN)
+def _turns_left(problem, turns, group, left):
+    """Write the turns that each station of a group has at some value; tell whether there are any."""
+    anything = False
+    for w in range(len(left)):
+        left[w] = ~np.uint64(0)
+        for s in range(len(problem.group)):
+            if problem.group[s] == group:
+                bits = np.uint64(0)
+                for t in range(turns.shape[1]):
+                    bits |= turns[s, t, w]
+                left[w] &= bits
+        anything |= left[w] != 0
+    return anything
 
 
 @njit(**PLAIN)
@@ -188,21 +223,20 @@ def _narrow(problem, sets, made, floor, place, depth, allowed):
 
 
 @njit(**PLAIN)
-def _together(problem, place, turns):
-    """Return the margin of the worst group at its best turn."""
-    holds, angles = len(place), problem.gaps.shape[1]
+def _together(problem, place, turns, left):
+    """Return the margin of the worst group at its best turn; ``left`` (words,) is scratch."""
     worst = np.inf
-    for g in range(problem.part.shape[1]):
+    for s in range(len(problem.group)):
+        if s and problem.group[s] == problem.group[s - 1]:
+            continue
         best = -np.inf
-        left = turns[g].copy()
+        _turns_left(problem, turns, problem.group[s], left)
         turn = _take_first(left)
         while turn >= 0:
             margin = np.inf
-            for d in range(holds):
-                part = problem.part[d, g]
-                if part >= 0:
-                    column = (place[d, 1] + turn) % angles
-                    margin = min(margin, problem.margins[part, place[d, 0], column])
+            for other in range(s, len(problem.group)):
+                if problem.group[other] == problem.group[s]:
+                    margin = min(margin, _station_margin(problem, place, other, turn))
             best = max(best, margin)
             turn = _take_first(left)
         worst = min(worst, best)
@@ -210,8 +244,24 @@ def _together(problem, place, turns):
 
 
 @njit(**PLAIN)
+def _station_margin(problem, place, station, turn):
+    """Return the smallest margin of a station's holds at a turn, at the best value of the torso."""
+    best = -np.inf
+    for t in range(problem.margins.shape[1]):
+        margin = np.inf
+        for d in range(len(place)):
+            part = problem.part[d, station]
+            if part >= 0:
+                column = (place[d, 1] + turn) % problem.gaps.shape[1]
+                margin = min(margin, problem.margins[part, t, place[d, 0], column])
+        best = max(best, margin)
+    return best
+
+
+@njit(**PLAIN)
 def _new_sets(problem, words):
-    count, double = problem.margins.shape[0] * problem.margins.shape[1], 2 * words + 1
+    parts, torsos, lines, _ = problem.margins.shape
+    count, double = parts * torsos * lines, 2 * words + 1
     return _Sets(
         np.empty((count, double), np.uint64),
         np.full(count, -1),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from itertools import pairwise
 from typing import Literal
 
@@ -15,11 +16,12 @@ import numpy as np
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.torso_maps import merged
 from symgrasp.plan.plan import Plan, Planner
 from symgrasp.plan.writing import write_plan
 from symgrasp.planners.bimanual import Climb, ClimbStep
 from symgrasp.planners.solving import TaskVisit, climb, first_grasp, holdings, with_regrasps
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world
@@ -245,11 +247,30 @@ def _visits(
     visits: list[TaskVisit] = []
     done = 0
     for task in tasks:
+        bodies = [world.scene.arm(name).robot for name in task.arms]
+        shared = {r.name: r for r in bodies if r.torso is not None and bodies.count(r) > 1}
         maps: dict[str, FeasibilityMap] = {}
-        for arm in task.arms:
-            step = (lambda share, done=done: progress((done + share) / total)) if progress else None
+        torsos: dict[str, dict[str, list[FeasibilityMap]]] = {name: {} for name in shared}
+        for arm, body in zip(task.arms, bodies, strict=True):
+            step = part_of(progress, done, total)
             given = (known or {}).get((task.name, arm))
-            maps[arm] = given or maker.map(arm, task, progress=step)
+            if body.name in shared:
+                by_torso = _by_torso(maker, arm, task, given, step)
+                torsos[body.name][arm] = by_torso
+                maps[arm] = given or merged(by_torso)
+            else:
+                maps[arm] = given or maker.map(arm, task, progress=step)
             done += 1
-        visits.append(TaskVisit(task, maps))
+        visits.append(TaskVisit(task, maps, tuple(torsos.values())))
     return visits
+
+
+def _by_torso(
+    maker: MapMaker, arm: str, task: Task, given: FeasibilityMap | None, progress: Progress | None
+) -> list[FeasibilityMap]:
+    """Return the maps of an arm at the samples of its torso, feasible only where a given map is."""
+    if given is None:
+        return maker.maps_by_torso(arm, task, progress=progress)
+    posed = replace(task, T_world_object=given.T_world_object)
+    found = maker.maps_by_torso(arm, posed, manifold=given.manifold, progress=progress)
+    return [m.masked(given.feasible) for m in found]

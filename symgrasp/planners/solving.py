@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch, hold_runs
 from symgrasp.planners.sequential import first_common_grasp
+from symgrasp.planners.stations import SharedTorso
 from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.world import BulletWorld
@@ -33,10 +35,12 @@ class TaskVisit(NamedTuple):
     Attributes:
         task: the task.
         maps: arm → its map of that task, for every arm of the task in its order.
+        torsos: for every torso that several arms of the task share, arm → its maps at the samples.
     """
 
     task: Task
     maps: Mapping[str, FeasibilityMap]
+    torsos: Sequence[Mapping[str, Sequence[FeasibilityMap]]] = ()
 
 
 def first_grasp(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> list[PlanTask]:
@@ -122,18 +126,20 @@ def holdings(
     """
     scene, maps = world.scene, [visit.maps for visit in visits]
     grid = next(iter(maps[0].values())).manifold
-    search = HoldingSearch(maps, PrintGaps([scene.arm(run.arm) for run in hold_runs(maps)], grid))
-    finders = [ConfigurationFinder(world, [scene.arm(a) for a in own], list(own.values())) for own in maps]
+    gaps = PrintGaps([scene.arm(run.arm) for run in hold_runs(maps)], grid)
+    torsos = [SharedTorso(k, shared) for k, visit in enumerate(visits) for shared in visit.torsos]
+    search = HoldingSearch(maps, gaps, torsos)
+    finders = [_finder(world, visit) for visit in visits]
     placements = FreePlacements(search, finders, progress)
     found = False
     for placement in placements:
         found = True
         common = round(turned / grid.dtheta) - placement.steps[0].turn
         entries = []
-        for visit, finder, step in zip(visits, finders, placement.steps, strict=True):
+        for visit, step in zip(visits, placement.steps, strict=True):
             held = [
                 Held(configuration, m, cell, cell.turned(-step.turn - common, grid.angles))
-                for configuration, m, cell in zip(step.configurations, finder.maps, step.cells, strict=True)
+                for configuration, m, cell in zip(step.configurations, step.maps, step.cells, strict=True)
             ]
             delta = float(wrap((step.turn + common) * grid.dtheta))
             entries.append(write_task(world, visit.task, delta, held))
@@ -144,6 +150,12 @@ def holdings(
         yield entries, Planner(algorithm="exact", statistics=statistics)
     if not found:
         raise _why_not(world, visits, placements.tried)
+
+
+def _finder(world: BulletWorld, visit: TaskVisit) -> ConfigurationFinder:
+    by_torso = {arm: maps for shared in visit.torsos for arm, maps in shared.items()}
+    arms = [world.scene.arm(name) for name in visit.maps]
+    return ConfigurationFinder(world, arms, list(visit.maps.values()), by_torso)
 
 
 def _why_not(world: BulletWorld, visits: Sequence[TaskVisit], tried: int) -> NoPlanError:
@@ -198,8 +210,30 @@ def climb(
     Raises:
         NoPlanError: it finds nothing.
     """
-    arms = [world.scene.arm(name) for name in visit.maps]
-    maps = list(visit.maps.values())
+    # Algorithm 3 knows no torso: it places the hands at one value of each after the other.
+    reason = NoPlanError(f"no value of a torso serves all arms of task {visit.task.name}")
+    for samples in product(*(range(len(next(iter(shared.values())))) for shared in visit.torsos)):
+        at = zip(visit.torsos, samples, strict=True)
+        fixed = {arm: maps[t] for shared, t in at for arm, maps in shared.items()}
+        try:
+            return _climb(world, visit, {**visit.maps, **fixed}, seed, limits, progress, trace)
+        except NoPlanError as error:
+            reason = error
+    raise reason
+
+
+def _climb(
+    world: BulletWorld,
+    visit: TaskVisit,
+    maps_of: Mapping[str, FeasibilityMap],
+    seed: int,
+    limits: Climb,
+    progress: Progress | None,
+    trace: list[ClimbStep] | None,
+) -> tuple[PlanTask, Planner]:
+    """Place the hands of one task on one map an arm; see `climb`."""
+    arms = [world.scene.arm(name) for name in maps_of]
+    maps = list(maps_of.values())
     configurations = ConfigurationFinder(world, arms, maps)
 
     def bodies_free(cells: Sequence[Cell]) -> bool:
@@ -208,9 +242,7 @@ def climb(
     found = hill_climb(maps, arms, bodies_free, seed, limits, progress, trace=trace)
     held = [
         Held(configuration, m, cell, cell)
-        for configuration, m, cell in zip(
-            configurations.witnesses(found.cells), maps, found.cells, strict=True
-        )
+        for configuration, m, cell in zip(witnesses(arms, maps, found.cells), maps, found.cells, strict=True)
     ]
     planner = Planner(
         algorithm="hill_climb",

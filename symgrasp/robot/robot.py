@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from symgrasp.robot.hand import Hand
 from symgrasp.robot.handprint import Handprint, handprint
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.model import RobotModel
+from symgrasp.robot.torso import Torso
 
 __all__ = ["Arm", "Robot"]
 
@@ -29,12 +30,21 @@ class Robot:
         model: its URDF.
         T_world_base: pose (4, 4) of the root link.
         home: parked joint values (n,) of ``model.joint_names``.
+        torso: the joints before the arms that maps sample; None where they stay at home.
     """
 
     name: str
     model: RobotModel
     T_world_base: Array
     home: Array
+    torso: Torso | None = None
+
+    def at(self, sample: int) -> Robot:
+        """Return the robot whose torso rests at a sample."""
+        assert self.torso is not None
+        home = self.home.copy()
+        home[self.torso.indices] = self.torso.values[sample]
+        return replace(self, home=home, torso=None)
 
 
 class Arm:
@@ -43,6 +53,7 @@ class Arm:
     All other joints of the robot stay at home, also prismatic joints of the chain and those that it
     shares with another arm. Kinematics is a product of exponentials read off the URDF:
     ``T_base_tool(q) = Trans(P0)·Rot(H0, q0)·Trans(P1)· … ·Rot(Hn-1, qn-1)·Trans(Pn)·R0``.
+    Where the robot has a torso, its joints come first among the arm's, and `at` is the arm alone.
 
     Args:
         name: its name in the scene.
@@ -56,12 +67,12 @@ class Arm:
             neither 6 nor 7 revolute joints.
 
     Attributes:
-        joint_names: its n joints, from base to tool.
+        joint_names: its n joints, from base to tool, those of the torso included.
         indices: (n,) their indices into the robot's joint values.
         lower: joint limits (n,), -inf for a continuous joint.
         upper: joint limits (n,), inf for a continuous joint.
-        H: unit axes (n, 3) in the base frame at zero.
-        P: offsets (n + 1, 3) between points on successive axes, at zero.
+        H: unit axes (., 3) in the base frame at zero, of the joints after the torso, which is at home.
+        P: offsets (. + 1, 3) between points on successive axes, at zero.
         R0: orientation (3, 3) of the tool at zero.
     """
 
@@ -80,21 +91,22 @@ class Arm:
                     model.path, f"hand {hand.name}: joint", joint, one_of(model.joint_names, joint)
                 )
         self.name, self.robot, self.tool, self.hand = name, robot, tool, hand
+        self._shared = shared
+        self._at: dict[int, Arm] = {}
+        torso = robot.torso.joint_names if robot.torso else ()
+        resting = {*shared, *hand.joints, *torso}
         joints = [
             j
             for j in model.chain(tool)
-            if j.name in model.joint_names
-            and j.kind != "prismatic"
-            and j.name not in shared
-            and j.name not in hand.joints
+            if j.name in model.joint_names and j.kind != "prismatic" and j.name not in resting
         ]
         if len(joints) not in (6, 7):
             names = [j.name for j in joints]
             raise UrdfError(model.path, f"arm {name}", names, f"6 or 7 revolute joints, not {len(joints)}")
-        self.joint_names = tuple(j.name for j in joints)
+        self.joint_names = (*torso, *(j.name for j in joints))
         self.indices = np.array([model.joint_names.index(n) for n in self.joint_names])
         for j in model.chain(tool):
-            if j.source in self.indices and j.name not in self.joint_names:
+            if j.source in self.indices[len(torso) :] and j.name not in self.joint_names:
                 followed = model.joint_names[j.source]
                 raise UrdfError(
                     model.path, f"joint {j.name}: mimic", followed, "an arm of independent joints"
@@ -105,7 +117,7 @@ class Arm:
     def _screws(self, joints: list[Joint]) -> tuple[Array, Array, Array]:
         """Return H, P and R0, with the joints of the arm at zero and all others at home."""
         q = self.robot.home.copy()
-        q[self.indices] = 0.0
+        q[self.indices[-len(joints) :]] = 0.0
         links = self.robot.model.forward(q)
         frames = [links[j.child] for j in joints]
         points = [np.zeros(3), *(frame[:3, 3] for frame in frames), links[self._tool_index][:3, 3]]
@@ -130,9 +142,27 @@ class Arm:
         """Parked joint values (n,) of the arm."""
         return self.robot.home[self.indices]
 
+    def at(self, sample: int) -> Arm:
+        """Return the arm alone, with the torso at a sample: its joints are those after the torso's."""
+        if sample not in self._at:
+            assert self.robot.torso is not None
+            shared = self._shared | frozenset(self.robot.torso.joint_names)
+            self._at[sample] = Arm(self.name, self.robot.at(sample), self.tool, self.hand, shared)
+        return self._at[sample]
+
+    def with_torso(self, sample: int, q: Array) -> Array:
+        """Return joint values (..., n) of the arm, from those of the arm alone at a sample of the torso."""
+        assert self.robot.torso is not None
+        torso = self.robot.torso.values[sample]
+        return np.concatenate([np.broadcast_to(torso, (*q.shape[:-1], len(torso))), q], axis=-1)
+
     def tool_pose(self, q: ArrayLike) -> Array:
         """Return ``T_base_tool`` (..., 4, 4) for joint values (..., n)."""
         q = np.asarray(q, dtype=float)
+        if self.robot.torso is not None:
+            values = np.broadcast_to(self.robot.home, (*q.shape[:-1], len(self.robot.home))).copy()
+            values[..., self.indices] = q
+            return self.robot.model.forward(values)[..., self._tool_index, :, :]
         rotation = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
         position = np.broadcast_to(self.P[0], (*q.shape[:-1], 3))
         for k, axis in enumerate(self.H):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -43,12 +44,13 @@ MOST_ROBOTS, MOST_ARMS, MOST_OBSTACLES, MOST_TASKS = 32, 16, 1000, 500
 """Most robots of a scene, arms of a robot, obstacles and tasks of a scene."""
 
 MOST_CANDIDATES = 10_000_000
-"""Most candidates of a map: heights × angles × rolls × redundancy. It takes minutes at worst."""
+"""Most candidates of a map: heights × angles × rolls × redundancy × torso. It takes minutes at worst."""
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
+Samples = Annotated[int, Field(ge=1, le=1024)]
 Vector = tuple[Number, Number, Number]
 
 
@@ -143,7 +145,11 @@ class ArmFile(_Strict):
 
 
 class RobotFile(_Strict):
-    """A robot: one arm (hand, and tool where the hand has none) or several (arms)."""
+    """A robot: one arm (hand, and tool where the hand has none) or several (arms).
+
+    ``torso`` names joints between base and arms, such as a lift, with the number of values that maps try
+    for each: the centres of so many equal parts of its range. All arms of the robot move with them.
+    """
 
     name: Name
     urdf: str
@@ -154,6 +160,7 @@ class RobotFile(_Strict):
     mount: MountFile | None = None
     arms: Annotated[tuple[ArmFile, ...], Field(min_length=1, max_length=MOST_ARMS)] | None = None
     home: tuple[Number, ...] | dict[str, Number] | None = None
+    torso: Annotated[dict[str, Samples], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _tool_or_arms(self) -> RobotFile:
@@ -254,7 +261,7 @@ class MapSettings(_Strict):
 
     heights: Annotated[int, Field(ge=1, le=1024)] = 48
     angles: Annotated[int, Field(ge=1, le=1024)] = 96
-    redundancy: Annotated[int, Field(ge=1, le=1024)] = 32
+    redundancy: Samples = 32
     approach: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
     """length (m) of the straight radial retreat that must be free as well"""
     margin: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
@@ -282,6 +289,17 @@ class SceneFile(_Strict):
     obstacles: Annotated[tuple[ObstacleFile, ...], Field(max_length=MOST_OBSTACLES, fail_fast=True)] = ()
     tasks: Annotated[tuple[TaskFile, ...], Field(min_length=1, max_length=MOST_TASKS, fail_fast=True)]
     map: MapSettings = MapSettings()
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> SceneFile:
+        m, torso = self.map, max(math.prod((r.torso or {}).values()) for r in self.robots)
+        candidates = m.heights * m.angles * len(ROLLS) * m.redundancy * torso
+        if candidates > MOST_CANDIDATES:
+            raise ValueError(
+                f"heights × angles × {len(ROLLS)} rolls × redundancy × torso samples of at most "
+                f"{MOST_CANDIDATES:,}, not {candidates:,}"
+            )
+        return self
 
 
 def scene_schema() -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from symgrasp.robot.assembly import Mount
 from symgrasp.robot.hand import HANDS, Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
+from symgrasp.robot.torso import Torso
 from symgrasp.scene.format import ArmFile, RobotFile
 
 __all__ = ["BuiltRobot", "RobotBuilder"]
@@ -70,7 +71,9 @@ class RobotBuilder:
                 mounts.append(Mount(hand.tool, None, tools[-1]))
         model = self.model(self._path(entry.urdf), tuple(mounts))
         chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
+        torso = self._torso(field, entry, model, tools)
         shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
+        shared |= frozenset(torso.joint_names if torso else ())
         joints, notes = [], []
         for k, (f, a, hand) in enumerate(zip(fields, files, hands, strict=True)):
             joints.append(self._joints(f, a, tools[k], model, shared, hand))
@@ -80,7 +83,7 @@ class RobotBuilder:
                 files = (*files[:k], a.model_copy(update={"joints": ends}), *files[k + 1 :])
                 notes.append(f"{a.name}: joints: [{', '.join(ends)}]; {', '.join(resting)} rest at home")
         home = self._home(f"{field}.home", entry, model, [name for names in joints for name in names], hands)
-        robot = Robot(entry.name, model, entry.base.matrix(), home)
+        robot = Robot(entry.name, model, entry.base.matrix(), home, torso)
         arms = [
             Arm(a.name, robot, tool, hand, frozenset(chain) - frozenset(names))
             for a, tool, hand, chain, names in zip(files, tools, hands, chains, joints, strict=True)
@@ -128,6 +131,17 @@ class RobotBuilder:
             expected = f"a link of {model.path.name}: " + one_of(model.link_names, tool)
             raise SceneError(self._source, f"{field}.tool", tool, expected)
         return revolute_joints(model, tool)
+
+    def _torso(self, field: str, entry: RobotFile, model: RobotModel, tools: Sequence[str]) -> Torso | None:
+        """Return the torso of a robot, whose joints must stand between its base and its arms."""
+        if entry.torso is None:
+            return None
+        before = [j.name for tool in tools for j in model.chain(tool) if j.name in model.joint_names]
+        for name in entry.torso:
+            if name not in before:
+                expected = "a joint between base and arms: " + one_of(dict.fromkeys(before), name)
+                raise SceneError(self._source, f"{field}.torso", name, expected)
+        return Torso.of(model, entry.torso)
 
     def _joints(
         self, field: str, arm: ArmFile, tool: str, model: RobotModel, shared: frozenset[str], hand: Hand

@@ -106,7 +106,7 @@ class BulletWorld:
         for arm, q, opening in configurations:
             robot = values[arm.robot.name]
             moved = arm.robot_values(q, opening)
-            changed = moved != arm.robot.home
+            changed = moved != self.scene.robots[arm.robot.name].home
             robot[changed] = moved[changed]
         for name, joints in values.items():
             self._set(name, joints)

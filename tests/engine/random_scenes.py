@@ -64,6 +64,34 @@ def random_scene(seed: int, arm: str = "") -> dict[str, Any]:
     return content
 
 
+def random_torso_scene(seed: int) -> dict[str, Any]:
+    """Return a scene like those of `random_scene` with a robot of two arms on a lift and a waist."""
+    content = random_scene(seed, next(iter(ARMS)))
+    rng = np.random.default_rng(seed)
+    home = [1.03, -1.14, -1.37, -1.58, -0.5, 2.1]
+    mirrored = [-1.03, -1.14, -1.37, -1.58, 0.5, 2.1]
+    arms = [
+        {"name": side, "hand": "wsg50", "mount": {"link": f"{side}_flange", "prefix": f"{side}_"}}
+        for side in ("left", "right")
+    ]
+    names = [f"{side}_j{k}" for side in ("left", "right") for k in range(1, 7)]
+    content["robots"] = [
+        {
+            "name": "body",
+            "urdf": str(Path(__file__).parent.parent / "data" / "two_arms.urdf"),
+            "base": {"position": [-0.1, 0.0, 0.0]},
+            "arms": arms,
+            "home": dict(zip(names, [*home, *mirrored], strict=True)),
+            "torso": {"lift_joint": int(rng.integers(1, 4)), "waist_joint": int(rng.integers(1, 4))},
+        }
+    ]
+    (task, *_) = content["tasks"]
+    task["arms"] = ["left", "right"]
+    content["tasks"] = [task]
+    content["map"]["redundancy"] = 1
+    return content
+
+
 def _profile(rng: np.random.Generator) -> list[list[float]]:
     heights = np.linspace(0, rng.uniform(0.08, 0.5), rng.integers(2, 6))
     radii = rng.uniform(0.012, 0.045, len(heights))

@@ -15,7 +15,7 @@ from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import SHIPPED
 from tests.engine.identity import assert_same, assert_true
-from tests.engine.random_scenes import ARMS, random_scene
+from tests.engine.random_scenes import ARMS, random_scene, random_torso_scene
 
 SEEDS = 320
 AT_ONCE = 20
@@ -54,13 +54,20 @@ def test_other_arms_have_the_same_maps(arm):
     assert feasible > 50
 
 
+def test_arms_on_a_torso_have_the_same_maps():
+    """Any value of the torso makes a cell feasible, for each arm alone."""
+    feasible = sum(check(random_torso_scene(seed)) for seed in range(AT_ONCE // 2))
+    assert feasible > 50
+
+
 def check(content):
     scene = Scene.from_content(content)
     task, feasible = scene.task(), 0
     with BulletWorld(scene) as world:
         maker = MapMaker(world)
         for arm in task.arms:
-            assert ExactEngine.knows(scene.arm(arm))
+            own = scene.arm(arm)
+            assert ExactEngine.knows(own.at(0) if own.robot.torso else own)
             exact = maker.map(arm, task)
             assert_same(exact, maker.map(arm, task, method="reference"))
             assert_true(world, scene, scene.arm(arm), exact)

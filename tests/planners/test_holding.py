@@ -23,6 +23,7 @@ from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import OVERLAP, PASSING, PrintGaps
 from symgrasp.planners.holding import HoldingSearch, hold_runs, turn_groups
 from symgrasp.planners.sequential import surface_margin
+from symgrasp.planners.stations import SharedTorso
 from symgrasp.robot.configuration import ArmConfiguration
 from tests.conftest import load_small
 from tests.planners.test_planners import map_of
@@ -335,10 +336,12 @@ class Picky(ConfigurationFinder):
     """Finds that bodies are free at some combinations of cells only."""
 
     def __init__(self, maps, seed):
+        world: Any = None
         arms: Any = [SimpleNamespace(name=f"arm {k}") for k in range(len(maps))]
-        self.arms, self.maps, self.seed = arms, maps, seed
+        super().__init__(world, arms, maps)
+        self.seed = seed
 
-    def find(self, cells, *, every=True):
+    def find(self, cells, torso=None, *, every=True):
         free = np.random.default_rng([self.seed, *chain(*cells)]).random() < 0.05
         return [ArmConfiguration(arm, np.zeros(7), 0.0) for arm in self.arms] if free else None
 
@@ -361,6 +364,46 @@ def test_the_best_that_is_free(seed, density):
         assert finder.find(found.steps[0].cells)
     elif found:
         assert apart(found.steps[0].cells) == OVERLAP
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([([[0, 1]], 2, 0.1), ([[0, 1]], 2, 0.2), ([[0, 1]], 3, 0.03), ([[0, 1], [2]], 3, 0.03)]),
+)
+@settings(max_examples=40, deadline=None)
+def test_arms_of_one_body_share_its_torso(seed, size):
+    """Exactly the placements for which one value of each torso serves all of its arms, best first."""
+    bodies, arms, density = size
+    values = 3
+    by_torso = [random_maps(seed + 1000 * k, values, density) for k in range(arms)]
+    union = [map_of(np.any([m.feasible for m in own], axis=0), grid=small()[1]) for own in by_torso]
+    names = [f"arm {k}" for k in range(arms)]
+    shared = [SharedTorso(0, {names[k]: by_torso[k] for k in body}) for body in bodies]
+    alone = {k: [union[k]] for k in range(arms) if not any(k in body for body in bodies)}
+    search = HoldingSearch([dict(zip(names, union, strict=True))], small()[2], shared)
+    expected: dict = {}
+    for cells in product(*([Cell(*map(int, c)) for c in np.argwhere(m.feasible)] for m in union)):
+        reached = apart(cells)
+        groups = [(body, range(values)) for body in bodies] + [([k], range(1)) for k in alone]
+        for body, torso in groups:
+            at = [[margin_at((alone.get(k) or by_torso[k])[t], cells[k]) for k in body] for t in torso]
+            reached = min(reached, max(map(min, at)))
+        if reached >= 0:
+            key = difference(cells)
+            expected[key] = max(expected.get(key, 0.0), reached)
+    found = [h for h in search.best_first() if h.score >= 0]
+    assert {difference(h.cells) for h in found} == set(expected)
+    assert [h.score for h in found] == sorted((h.score for h in found), reverse=True)
+    for holding in found:
+        assert holding.score == pytest.approx(expected[difference(holding.cells)])
+        for turn in search.turns(holding.cells, 0):
+            turned = [c.turned(turn.columns, 8) for c in holding.cells]
+            at = [union[k] if k in alone else by_torso[k][turn.torsos[k // 2]] for k in range(arms)]
+            assert turn.margin == min(margin_at(m, c) for m, c in zip(at, turned, strict=True)) >= 0
+
+
+def margin_at(m, cell) -> float:
+    return float(surface_margin(m)[cell]) if m.feasible[cell] else -1.0
 
 
 def test_an_object_that_stands_is_not_turned():
