@@ -11,11 +11,13 @@ import coal  # pyright: ignore[reportMissingImports]
 import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
 
+from symgrasp.files import temporary_folder
 from symgrasp.ik import Solver
 from symgrasp.poses import Array, axis_frame
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.robot import Arm
 from symgrasp.world import BulletWorld, Shape, checked_self_pairs
+from symgrasp.world.urdf import collision_urdf
 
 __all__ = ["BruteForce"]
 
@@ -39,7 +41,8 @@ class BruteForce:
             shape.kind == "mesh" for o in world.scene.obstacles for _, shape in o.shapes()
         )
         robot = arm.robot
-        self._model = pinocchio.buildModelFromXML(robot.model.collision_urdf().decode())
+        with temporary_folder() as folder:
+            self._model = pinocchio.buildModelFromXML(collision_urdf(robot.model, folder).decode())
         self._data = self._model.createData()
         self._geometry = pinocchio.GeometryModel()
         own = self._add_robot(world)

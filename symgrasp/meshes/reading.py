@@ -14,7 +14,7 @@ from trimesh.resolvers import FilePathResolver
 from symgrasp.errors import MeshError, one_of
 from symgrasp.meshes.formats import FORMATS, Declared, ending_of_content
 
-__all__ = ["MESH_ENDINGS", "check_size", "joined", "read_mesh", "read_parts"]
+__all__ = ["MESH_ENDINGS", "check_size", "joined", "read_groups", "read_mesh", "read_parts"]
 
 MESH_ENDINGS = tuple(FORMATS)
 """File endings of the mesh formats that are read."""
@@ -54,12 +54,18 @@ def read_mesh(path: Path, field: str = "mesh", *, upright: bool = True) -> trime
         MeshError: the file is missing, of another kind than its ending says, damaged or too large, holds
             something that cannot be read, has no triangles, or vertices that are not finite.
     """
-    return joined(_parts(path, field, upright=upright, materials=False))
+    return joined(_parts(path, field, upright=upright))
 
 
 def read_parts(path: Path, field: str = "mesh") -> list[trimesh.Trimesh]:
     """Read a mesh of a URDF as `read_mesh` does, as one mesh for each material, with their colours."""
     return _parts(path, field, upright=False, materials=True)
+
+
+def read_groups(path: Path, field: str = "mesh") -> list[trimesh.Trimesh]:
+    """Read a mesh of a URDF as `read_mesh` does, as one mesh for each object and group of an OBJ file."""
+    parts = _parts(path, field, upright=False, groups=True)
+    return parts if path.suffix.lower() == ".obj" else [joined(parts)]
 
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
@@ -103,8 +109,13 @@ def check_size(
     raise MeshError(path, field, f"{size:.4g} m", expected)
 
 
-def _parts(path: Path, field: str, *, upright: bool, materials: bool) -> list[trimesh.Trimesh]:
-    """Read the parts of a mesh, and compare them with what the file says of itself."""
+def _parts(
+    path: Path, field: str, *, upright: bool, materials: bool = False, groups: bool = False
+) -> list[trimesh.Trimesh]:
+    """Read the parts of a mesh, and compare them with what the file says of itself.
+
+    An OBJ file is divided by its materials, or by its groups if these are asked for.
+    """
     declared = _declared(path, field)
     kind = path.suffix.lower()[1:]
     try:
@@ -114,6 +125,9 @@ def _parts(path: Path, field: str, *, upright: bool, materials: bool) -> list[tr
                 file_type=kind,
                 resolver=FilePathResolver(str(path)) if materials else None,
                 skip_materials=not materials,
+                group_material=not groups,
+                split_objects=groups,
+                split_groups=groups,
                 process=False,
             )
             parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]

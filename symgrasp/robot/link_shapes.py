@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import trimesh
 import yourdfpy
+from scipy.spatial import ConvexHull, QhullError
 
-from symgrasp.errors import UrdfError
-from symgrasp.meshes import check_size, read_mesh
+from symgrasp.errors import MeshError, UrdfError
+from symgrasp.files import file_sha256
+from symgrasp.meshes import check_size, joined, read_groups, read_mesh
 from symgrasp.poses import Array
 
-__all__ = ["CollisionShape", "collision_hull", "link_shape", "shape_mesh"]
+__all__ = ["CollisionShape", "collision_hulls", "link_shape", "shape_mesh"]
 
 LARGEST_SIZE = 1e4
 """No size of a shape is larger (m), nor is a scale."""
@@ -21,6 +24,15 @@ LARGEST_SIZE = 1e4
 SIZES = (0.001, 50.0)
 """Smallest and largest size (m) of a mesh that is a link or an obstacle; others are taken to be in other
 units."""
+
+THINNEST = 1e-6
+"""Smallest mean thickness (m) of the convex hull of a mesh that is a link."""
+
+MOST_HULLS = 256
+"""A mesh of more groups than this is taken as one."""
+
+SIDES = 48
+"""Of the polygon that stands for a circle."""
 
 
 class CollisionShape(NamedTuple):
@@ -33,6 +45,7 @@ class CollisionShape(NamedTuple):
         path: the file of a mesh, otherwise None.
         pose: pose (4, 4) in the frame of the link or obstacle; boxes, cylinders and spheres are centred.
         upright: whether a mesh is turned to z up; see `symgrasp.meshes.read_mesh`.
+        sha256: SHA-256 of the mesh file of a link, as it was when the URDF was loaded.
     """
 
     kind: str
@@ -40,6 +53,7 @@ class CollisionShape(NamedTuple):
     path: Path | None
     pose: Array
     upright: bool = False
+    sha256: str = ""
 
     def mesh(self, field: str) -> trimesh.Trimesh:
         """Read the mesh of a shape that is one, scaled, in the shape's own frame.
@@ -51,11 +65,7 @@ class CollisionShape(NamedTuple):
             MeshError: it cannot be read, or is too large or too small to be meant in metres.
         """
         assert self.path is not None
-        mesh = read_mesh(self.path, field, upright=self.upright)
-        vertices, faces = mesh.vertices * self.size, mesh.faces
-        if np.prod(self.size) < 0:  # a mirror image is inside out
-            faces = faces[:, ::-1]
-        mesh = trimesh.Trimesh(vertices, faces, process=False)
+        mesh = _scaled(read_mesh(self.path, field, upright=self.upright), self.size)
         check_size(self.path, field, mesh, SIZES, float(np.abs(self.size).max()))
         return mesh
 
@@ -69,12 +79,13 @@ def link_shape(path: Path, link: str, shape: yourdfpy.Collision) -> CollisionSha
         shape: the shape as the parser has it; a mesh by its path.
 
     Raises:
-        UrdfError: the shape has no geometry, a size is not a positive number, or a scale is zero.
+        UrdfError: the shape has no geometry, a size is not a positive number, a scale is zero, or the file
+            of a mesh cannot be read.
     """
     geometry, field = shape.geometry, f"link {link}: collision"
     if geometry is None:
         raise UrdfError(path, field, None, "a geometry")
-    mesh = None
+    mesh, sha256 = None, ""
     if geometry.box is not None:
         kind, sizes = "box", np.ravel(geometry.box.size)
     elif geometry.cylinder is not None:
@@ -84,6 +95,10 @@ def link_shape(path: Path, link: str, shape: yourdfpy.Collision) -> CollisionSha
     elif geometry.mesh is not None:
         mesh, scale = Path(geometry.mesh.filename), geometry.mesh.scale
         kind, sizes = "mesh", np.broadcast_to(np.ravel(1.0 if scale is None else scale), 3)
+        try:
+            sha256 = file_sha256(mesh)
+        except OSError as error:
+            raise UrdfError(path, f"link {link}: mesh", str(mesh), "a readable mesh file") from error
     else:
         raise UrdfError(path, field, None, "a box, cylinder, sphere or mesh")
     size = tuple(float(value) for value in sizes)
@@ -92,10 +107,10 @@ def link_shape(path: Path, link: str, shape: yourdfpy.Collision) -> CollisionSha
     pose = np.eye(4) if shape.origin is None else np.asarray(shape.origin, dtype=float)
     if not np.isfinite(pose).all():
         raise UrdfError(path, f"{field}: origin", pose[:3, 3].tolist(), "finite numbers")
-    return CollisionShape(kind, size, mesh, pose)
+    return CollisionShape(kind, size, mesh, pose, sha256=sha256)
 
 
-def shape_mesh(shape: CollisionShape, field: str, sides: int = 48) -> trimesh.Trimesh:
+def shape_mesh(shape: CollisionShape, field: str, sides: int = SIDES) -> trimesh.Trimesh:
     """Return a collision shape as a mesh to be looked at, in the frame of its link or obstacle.
 
     Args:
@@ -117,26 +132,71 @@ def shape_mesh(shape: CollisionShape, field: str, sides: int = 48) -> trimesh.Tr
     return mesh.apply_transform(shape.pose)
 
 
-def collision_hull(shape: CollisionShape, link: str) -> Array:
-    """Return the vertices (n, 3) of a convex hull that contains a collision shape, in the link frame.
+def collision_hulls(shape: CollisionShape, field: str) -> tuple[Array, ...]:
+    """Return the vertices (n, 3) of the convex hulls that stand for a link's collision shape, in its frame.
+
+    They contain the shape. A mesh is one hull; an OBJ file whose groups are closed surfaces, as programs
+    write it that divide a body into convex parts, is one for each group. Groups that are not closed are
+    patches of a surface, between whose hulls the inside would be left out.
 
     Args:
         shape: the shape.
-        link: the link that it belongs to, for error messages.
+        field: the link that it belongs to, for error messages.
 
     Raises:
-        MeshError: its mesh is unusable.
+        MeshError: its mesh is unusable, or has no volume.
     """
     if shape.kind == "box":
-        mesh = trimesh.creation.box(extents=shape.size)
+        hulls = (trimesh.creation.box(extents=shape.size).vertices,)
     elif shape.kind == "cylinder":
         # Circumscribed, so that the hull contains the round shape.
-        sides, (radius, height) = 48, shape.size
-        mesh = trimesh.creation.cylinder(radius=radius / np.cos(np.pi / sides), height=height, sections=sides)
+        radius, height = shape.size
+        around = radius / np.cos(np.pi / SIDES)
+        hulls = (trimesh.creation.cylinder(radius=around, height=height, sections=SIDES).vertices,)
     elif shape.kind == "sphere":
         ball = trimesh.creation.icosphere(subdivisions=3)
         inradius = np.einsum("ij,ij->i", ball.face_normals, ball.triangles_center).min()
-        mesh = ball.apply_scale(shape.size[0] / inradius)
+        hulls = (ball.vertices * (shape.size[0] / inradius),)
     else:
-        mesh = shape.mesh(f"link {link}")
-    return np.asarray(mesh.convex_hull.vertices) @ shape.pose[:3, :3].T + shape.pose[:3, 3]
+        assert shape.path is not None
+        hulls = _mesh_hulls(shape.path, shape.sha256, shape.size, field)
+    return tuple(points @ shape.pose[:3, :3].T + shape.pose[:3, 3] for points in hulls)
+
+
+@lru_cache(maxsize=1024)
+def _mesh_hulls(path: Path, sha256: str, size: tuple[float, ...], field: str) -> tuple[Array, ...]:
+    """Return the vertices (n, 3) of the convex hulls of a mesh, scaled; the SHA-256 tells if it changed."""
+    groups = [_scaled(group, size) for group in read_groups(path, field)]
+    whole = joined(groups)
+    check_size(path, field, whole, SIZES, float(np.abs(size).max()))
+    if 1 < len(groups) <= MOST_HULLS and all(_is_closed(group) for group in groups):
+        hulls = [_hull(group) for group in groups]
+        if all(hull is not None for hull in hulls):
+            return tuple(hull for hull in hulls if hull is not None)
+    hull = _hull(whole)
+    if hull is None:
+        value = f"a flat surface, less than {THINNEST:g} m thick"
+        raise MeshError(path, field, value, "a body with a volume; a thin box does for a plate")
+    return (hull,)
+
+
+def _scaled(mesh: trimesh.Trimesh, size: tuple[float, ...]) -> trimesh.Trimesh:
+    """Return a mesh scaled by factors for x, y and z."""
+    mirrored = np.prod(size) < 0  # a mirror image is inside out
+    faces = mesh.faces[:, ::-1] if mirrored else mesh.faces
+    return trimesh.Trimesh(mesh.vertices * size, faces, process=False)
+
+
+def _is_closed(mesh: trimesh.Trimesh) -> bool:
+    mesh = mesh.copy()
+    mesh.merge_vertices()  # a file may repeat them
+    return mesh.is_watertight
+
+
+def _hull(mesh: trimesh.Trimesh) -> Array | None:
+    """Return the vertices (n, 3) of the convex hull of a mesh, None where it is flat."""
+    try:
+        hull = ConvexHull(mesh.vertices)
+    except QhullError:
+        return None
+    return hull.points[hull.vertices] if 2 * hull.volume > THINNEST * hull.area else None

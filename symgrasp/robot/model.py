@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,11 +13,10 @@ import yourdfpy
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import UrdfError, one_of
-from symgrasp.files import file_sha256
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
 from symgrasp.robot.joint import Joint, joint_motion
-from symgrasp.robot.link_shapes import CollisionShape, collision_hull, link_shape
+from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
 
 __all__ = ["RobotModel"]
 
@@ -68,7 +66,7 @@ class RobotModel:
             for link in urdf.robot.links
         }
         self.sha256 = self._content_sha256()
-        self._hulls: dict[str, tuple[Array, ...]] = {}
+        self._hulls: dict[str, tuple[tuple[Array, ...], ...]] = {}
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
         self.joints, self.link_names = self._build_tree(urdf, root)
         by_name = {joint.name: joint for joint in self.joints}
@@ -80,15 +78,8 @@ class RobotModel:
         digest = hashlib.sha256(self.urdf)
         for shapes in self._shapes.values():
             for shape in shapes:
-                if shape.path is not None:
-                    digest.update(self._file_sha256(shape.path))
+                digest.update(shape.sha256.encode())
         return digest.hexdigest()
-
-    def _file_sha256(self, path: Path) -> bytes:
-        try:
-            return file_sha256(path).encode()
-        except OSError as error:
-            raise UrdfError(self.path, "mesh", str(path), "a readable mesh file") from error
 
     def _build_tree(self, urdf: yourdfpy.URDF, root: str) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
         """Return joints and link names in the order of a breadth-first walk from the root.
@@ -256,9 +247,18 @@ class RobotModel:
         return frozenset(pairs)
 
     def hulls(self, link: str) -> tuple[Array, ...]:
-        """Return the vertices (n, 3) of the convex hull of each collision shape, in the link frame."""
+        """Return the vertices (n, 3) of the convex hulls of a link's collision shapes, in the link frame.
+
+        Raises:
+            MeshError: a mesh is unusable.
+        """
+        return tuple(hull for hulls in self.shape_hulls(link) for hull in hulls)
+
+    def shape_hulls(self, link: str) -> tuple[tuple[Array, ...], ...]:
+        """Return the hulls of each collision shape of a link: one, or several for a mesh; see `hulls`."""
         if link not in self._hulls:
-            self._hulls[link] = tuple(collision_hull(shape, link) for shape in self._shapes[link])
+            field = f"link {link} of {self.path.name}"
+            self._hulls[link] = tuple(collision_hulls(shape, field) for shape in self._shapes[link])
         return self._hulls[link]
 
     def shapes(self, link: str) -> tuple[CollisionShape, ...]:
@@ -279,30 +279,6 @@ class RobotModel:
 
     def __hash__(self) -> int:
         return hash(self.sha256)
-
-    def collision_urdf(self) -> bytes:
-        """Return links and joints of the URDF, without visual shapes, in the form that PyBullet demands.
-
-        Every link has a mass, every mimic joint limits, and no line is long: it reads some kilobytes of each.
-        """
-        root = ET.fromstring(self.urdf)
-        for other in [child for child in root if child.tag not in ("link", "joint")]:
-            root.remove(other)
-        for joint in root.iter("joint"):
-            if joint.find("mimic") is not None and joint.find("limit") is None:
-                ET.SubElement(joint, "limit", lower="0", upper="0", effort="0", velocity="0")  # not heeded
-        for link in root.iter("link"):
-            for other in [child for child in link if child.tag not in ("inertial", "collision")]:
-                link.remove(other)
-            for collision in link.iter("collision"):
-                collision.attrib.pop("concave", None)  # links are their convex hulls
-            if link.find("inertial") is None:
-                inertial = ET.SubElement(link, "inertial")
-                ET.SubElement(inertial, "mass", value="1")
-                moments = {"ixx": "1", "ixy": "0", "ixz": "0", "iyy": "1", "iyz": "0", "izz": "1"}
-                ET.SubElement(inertial, "inertia", moments)
-        ET.indent(root)
-        return ET.tostring(root)
 
 
 def _has_limits(j: yourdfpy.Joint) -> bool:

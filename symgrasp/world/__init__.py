@@ -1,8 +1,8 @@
 """Collision checks and distances of a scene in PyBullet, which no other room uses.
 
 All checks ask PyBullet for closest points within a distance, which depend on the present poses alone; its
-contact cache, which depends on earlier configurations, is not used. Collision margins are set to zero, so
-distances are those of the shapes themselves.
+contact cache, which depends on earlier configurations, is not used. Distances are those of the shapes
+themselves, but for a millimetre that PyBullet keeps around the hulls of links.
 """
 
 from symgrasp.world.bullet import BulletWorld

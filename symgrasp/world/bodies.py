@@ -39,7 +39,10 @@ class MovableJoint(NamedTuple):
 
 
 class SceneBodies:
-    """The bodies of a scene in a PyBullet client, with their collision margins set to zero.
+    """The bodies of a scene in a PyBullet client.
+
+    Obstacles and the object have no collision margin. Links keep the one around their hulls, see
+    `symgrasp.world.shapes.MARGIN`: it covers what PyBullet rounds off when it makes a hull.
 
     Args:
         client: PyBullet's id of the physics client to load them into.
@@ -82,14 +85,15 @@ class SceneBodies:
         return BodyName(self.names[body], self.links[body][link + 1])
 
     def link_indices(self, robot: str) -> dict[str, int]:
-        """Return link name → PyBullet's link index (-1 for the base) of a robot."""
+        """Return link name → PyBullet's link index (-1 for the base) of a robot.
+
+        It has those that have shapes, or carry some through a joint.
+        """
         return {link: i - 1 for i, link in enumerate(self.links[self.robots[robot]])}
 
     def _register(self, body: int, name: str, links: Sequence[str]) -> int:
         self.names[body] = name
         self.links[body] = tuple(links)
-        for link in range(-1, len(links) - 1):
-            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=self.client)
         return body
 
     def _load_urdf(self, model: RobotModel, name: str, pose: Array) -> int:
@@ -101,7 +105,7 @@ class SceneBodies:
         return [
             MovableJoint(index[model.link_names[j.child]], j.source, j.ratio, j.offset)
             for j in model.joints
-            if j.source >= 0
+            if j.source >= 0 and model.link_names[j.child] in index
         ]
 
     def _load_shape(self, name: BodyName, shape: CollisionShape, pose: Array) -> int:
@@ -157,6 +161,7 @@ class SceneBodies:
             baseOrientation=xyzw(pose),
             physicsClientId=self.client,
         )
+        pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self.client)
         return self._register(body, name.body, [name.link])
 
     def _load_object(self, scene: Scene) -> list[int]:

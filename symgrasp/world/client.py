@@ -5,16 +5,15 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from symgrasp.errors import UrdfError
 from symgrasp.files import temporary_folder
-from symgrasp.meshes import read_mesh
 from symgrasp.poses import Array, from_position_quat, quat_wxyz, wxyz_to_xyzw, xyzw_to_wxyz
 from symgrasp.robot.model import RobotModel
+from symgrasp.world.urdf import collision_urdf
 
 
 @contextmanager
@@ -64,14 +63,12 @@ def load_urdf(client: int, model: RobotModel, pose: Array) -> int:
         PyBullet's body id.
 
     Raises:
-        UrdfError: PyBullet cannot load it, or a link has fewer shapes there.
+        UrdfError: PyBullet cannot load it, or a link has other shapes there.
         MeshError: a mesh is unusable.
     """
-    for link in model.colliding_links():
-        model.hulls(link)  # PyBullet takes a damaged mesh for an empty one
     with temporary_folder() as folder:
         file = folder / "model.urdf"
-        file.write_bytes(_with_stl_meshes(model, folder))
+        file.write_bytes(collision_urdf(model, folder))
         try:
             body = pybullet.loadURDF(
                 str(file),
@@ -82,28 +79,14 @@ def load_urdf(client: int, model: RobotModel, pose: Array) -> int:
             )
         except pybullet.error as error:
             raise UrdfError(model.path, "urdf", str(error), "a URDF that PyBullet can load") from error
-    for i, link in enumerate(link_names(client, body)):
-        shapes = pybullet.getCollisionShapeData(body, i - 1, physicsClientId=client)
-        expected = len(model.shapes(link))
-        if len(shapes) < expected:
-            found = f"{len(shapes)} shapes in PyBullet"
-            raise UrdfError(model.path, f"link {link}: collision", found, f"{expected}, as in the URDF")
+    expected = {link: len(hulls) for link in model.colliding_links() if (hulls := model.hulls(link))}
+    links = enumerate(link_names(client, body), start=-1)
+    found = {link: len(pybullet.getCollisionShapeData(body, i, physicsClientId=client)) for i, link in links}
+    for link, count in expected.items():
+        if found.get(link) != count:
+            value = f"{found.get(link, 0)} shapes in PyBullet"
+            raise UrdfError(model.path, f"link {link}: collision", value, f"{count}, as in the URDF")
     return body
-
-
-def _with_stl_meshes(model: RobotModel, folder: Path) -> bytes:
-    """Return the URDF for PyBullet, with copies in a folder of the meshes that it might read otherwise.
-
-    It reads binary STL and OBJ as this library does, and takes each group of an OBJ as a hull of its own.
-    """
-    root = ET.fromstring(model.collision_urdf())
-    for k, mesh in enumerate(root.iter("mesh")):
-        path = Path(mesh.get("filename", ""))
-        if path.suffix.lower() != ".obj":
-            copy = folder / f"{k}.stl"
-            read_mesh(path, f"{model.path.name}: collision", upright=False).export(copy)
-            mesh.set("filename", str(copy))
-    return ET.tostring(root)
 
 
 def link_names(client: int, body: int) -> list[str]:

@@ -50,8 +50,8 @@ def arm_queries(bodies: SceneBodies, arm: Arm) -> list[Query]:
     robot = arm.robot
     body = bodies.robots[robot.name]
     index = bodies.link_indices(robot.name)
-    mount = frozenset(index[link] for link in robot.model.mount_links())
-    touch = frozenset(index[link] for link in arm.hand.touch_links)
+    mount = frozenset(index[link] for link in robot.model.mount_links() if link in index)
+    touch = frozenset(index[link] for link in arm.hand.touch_links if link in index)
     queries = [
         Query(Reason.SELF_COLLISION, frozenset((a, b)), body, body, index[a], index[b])
         for a, b in checked_self_pairs(robot.model)

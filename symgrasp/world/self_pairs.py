@@ -29,14 +29,16 @@ def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
     try:
         body = load_urdf(client, model, np.eye(4))
         index = {link: i - 1 for i, link in enumerate(link_names(client, body))}
-        for link in index.values():
-            pybullet.changeDynamics(body, link, collisionMargin=0.0, physicsClientId=client)
         links = model.colliding_links()
         adjacent = model.neighbours()
         pairs = [
             (a, b) for i, a in enumerate(links) for b in links[i + 1 :] if frozenset((a, b)) not in adjacent
         ]
-        moving = [(index[model.link_names[j.child]], j) for j in model.joints if j.source >= 0]
+        moving = [
+            (index[link], j)
+            for j in model.joints
+            if j.source >= 0 and (link := model.link_names[j.child]) in index
+        ]
         lower = np.where(np.isfinite(model.lower), model.lower, -np.pi)
         upper = np.where(np.isfinite(model.upper), model.upper, np.pi)
         samples = np.random.default_rng(0).uniform(lower, upper, (SELF_SAMPLES, len(lower)))
