@@ -8,6 +8,7 @@ contained in the piece, and smaller by at most the slack.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -75,12 +76,11 @@ def pack(pieces: Sequence[Piece]) -> PackedPieces:
     index, size = np.zeros((len(pieces), 3), dtype=np.int32), np.zeros((len(pieces), 9))
     first = edge = 0
     for k, piece in enumerate(pieces):
-        corners, triangles = (piece.vertices, None) if piece.revolved else _hull(piece.vertices)
+        corners, triangles, count, neighbours = _shape(piece.vertices.tobytes(), piece.revolved)
         row = -1
         if triangles is not None:
             row = len(seeds)
             seeds.append(first + (corners @ _seed_directions().T).argmax(axis=0))
-        count, neighbours = _neighbours(len(corners), triangles)
         starts.append(edge + np.concatenate([[0], np.cumsum(count)[:-1]]))
         edges.append(first + neighbours)
         vertices.append(corners)
@@ -105,6 +105,17 @@ def pose_rows(poses: Array) -> Array:
     poses = np.asarray(poses, dtype=float)
     rotation = poses[..., :3, :3].reshape(*poses.shape[:-2], 9)
     return np.concatenate([rotation, poses[..., :3, 3]], axis=-1)
+
+
+@lru_cache(maxsize=4096)
+def _shape(vertices: bytes, revolved: bool) -> tuple[Array, np.ndarray | None, np.ndarray, np.ndarray]:
+    """Return the corners of a piece, the triangles of its hull, and `_neighbours`.
+
+    Links look the same in every engine and robot of their kind, and this is most of the work of packing.
+    """
+    points = np.frombuffer(vertices).reshape(-1, 3)
+    corners, triangles = (points, None) if revolved else _hull(points)
+    return corners, triangles, *_neighbours(len(corners), triangles)
 
 
 def _hull(points: Array) -> tuple[Array, np.ndarray | None]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -85,8 +86,8 @@ def handprint(hulls: Sequence[Array], manifold: Manifold, row: int, roll: int, s
     to_row = lambda h: int(np.floor((h - manifold.profile.h_min) / manifold.dh))  # noqa: E731
     first, last = to_row(lowest - ROUNDING_MARGIN), to_row(highest + ROUNDING_MARGIN)
     cells = np.zeros((last - first + 1, manifold.angles), dtype=bool)
-    for points in placed:
-        edges = hull_edges(points)
+    for hull, points in zip(hulls, placed, strict=True):
+        edges = _known_edges(hull.tobytes())  # of one opening they are the same wherever the hand is
         for k in range(len(cells)):
             bottom = manifold.profile.h_min + (first + k) * manifold.dh
             corners = slab_corners(
@@ -103,6 +104,11 @@ def hull_edges(points: Array) -> np.ndarray:
     triangles = ConvexHull(points).simplices
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+@lru_cache(maxsize=1024)
+def _known_edges(points: bytes) -> np.ndarray:
+    return hull_edges(np.frombuffer(points).reshape(-1, 3))
 
 
 def slab_corners(points: Array, edges: np.ndarray, bottom: float, top: float) -> Array:

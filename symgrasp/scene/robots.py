@@ -123,7 +123,7 @@ class RobotBuilder:
             raise SceneError(
                 self._source, f"{field}.tool", None, f"a link; hand {hand.name} names none itself"
             )
-        return hand.tool.link if hand.tool.is_link else f"{arm.name}_tool"
+        return hand.tool.link if hand.tool.is_link else f"{hand.tool.link}_tool"
 
     def _chain(self, field: str, tool: str, model: RobotModel) -> list[str]:
         """Return the names of the revolute joints from the root to the tool link."""

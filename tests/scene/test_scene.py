@@ -121,7 +121,7 @@ def test_a_mounted_hand_with_a_prefix(content, tmp_path):
     content["robots"][0].update(hand="pr2", mount=MOUNT)
     scene = Scene.load(write_scene(tmp_path, content))
     arm = scene.arm()
-    assert arm.tool == "panda_tool"
+    assert arm.tool == "second_gripper_pole_tool"
     assert arm.hand.links[0] == "second_gripper_pole"
     assert "second_left_gripper_joint" in scene.robots["panda"].model.joint_names
     assert Scene.from_content(json.loads(json.dumps(scene.content))).sha256 == scene.sha256
@@ -143,7 +143,7 @@ def test_an_inline_hand_brings_its_urdf_table_and_tool(content, tmp_path):
     again = Scene.from_content(json.loads(json.dumps(scene.content)))
     assert again.sha256 == scene.sha256
     assert again.arm().hand.joint_values(0.025) == pytest.approx({"second_wsg50_joint": 0.015})
-    assert again.arm().tool == "panda_tool"
+    assert again.arm().tool == "second_wsg50_base_tool"
 
 
 def test_home_by_name(content, tmp_path):
