@@ -9,7 +9,7 @@ import symgrasp
 from symgrasp.compiling import SOURCES
 from symgrasp.feasibility.create import create_map
 from symgrasp.planners.planning import plan_bimanual, plan_sequential
-from tests.conftest import SHIPPED, load_small
+from tests.conftest import PLAIN, load_small
 
 __all__ = ["fingerprint"]
 
@@ -22,7 +22,7 @@ def fingerprint() -> str:
 
 
 if __name__ == "__main__":
-    for name in SHIPPED:
+    for name in PLAIN:
         create_map(load_small(name, 4, 8, 2))
     plan_sequential(load_small("pick_pour_place", 12, 24, 8))
     plan_bimanual(load_small("log_two_robots", 20, 24, 6))

@@ -16,7 +16,7 @@ from hypothesis import settings
 
 from symgrasp.files import SCENES_DIR
 from symgrasp.scene.scene import Scene
-from symgrasp.scene.shipped import shipped_scenes
+from symgrasp.scene.shipped import extra_of, shipped_scenes
 
 # CI asks the same questions every time; elsewhere every run asks new ones.
 # No deadlines: the first example may have to wait for code to be compiled.
@@ -27,6 +27,9 @@ settings.load_profile("ci" if os.environ.get("CI") else "local")
 ROOT = Path(__file__).parent.parent
 
 SHIPPED = list(shipped_scenes())
+
+PLAIN = [name for name, path in shipped_scenes().items() if extra_of(path) is None]
+"""Those whose robots come with PyBullet: what is slow is done for these alone."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -59,7 +62,7 @@ def load_small(name: str, heights: int = 8, angles: int = 16, redundancy: int = 
     return Scene.load(name).with_settings(heights=heights, angles=angles, redundancy=redundancy)
 
 
-@pytest.fixture(params=SHIPPED)
+@pytest.fixture(params=PLAIN)
 def shipped(request: pytest.FixtureRequest) -> Scene:
     return load_small(request.param)
 

@@ -24,7 +24,7 @@ from symgrasp.ik import solver_for
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
-from symgrasp.scene.shipped import shipped_scenes
+from symgrasp.scene.shipped import extra_of, shipped_scenes
 from symgrasp.world import BulletWorld, open_world
 
 __all__ = ["against_others", "boxes", "growth", "process", "run", "turning"]
@@ -62,7 +62,8 @@ WITHOUT_COAL = "maps against Pinocchio and Coal: not measured, needs pip install
 
 def run() -> Iterator[Figure]:
     """Run the benchmarks of maps and yield their figures as they are measured."""
-    yield from against_others(list(shipped_scenes()), ROUNDS)
+    plain = [name for name, path in shipped_scenes().items() if extra_of(path) is None]
+    yield from against_others(plain, ROUNDS)
     yield from growth(ROUNDS)
     yield from boxes(ROUNDS)
     yield from turning(20 * ROUNDS)

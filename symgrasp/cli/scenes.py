@@ -16,10 +16,12 @@ def add_parser(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for every shipped scene; return the exit status."""
-    from symgrasp.scene.shipped import list_scenes
+    from symgrasp.scene.shipped import list_scenes, missing_extra, shipped_scenes
 
-    scenes = list_scenes()
+    scenes, files = list_scenes(), shipped_scenes()
     width = max(map(len, scenes))
     for name, description in scenes.items():
-        say(f"{name:{width}}  {description}")
+        extra = missing_extra(files[name])
+        needs = f" (needs pip install 'symgrasp[{extra}]')" if extra else ""
+        say(f"{name:{width}}  {description}{needs}")
     return 0

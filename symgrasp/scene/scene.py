@@ -29,7 +29,7 @@ from symgrasp.scene.format import (
 )
 from symgrasp.scene.map_content import map_content
 from symgrasp.scene.parts import Obstacle, Task
-from symgrasp.scene.shipped import shipped_scenes
+from symgrasp.scene.shipped import missing_extra, shipped_scenes
 
 __all__ = ["Scene", "load_scene"]
 
@@ -81,6 +81,10 @@ class Scene:
             if str(scene) not in shipped:
                 raise SceneError("scene", "name", str(scene), one_of(shipped, scene) + ", or a .yaml file")
             path = shipped[str(scene)]
+            extra = missing_extra(path)
+            if extra:
+                expected = f"a scene whose robots are installed: pip install 'symgrasp[{extra}]'"
+                raise SceneError("scene", "name", str(scene), expected)
         try:
             text = read_file(path, LARGEST_YAML).decode("utf-8")
         except (OSError, ValueError) as error:

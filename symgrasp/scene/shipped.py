@@ -5,8 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from symgrasp.files import SCENES_DIR, parse_yaml
+from symgrasp.references import package_dirs
 
-__all__ = ["list_scenes", "shipped_scenes"]
+__all__ = ["extra_of", "list_scenes", "missing_extra", "shipped_scenes"]
+
+EXTRAS = {"example-robot-data": "robots"}
+"""Package that some shipped scenes take files from → extra of this package that installs it."""
 
 
 def shipped_scenes() -> dict[str, Path]:
@@ -17,6 +21,19 @@ def shipped_scenes() -> dict[str, Path]:
 def list_scenes() -> dict[str, str]:
     """Return what the shipped scenes show: name → description in one line, in order."""
     return {name: _description(path) for name, path in shipped_scenes().items()}
+
+
+def extra_of(path: Path) -> str | None:
+    """Return the extra of this package that installs the robots of a shipped scene, None if it needs none."""
+    text = path.read_text(encoding="utf-8")
+    return next((extra for package, extra in EXTRAS.items() if f"package://{package}/" in text), None)
+
+
+def missing_extra(path: Path) -> str | None:
+    """Return the extra that a shipped scene needs and that is not installed, None if there is none."""
+    extra = extra_of(path)
+    packages = [package for package, other in EXTRAS.items() if other == extra]
+    return None if all(package_dirs(f"package://{package}/") for package in packages) else extra
 
 
 def _description(path: Path) -> str:

@@ -16,7 +16,7 @@ from symgrasp.ik import solver_for
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.world import BulletWorld
-from tests.conftest import SHIPPED, load_small
+from tests.conftest import PLAIN, load_small
 
 
 def figures(found) -> dict[str, bench.Figure]:
@@ -86,7 +86,7 @@ def test_the_process_is_weighed():
     assert 50 < memory.values[0] < 1000
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 def test_brute_force_agrees_with_the_map(name):
     """Coal finds the same cells feasible as PyBullet: only its rounding of links beside meshes differs."""
     scene = load_small(name)

@@ -20,7 +20,7 @@ from symgrasp.engine.pieces import Piece, pack, pose_rows
 from symgrasp.poses import axis_frame
 from symgrasp.robot.robot import Arm
 from symgrasp.world import BulletWorld
-from tests.conftest import SHIPPED, load_small
+from tests.conftest import PLAIN, load_small
 
 NEAR = 0.1
 
@@ -60,11 +60,11 @@ def test_bounds_enclose_the_distance_of_random_hulls(seed):
         assert upper <= 1e-6
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 def test_bounds_enclose_what_pybullet_measures(name):
     """All pairs that are near in random configurations, by link and body; few are ever off by a micron."""
     scene = load_small(name)
-    rng = np.random.default_rng(SHIPPED.index(name))
+    rng = np.random.default_rng(PLAIN.index(name))
     compared = 0
     with BulletWorld(scene) as world:
         arms = scene.task().arms

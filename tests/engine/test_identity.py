@@ -13,7 +13,7 @@ from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
-from tests.conftest import SHIPPED
+from tests.conftest import PLAIN
 from tests.engine.identity import assert_same, assert_true
 from tests.engine.random_scenes import ARMS, random_scene, random_torso_scene
 
@@ -21,7 +21,7 @@ SEEDS = 320
 AT_ONCE = 20
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 def test_shipped_scenes_have_the_same_maps_at_full_grid(name):
     """Every task with every arm that holds the object in it."""
     scene = Scene.load(name)

@@ -18,7 +18,7 @@ from symgrasp.poses import from_position_rpy, inverse, pose_error, rotation_z, t
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
-from tests.conftest import SHIPPED, load_small, write_scene
+from tests.conftest import PLAIN, load_small, write_scene
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -32,7 +32,7 @@ def bottle_map() -> FeasibilityMap:
     return create_map(load_small("bottle_on_table", 12, 24, 8))
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 def test_shipped_scenes_have_feasible_and_infeasible_cells(name):
     scene = load_small(name)
     for task in scene.tasks.values():
@@ -42,11 +42,11 @@ def test_shipped_scenes_have_feasible_and_infeasible_cells(name):
             assert not m.feasible.all()
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 def test_turning_the_object_shifts_the_map(name):
     """Equation 3 by brute force: recomputed for the turned object equals shifted, witnesses and all."""
     scene = load_small(name)
-    rng = np.random.default_rng(SHIPPED.index(name))
+    rng = np.random.default_rng(PLAIN.index(name))
     task = scene.task(rng.choice(list(scene.tasks)))
     m = create_map(scene, task=task.name)
     for k in rng.integers(1, scene.manifold.angles, 2):

@@ -20,7 +20,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
-from tests.conftest import SHIPPED, load_small
+from tests.conftest import PLAIN, load_small
 
 COLLISIONS = (
     Reason.SELF_COLLISION, Reason.OBJECT_COLLISION, Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION,
@@ -38,7 +38,7 @@ def some_cells(m: FeasibilityMap, each: int = 3) -> list[Cell]:
 
 
 @pytest.mark.parametrize("approach", [0.0, 0.1])
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 def test_the_best_candidate_is_the_reason_of_both_maps(name, approach):
     scene = load_small(name, 6, 12, 6).with_settings(approach=approach)
     task = list(scene.tasks.values())[-1]

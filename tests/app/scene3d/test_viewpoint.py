@@ -19,7 +19,7 @@ from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
 from app.server.viser_server import quiet_server
 from symgrasp.scene.scene import Scene
 from tests.app.state.test_state import opened
-from tests.conftest import SHIPPED
+from tests.conftest import PLAIN
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_a_view_that_begins_with_a_camera_has_the_flat_map_towards_it(server, an
     assert front_towards(view_of(server, (*eye, 0.5, 0.0, 0.1)), eye) > 0.9
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 @pytest.mark.parametrize("aspect", [472 / 800, 840 / 800])
 def test_every_robot_and_every_task_is_in_the_picture(name, aspect):
     scene = Scene.load(name)
@@ -96,7 +96,7 @@ def test_every_robot_and_every_task_is_in_the_picture(name, aspect):
         assert abs((point - eye) @ right) < edge * ((point - eye) @ forward)
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", PLAIN)
 def test_the_object_can_be_moved_a_metre_beyond_everything(name):
     scene = Scene.load(name)
     poses = [robot.T_world_base for robot in scene.robots.values()]
