@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import xml.etree.ElementTree as ET
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +21,26 @@ __all__ = ["Frame", "Mount", "assemble"]
 LARGEST_URDF = 5_000_000
 """Largest URDF file (bytes) that is read."""
 
-MOST_LINKS = 1000
+MOST_LINKS = 5000
 """Most links of a URDF file, and most joints."""
 
 MOST_ELEMENTS, DEEPEST = 100_000, 50
 """Most XML elements of a URDF file, and how deep they may be nested."""
+
+NUMBERS = {
+    "origin": {"xyz": (3,), "rpy": (3,)},
+    "axis": {"xyz": (3,)},
+    "box": {"size": (3,)},
+    "cylinder": {"radius": (1,), "length": (1,)},
+    "sphere": {"radius": (1,)},
+    "mesh": {"scale": (1, 3)},
+    "limit": {"lower": (1,), "upper": (1,)},
+    "mimic": {"multiplier": (1,), "offset": (1,)},
+}
+"""Elements of links and joints → their attributes that hold numbers, and how many."""
+
+SHAPES = ("box", "cylinder", "sphere", "mesh")
+"""Geometries that a link may have."""
 
 
 @dataclass(frozen=True)
@@ -91,13 +107,20 @@ def _read(path: Path) -> ET.Element:
         raise UrdfError(path, "urdf", str(path), "a readable URDF file") from error
     except (ET.ParseError, ValueError, LookupError) as error:
         raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
+    if robot.tag != "robot" or robot.find("link") is None:
+        found = f"<{robot.tag}> without links" if robot.tag == "robot" else f"<{robot.tag}>"
+        raise UrdfError(path, "urdf", found, "<robot> with links, as in a URDF")
     for tag in ("link", "joint"):
         names = _names(robot, tag)
         if len(names) > MOST_LINKS:
             raise UrdfError(path, f"{tag}s", f"{len(names):,} of them", f"at most {MOST_LINKS:,} of them")
         _no_repeats(path, f"{tag} name", names)
     _no_repeats(path, "child link of joints", [c.get("link", "") for c in robot.iterfind("joint/child")])
+    for element in robot.iterfind("joint"):
+        _check_numbers(path, f"joint {element.get('name')}", element)
     for link in robot.iter("link"):
+        _check_numbers(path, f"link {link.get('name')}", link)
+        _check_shapes(path, link)
         for mesh in link.iter("mesh"):
             reference = mesh.get("filename", "")
             file = resolve(reference, path.parent)
@@ -125,9 +148,35 @@ def _parse(content: bytes) -> ET.Element:
 
 def _no_repeats(path: Path, field: str, names: Sequence[str]) -> None:
     """Raise UrdfError if a name occurs twice."""
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(names).items():
+        if count > 1:
             raise UrdfError(path, field, name, "a name that is not used twice")
+
+
+def _check_numbers(path: Path, field: str, part: ET.Element) -> None:
+    """Raise UrdfError if a number in a link or a joint cannot be read."""
+    for element in part.iter():
+        for key, counts in NUMBERS.get(element.tag, {}).items():
+            words = element.get(key)
+            if words is None:
+                continue
+            try:
+                complete = len([float(word) for word in words.split()]) in counts
+            except ValueError:
+                complete = False
+            if not complete:
+                expected = " or ".join("a number" if n == 1 else f"{n} numbers" for n in counts)
+                raise UrdfError(path, f"{field}: {element.tag}: {key}", words, expected)
+
+
+def _check_shapes(path: Path, link: ET.Element) -> None:
+    """Raise UrdfError if a link has a collision shape of an unknown kind; drop those only seen."""
+    for part in [*link.findall("collision"), *link.findall("visual")]:
+        unknown = [shape.tag for shape in part.iterfind("geometry/*") if shape.tag not in SHAPES]
+        if unknown and part.tag == "collision":
+            raise UrdfError(path, f"link {link.get('name')}: collision", unknown[0], one_of(SHAPES))
+        if unknown:
+            link.remove(part)
 
 
 def _names(robot: ET.Element, tag: str) -> list[str]:

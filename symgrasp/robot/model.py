@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_sha
 __all__ = ["RobotModel"]
 
 LARGEST_LIMIT = 1e4
-"""Joint limits and sizes of shapes must be below this (rad or m)."""
+"""A joint limit beyond this (rad or m) is none."""
 
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -47,8 +47,8 @@ class RobotModel:
         link_names: all links; the first is the root.
         joints: all joints, parents before children.
         joint_names: the joints that take a value: neither fixed nor mimic.
-        lower: their lower limits (n,).
-        upper: their upper limits (n,).
+        lower: their lower limits (n,), -inf where there is none.
+        upper: their upper limits (n,), inf where there is none.
     """
 
     def __init__(self, path: Path, mounts: Sequence[Mount] = ()) -> None:
@@ -68,7 +68,10 @@ class RobotModel:
         self.sha256 = self._content_sha256()
         self._hulls: dict[str, tuple[tuple[Array, ...], ...]] = {}
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
+        self._indices = {name: k for k, name in enumerate(self.joint_names)}
+        self._unusable_limits: dict[str, tuple[float, float] | None] = {}  # as the URDF states them
         self.joints, self.link_names = self._build_tree(urdf, root)
+        self._above = {joint.child: joint for joint in self.joints}
         by_name = {joint.name: joint for joint in self.joints}
         self.lower = np.array([by_name[name].lower for name in self.joint_names])
         self.upper = np.array([by_name[name].upper for name in self.joint_names])
@@ -87,31 +90,35 @@ class RobotModel:
         Raises:
             UrdfError: a joint is not connected to the root, of an unknown type, or moves no link.
         """
-        links = [root]
+        links = {root: 0}
         joints: list[Joint] = []
         by_name = {j.name: j for j in urdf.robot.joints}
-        remaining = list(urdf.robot.joints)
-        while remaining:
-            known = set(links)
-            ready = [j for j in remaining if j.parent in known]
-            if not ready:
-                raise UrdfError(self.path, "joint", remaining[0].name, "a parent link that hangs on the root")
+        order = {j.name: k for k, j in enumerate(urdf.robot.joints)}
+        below: dict[str, list[yourdfpy.Joint]] = {}
+        for j in urdf.robot.joints:
+            below.setdefault(j.parent, []).append(j)
+        ready = below.pop(root, [])
+        while ready:
             for j in ready:
                 if j.type != "fixed" and j.type not in MOVING:
                     raise UrdfError(self.path, f"joint {j.name}", j.type, one_of((*MOVING, "fixed")))
                 if j.child not in self._shapes:
                     expected = one_of(self._shapes, j.child)
                     raise UrdfError(self.path, f"joint {j.name}: child", j.child, expected)
-                links.append(j.child)
+                links[j.child] = len(links)
                 joints.append(self._joint(j, by_name, links))
-            remaining = [j for j in remaining if j.parent not in known]
+            ready = sorted((b for j in ready for b in below.pop(j.child, [])), key=lambda j: order[j.name])
+        for hanging in below.values():
+            raise UrdfError(self.path, "joint", hanging[0].name, "a parent link that hangs on the root")
         return tuple(joints), tuple(links)
 
-    def _joint(self, j: yourdfpy.Joint, by_name: Mapping[str, yourdfpy.Joint], links: list[str]) -> Joint:
-        """Convert a joint of the URDF; ``by_name`` holds all of them.
+    def _joint(
+        self, j: yourdfpy.Joint, by_name: Mapping[str, yourdfpy.Joint], links: Mapping[str, int]
+    ) -> Joint:
+        """Convert a joint of the URDF; ``by_name`` holds all of them, ``links`` the indices of the links.
 
         Raises:
-            UrdfError: its origin, axis, limits or mimic reference are unusable.
+            UrdfError: its origin, axis or mimic reference is unusable.
         """
         origin = np.eye(4) if j.origin is None else np.asarray(j.origin, dtype=float)
         if not np.isfinite(origin).all():
@@ -125,14 +132,14 @@ class RobotModel:
                 raise UrdfError(self.path, f"joint {j.name}: axis", axis.tolist(), "a direction")
             axis = axis / length
             followed, ratio, offset = self._followed(j, by_name)
-            source = self.joint_names.index(followed.name)
-            if j.mimic is None or j.type == "continuous" or _has_limits(j):
+            source = self._indices[followed.name]
+            if j.mimic is None or j.type == "continuous" or _stated_limits(j):
                 lower, upper = self._limits(j)
             else:  # as far as the joint that it mimics takes it
                 ends = [ratio * end + offset if ratio else offset for end in self._limits(followed)]
                 lower, upper = min(ends), max(ends)
         return Joint(
-            j.name, j.type, links.index(j.parent), links.index(j.child), origin, axis, lower, upper,
+            j.name, j.type, links[j.parent], links[j.child], origin, axis, lower, upper,
             source, ratio, offset,
         )  # fmt: skip
 
@@ -161,20 +168,29 @@ class RobotModel:
         return at, ratio, offset
 
     def _limits(self, j: yourdfpy.Joint) -> tuple[float, float]:
-        """Return the limits of a joint of the URDF, infinite for a continuous one.
+        """Return the limits of a joint of the URDF, infinite where there are none.
 
-        Raises:
-            UrdfError: they are missing, or not in order.
+        Those that are missing or not in order are noted: they matter only if the joint is used.
         """
         if j.type == "continuous":
             return -np.inf, np.inf
-        limit = j.limit
-        if limit is None or limit.lower is None or limit.upper is None:
-            raise UrdfError(self.path, f"joint {j.name}: limit", None, "a lower and an upper limit")
-        lower, upper = float(limit.lower), float(limit.upper)
-        if not -LARGEST_LIMIT <= lower <= upper <= LARGEST_LIMIT:
-            raise UrdfError(self.path, f"joint {j.name}: limit", [lower, upper], "lower <= upper")
-        return lower, upper
+        limits = _stated_limits(j)
+        if limits is None or not limits[0] <= limits[1]:
+            self._unusable_limits[j.name] = limits
+            return -np.inf, np.inf
+        lower, upper = limits
+        return lower if lower >= -LARGEST_LIMIT else -np.inf, upper if upper <= LARGEST_LIMIT else np.inf
+
+    def check_limits(self, joints: Iterable[str]) -> None:
+        """Check that the URDF has limits for the joints of an arm or a hand, given by name.
+
+        Raises:
+            UrdfError: they are missing for one, or not in order.
+        """
+        for name in joints:
+            if name in self._unusable_limits:
+                expected = "a lower and an upper limit, the lower one first"
+                raise UrdfError(self.path, f"joint {name}: limit", self._unusable_limits[name], expected)
 
     @property
     def root(self) -> str:
@@ -213,17 +229,20 @@ class RobotModel:
 
     def chain(self, link: str) -> list[Joint]:
         """Return the joints on the path from the root to a link, fixed ones included."""
-        by_child = {joint.child: joint for joint in self.joints}
         joints: list[Joint] = []
         at = self.link_index(link)
         while at:
-            joints.insert(0, by_child[at])
-            at = by_child[at].parent
-        return joints
+            joints.append(self._above[at])
+            at = self._above[at].parent
+        return joints[::-1]
 
     def mount_links(self) -> frozenset[str]:
         """Return the links that no joint moves: the root and what is fixed to it."""
-        return frozenset(name for name in self.link_names if not any(j.source >= 0 for j in self.chain(name)))
+        still = {0}
+        for joint in self.joints:  # parents before children
+            if joint.source < 0 and joint.parent in still:
+                still.add(joint.child)
+        return frozenset(self.link_names[k] for k in still)
 
     def colliding_links(self) -> tuple[str, ...]:
         """Return the links that have a collision shape."""
@@ -281,8 +300,10 @@ class RobotModel:
         return hash(self.sha256)
 
 
-def _has_limits(j: yourdfpy.Joint) -> bool:
-    return j.limit is not None and j.limit.lower is not None and j.limit.upper is not None
+def _stated_limits(j: yourdfpy.Joint) -> tuple[float, float] | None:
+    if j.limit is None or j.limit.lower is None or j.limit.upper is None:
+        return None
+    return float(j.limit.lower), float(j.limit.upper)
 
 
 def _root_link(urdf: yourdfpy.URDF) -> str:

@@ -63,8 +63,8 @@ class Arm:
         shared: joints of the chain that are not the arm's: shared with another arm, or of the torso.
 
     Raises:
-        UrdfError: the tool, a hand link or a hand joint is not in the URDF, or the chain has
-            neither 6 nor 7 revolute joints.
+        UrdfError: the tool, a hand link or a hand joint is not in the URDF, the chain has neither 6 nor
+            7 revolute joints, or a joint has no limits.
 
     Attributes:
         joint_names: its n joints, from base to tool, those of the torso included.
@@ -104,6 +104,7 @@ class Arm:
             names = [j.name for j in joints]
             raise UrdfError(model.path, f"arm {name}", names, f"6 or 7 revolute joints, not {len(joints)}")
         self.joint_names = (*torso, *(j.name for j in joints))
+        model.check_limits((*self.joint_names, *hand.joints))
         self.indices = np.array([model.joint_names.index(n) for n in self.joint_names])
         for j in model.chain(tool):
             if j.source in self.indices[len(torso) :] and j.name not in self.joint_names:

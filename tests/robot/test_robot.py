@@ -119,7 +119,6 @@ def test_a_hand_that_is_not_on_the_robot(panda, change, message):
     ("text", "message"),
     [
         ("<robot", "valid URDF"),
-        ("<robot name='r'/>", "valid URDF"),
         (
             "<robot name='r'><link name='a'><collision><geometry><box size='-1 1 1'/></geometry></collision>"
             "</link></robot>",
@@ -148,10 +147,22 @@ def test_a_hand_that_is_not_on_the_robot(panda, change, message):
             "<parent link='a'/><child link='b'/></joint></robot>",
             "floating",
         ),
+        ("<robot name='r'/>", "without links"),
+        ("<mujoco model='r'/>", "<mujoco>"),
         (
-            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='revolute'>"
-            "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>",
-            "lower and an upper limit",
+            "<robot name='r'><link name='a'><collision><geometry><plane/></geometry></collision></link>"
+            "</robot>",
+            "link a: collision: 'plane'",
+        ),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><box size='1 2'/></geometry></collision>"
+            "</link></robot>",
+            "link a: box: size: '1 2': expected 3 numbers",
+        ),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='fixed'>"
+            "<parent link='a'/><child link='b'/><origin xyz='0, 1, 2'/></joint></robot>",
+            "joint j: origin: xyz: '0, 1, 2'",
         ),
         (
             "<robot name='r'><link name='base'/><joint name='j' type='fixed'><parent link='base'/>"
@@ -184,3 +195,60 @@ def test_unusable_urdfs(tmp_path, text, message, capfd):
 def test_a_missing_urdf(tmp_path):
     with pytest.raises(UrdfError, match="readable URDF"):
         RobotModel(tmp_path / "none.urdf")
+
+
+def panda_with(folder: Path, old: str, new: str) -> RobotModel:
+    """Return the Panda with a piece of its URDF replaced."""
+    text = Path(PANDA).read_text().replace("package://", f"{Path(PANDA).parent}/")
+    assert old in text
+    path = folder / "panda.urdf"
+    path.write_text(text.replace(old, new))
+    return RobotModel(path)
+
+
+@pytest.mark.parametrize("limits", ['lower="1" upper="-1"', 'upper="-1"', ""])
+def test_limits_matter_where_an_arm_uses_the_joint(tmp_path, limits):
+    stated = 'lower="-3.1416" upper="0.0"'
+    with pytest.raises(UrdfError, match=r"joint panda_joint4: limit: .*a lower and an upper limit"):
+        make_arm(panda_with(tmp_path, stated, limits))
+    wheel = (
+        '<link name="wheel"/><joint name="spin" type="revolute"><parent link="panda_link0"/>'
+        f'<child link="wheel"/><axis xyz="0 0 1"/><limit {limits} effort="1" velocity="1"/></joint></robot>'
+    )
+    assert make_arm(panda_with(tmp_path, "</robot>", wheel)).dof == 7
+
+
+def test_limits_without_end_are_none(tmp_path):
+    arm = make_arm(panda_with(tmp_path, 'lower="-3.1416" upper="0.0"', 'lower="-1e16" upper="1e16"'))
+    assert arm.lower[3] == -np.inf
+    assert arm.upper[3] == np.inf
+
+
+def test_shapes_that_are_only_seen_do_not_matter(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(
+        "<robot name='r'><link name='a'><visual><geometry><capsule radius='1' length='2'/></geometry>"
+        "</visual></link></robot>"
+    )
+    assert RobotModel(path).link_names == ("a",)
+
+
+def test_links_come_level_by_level_in_the_order_of_the_file(tmp_path):
+    """However the joints are ordered, also in a tree of as many links as are allowed."""
+    rng = np.random.default_rng(0)
+    parents = [0] + [int(rng.integers(max(0, k - 50), k)) for k in range(1, 5000)]
+    joints = [
+        f'<joint name="j{k}" type="fixed"><parent link="l{parents[k]}"/><child link="l{k}"/></joint>'
+        for k in rng.permutation(np.arange(1, 5000))
+    ]
+    links = [f'<link name="l{k}"/>' for k in range(5000)]
+    path = tmp_path / "tree.urdf"
+    path.write_text(f'<robot name="r">{"".join(links + joints)}</robot>')
+    model = RobotModel(path)
+    depth = [0] * 5000
+    for k in range(1, 5000):
+        depth[k] = depth[parents[k]] + 1
+    order = {joint.split('"')[1].replace("j", "l"): k for k, joint in enumerate(joints)}
+    expected = sorted(range(1, 5000), key=lambda k: (depth[k], order[f"l{k}"]))
+    assert model.link_names == ("l0", *(f"l{k}" for k in expected))
+    assert model.mount_links() == frozenset(model.link_names)
