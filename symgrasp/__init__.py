@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from symgrasp.planners.planning import plan_bimanual, plan_handover, plan_sequential
     from symgrasp.reason import Reason
     from symgrasp.robot.measure_hand import measure_hand
-    from symgrasp.scene.scene import Scene, load_scene
+    from symgrasp.scene.scene import Scene
     from symgrasp.scene.shipped import list_scenes
+    from symgrasp.world.loading import load_scene
 
 __all__ = [
     "FeasibilityMap",
@@ -61,7 +62,7 @@ _ORIGINS = {
     "create_map": "symgrasp.feasibility.create:create_map",
     "explain": "symgrasp.feasibility.create:explain",
     "list_scenes": "symgrasp.scene.shipped:list_scenes",
-    "load_scene": "symgrasp.scene.scene:load_scene",
+    "load_scene": "symgrasp.world.loading:load_scene",
     "measure_hand": "symgrasp.robot.measure_hand:measure_hand",
     "measure_object": "symgrasp.feasibility.object_report:describe_object",
     "plan_bimanual": "symgrasp.planners.planning:plan_bimanual",

@@ -11,7 +11,7 @@ from symgrasp.errors import SceneError, one_of
 from symgrasp.files import SCENES_DIR
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
-from symgrasp.world import check_tasks
+from symgrasp.world import prepared
 
 from ..files.links import Link
 from ..scene3d.visual_meshes import check_visuals
@@ -65,8 +65,7 @@ class SharedCache:
             return scene
         if name not in self.names:  # else a browser could open any file of the server
             raise SceneError("page", "scene", name, one_of(self.names, name))
-        scene = Scene.load(name)
-        check_tasks(scene)
+        scene = prepared(Scene.load(name))
         check_visuals(scene)
         with self._lock:
             return self._scenes.setdefault(name, scene)

@@ -6,11 +6,12 @@ all memory ends this process only.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
-from symgrasp.world import check_tasks
+from symgrasp.world import prepared
 
 from ..files.scene_files import read_scene
 from ..scene3d.visual_meshes import check_visuals
@@ -40,7 +41,7 @@ class UploadService:
         progress(0.0)
         uploaded = read_scene(name, content, self._folders)
         progress(0.3)
-        check_tasks(uploaded.scene)
+        uploaded = replace(uploaded, scene=prepared(uploaded.scene))
         progress(0.6)
         check_visuals(uploaded.scene)
         return uploaded
@@ -60,6 +61,6 @@ class UploadService:
             MeshError: a mesh of the hand cannot be read.
         """
         progress(0.0)
-        scene = scene.with_hand(arm, hand)
+        scene = prepared(scene.with_hand(arm, hand))
         check_visuals(scene)
         return scene

@@ -172,9 +172,9 @@ def checked_scene(name: str) -> Scene:
 
     scene = Scene.load(name)
 
-    from symgrasp.world import check_tasks  # PyBullet, which a scene that is refused does not need
+    from symgrasp.world import prepared  # PyBullet, which a scene that is refused does not need
 
-    check_tasks(scene)
+    scene = prepared(scene)
     for note in scene.notes:
         warn(f"{scene.name}: {note}")
     return scene

@@ -12,7 +12,9 @@ from symgrasp.errors import UrdfError, one_of
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.model import RobotModel
 
-__all__ = ["MOST_JOINTS", "guess_arm_joints", "joints_between", "revolute_joints"]
+__all__ = [
+    "BRANCH", "MOST_JOINTS", "guess_arm_joints", "joints_between", "joints_outwards", "revolute_joints",
+]  # fmt: skip
 
 MOST_JOINTS = 7
 """Most joints of an arm."""
@@ -75,6 +77,14 @@ def joints_between(model: RobotModel, tool: str, first: str, last: str) -> list[
     return names[k : m + 1]
 
 
+def joints_outwards(model: RobotModel) -> list[int]:
+    """Return for each link the most joints that turn on the way from it to the end of a branch."""
+    longest = [0] * len(model.link_names)
+    for joint in reversed(model.joints):  # children before their parents
+        longest[joint.parent] = max(longest[joint.parent], longest[joint.child] + _turns(model, joint))
+    return longest
+
+
 def _turns(model: RobotModel, joint: Joint) -> bool:
     """Whether a joint turns and takes a value of its own."""
     return joint.kind in ("revolute", "continuous") and model.joint_names[joint.source] == joint.name
@@ -82,10 +92,7 @@ def _turns(model: RobotModel, joint: Joint) -> bool:
 
 def _before_last_fork(model: RobotModel, tool: str) -> set[str]:
     """Return the joints of a chain before the last fork into two branches of `BRANCH` joints or more."""
-    longest = dict.fromkeys(range(len(model.link_names)), 0)  # joints in a row from each link outwards
-    for joint in reversed(model.joints):  # children before their parents
-        beyond = longest[joint.child] + _turns(model, joint)
-        longest[joint.parent] = max(longest[joint.parent], beyond)
+    longest = joints_outwards(model)
     chain = model.chain(tool)
     left = len(revolute_joints(model, tool))
     before: list[str] = []

@@ -115,6 +115,10 @@ class BulletWorld:
         """Set all joints of a robot, given by name, to home."""
         self._set(robot, self.scene.robots[robot].home)
 
+    def set_robot(self, robot: str, values: Array) -> None:
+        """Set all joints of a robot, given by name, to values (N,) of its model's joints."""
+        self._set(robot, values)
+
     @contextmanager
     def preserving_state(self) -> Iterator[None]:
         """Restore robots, object and margin at the end of the ``with`` block."""
@@ -167,12 +171,17 @@ class BulletWorld:
             stage += self._collisions(query)
         return max(stage, key=lambda c: c.depth, default=None)
 
-    def arm_collisions(self, arm: Arm) -> list[Collision]:
+    def arm_collisions(self, arm: Arm, among: NearBodies | None = None) -> list[Collision]:
         """Return all collisions of an arm, by stage in the order of `first_collision`, then deepest first.
 
         Each pair of bodies appears once; the first entry is what `first_collision` returns.
+
+        Args:
+            arm: the arm.
+            among: what to check against; everything if None.
         """
-        found = _deepest(c for query in self._queries[arm.name] for c in self._collisions(query))
+        queries = (q for q in self._queries[arm.name] if among is None or q.key in among)
+        found = _deepest(c for query in queries for c in self._collisions(query))
         return sorted(found, key=lambda c: c.reason)
 
     def collisions(self, arms: Sequence[Arm]) -> list[Collision]:

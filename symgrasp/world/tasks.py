@@ -1,15 +1,30 @@
-"""Checking the tasks of a scene: the object must not be inside another body."""
+"""Checking a scene before maps are computed: the object must not be inside another body in any task."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from symgrasp.errors import SceneError
 from symgrasp.scene.scene import Scene
+from symgrasp.world.home import check_homes, with_free_homes
 from symgrasp.world.opening import open_world
 
-__all__ = ["RESTING_DEPTH", "check_tasks"]
+__all__ = ["RESTING_DEPTH", "check_tasks", "prepared"]
 
 RESTING_DEPTH = 1e-3
 """How deep (m) the object may be inside another body and still count as resting on it."""
+
+
+def prepared(scene: Scene) -> Scene:
+    """Return a scene of which maps can be computed: homes are found where none are given, and all is checked.
+
+    Raises:
+        SceneError: see `check_tasks` and `symgrasp.world.home.check_homes`.
+        UrdfError, MeshError: PyBullet cannot make a shape of the scene.
+    """
+    scene = with_free_homes(scene)
+    check_tasks(scene)
+    return replace(scene, notes=(*scene.notes, *check_homes(scene)))
 
 
 def check_tasks(scene: Scene) -> None:
