@@ -101,8 +101,10 @@ class Arm:
             if j.name in model.joint_names and j.kind != "prismatic" and j.name not in resting
         ]
         if len(joints) not in (6, 7):
-            names = [j.name for j in joints]
-            raise UrdfError(model.path, f"arm {name}", names, f"6 or 7 revolute joints, not {len(joints)}")
+            names, expected = [j.name for j in joints], f"6 or 7 revolute joints, not {len(joints)}"
+            if len(joints) < 6:
+                expected += "; a grasp sets position and orientation of the hand in full, which takes six"
+            raise UrdfError(model.path, f"arm {name}", names, expected)
         self.joint_names = (*torso, *(j.name for j in joints))
         model.check_limits((*self.joint_names, *hand.joints))
         self.indices = np.array([model.joint_names.index(n) for n in self.joint_names])

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from trimesh.creation import box, icosphere
 
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.exact import ExactEngine
+from symgrasp.poses import translation
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
@@ -19,6 +22,7 @@ from tests.engine.random_scenes import ARMS, random_scene, random_torso_scene
 
 SEEDS = 320
 AT_ONCE = 20
+DATA = Path(__file__).parent.parent / "data"
 
 
 @pytest.mark.parametrize("name", PLAIN)
@@ -52,6 +56,36 @@ def test_other_arms_have_the_same_maps(arm):
     """One whose three parallel joints make its closed form, and one whose first joint is locked."""
     feasible = sum(check(random_scene(seed, arm)) for seed in range(AT_ONCE))
     assert feasible > 50
+
+
+def test_links_of_every_kind_of_shape_have_the_same_maps(tmp_path):
+    """In one link: the parts of an OBJ, a plain mesh, boxes, balls and cylinders."""
+    parts = [box([0.1, 0.08, 0.06]), box([0.16, 0.04, 0.05], translation([0.2, 0, 0]))]
+    groups, first = [], 1
+    for name, part in zip(("near", "far"), parts, strict=True):
+        groups += [f"v {x} {y} {z}" for x, y, z in part.vertices] + [f"g {name}"]
+        groups += [f"f {a} {b} {c}" for a, b, c in part.faces + first]
+        first += len(part.vertices)
+    (tmp_path / "parts.obj").write_text("\n".join(groups))
+    icosphere(subdivisions=1, radius=0.055).export(tmp_path / "ball.stl")
+    shapes = {
+        "upper_arm": (("0.05 0 0", '<mesh filename="parts.obj"/>'), ("0.36 0 0", '<sphere radius="0.06"/>')),
+        "forearm": (("0.2 0 0", '<box size="0.3 0.07 0.06"/>'), ("0 0 0", '<mesh filename="ball.stl"/>')),
+        "wrist_2": (("0 0 -0.05", '<box size="0.06 0.05 0.07"/>'),),
+    }
+    root = ET.parse(DATA / "three_parallel.urdf")
+    for link in root.iter("link"):
+        for at, geometry in shapes.get(link.get("name", ""), ()):
+            collision = ET.SubElement(link, "collision")
+            ET.SubElement(collision, "origin", xyz=at, rpy="0.2 0.3 0.4")
+            ET.SubElement(collision, "geometry").append(ET.fromstring(geometry))
+    root.write(tmp_path / "arm.urdf")
+    feasible = 0
+    for seed in range(AT_ONCE // 2):
+        content = random_scene(seed, "three_parallel")
+        content["robots"][0]["urdf"] = str(tmp_path / "arm.urdf")
+        feasible += check(content)
+    assert feasible > 20
 
 
 def test_arms_on_a_torso_have_the_same_maps():
