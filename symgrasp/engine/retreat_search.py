@@ -14,7 +14,7 @@ from symgrasp.compiling import njit
 from symgrasp.engine.checks import UNDECIDED, check_arm, check_hand
 from symgrasp.engine.kinematics import place_arm, place_hand
 from symgrasp.engine.search_types import BLOCKED, FEASIBLE, RETREAT_UNDECIDED
-from symgrasp.ik.branches import BRANCHES, branches_at
+from symgrasp.ik.branches import branches_at
 from symgrasp.ik.retreat import RETREAT_TURN
 from symgrasp.ik.vectors import STRICT
 
@@ -74,9 +74,7 @@ def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, rows, r
     for s in range(len(inputs.retreat)):
         moved_along(T, inputs.retreat[s], moved)
         scratch.hit[0] = scratch.hit[2] = -1
-        branches_at(
-            chain.geometry, chain.joint, chain.limits, chain.forward, k, moved, True, q, exists, inside
-        )
+        branches_at(chain, k, moved, True, q, exists, inside, branches.memory)
         if not _follow(chain.limits, q, inside, at):
             furthest = BLOCKED
             break
@@ -103,7 +101,7 @@ def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, rows, r
 def _follow(limits, q, inside, at):
     """Replace ``at`` by the nearest branch inside the limits; return whether none turns a joint too far."""
     nearest, least = -1, math.inf
-    for b in range(BRANCHES):
+    for b in range(len(inside)):
         if inside[b]:
             turn = 0.0
             for j in range(len(at)):

@@ -34,7 +34,7 @@ from symgrasp.engine.search_types import (
     SearchResult,
 )
 from symgrasp.engine.tree import Tree
-from symgrasp.ik.branches import BRANCHES, branches_at
+from symgrasp.ik.branches import branch_count, branches_at, new_memory
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
@@ -104,11 +104,12 @@ def _search(chain, moving, pieces, tree, pose, inputs, result):
     for chunk in prange(inputs.chunks):
         scratch = new_scratch(pose, pieces, n)
         branches = BranchScratch(
-            np.empty((2, BRANCHES, n)),
-            np.empty((2, BRANCHES), dtype=np.bool_),
-            np.empty((2, BRANCHES), dtype=np.bool_),
+            np.empty((2, branch_count(chain), n)),
+            np.empty((2, branch_count(chain)), dtype=np.bool_),
+            np.empty((2, branch_count(chain)), dtype=np.bool_),
             np.empty(n),
             np.empty((4, 4)),
+            new_memory(n),
         )
         # Interleaved, so that every chunk has its share of easy and of hard cells.
         for cell in range(chunk, m, inputs.chunks):
@@ -137,10 +138,8 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, rows, c
     best = -math.inf
     elbow_reaches = retreat_known = tool_free = False
     for k in inputs.sample_order:
-        elbow_reaches |= branches_at(
-            chain.geometry, chain.joint, chain.limits, chain.forward, k, T, True, q, exists, inside
-        )
-        for b in range(BRANCHES):
+        elbow_reaches |= branches_at(chain, k, T, True, q, exists, inside, branches.memory)
+        for b in range(len(inside)):
             if not inside[b]:
                 continue
             if math.isnan(hand):
@@ -182,7 +181,7 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, rows, c
     if best > -math.inf:
         result.status[cell] = FEASIBLE
         result.clearance[cell] = max(0.0, best - FREE_BAND)
-    elif math.isnan(hand) and elbow_reaches and _reaches(chain, T, q, exists, inside):
+    elif math.isnan(hand) and elbow_reaches and _reaches(chain, T, q, exists, inside, branches.memory):
         result.status[cell] = LIMITS
 
 
@@ -204,11 +203,11 @@ def _list_undecided(result, cell, q, k, b):
 
 
 @njit(**STRICT)
-def _reaches(chain, T, q, exists, inside):
+def _reaches(chain, T, q, exists, inside, memory):
     """Whether any branch reaches a pose, inside the limits or not."""
     for k in range(len(chain.geometry)):
-        branches_at(chain.geometry, chain.joint, chain.limits, chain.forward, k, T, False, q, exists, inside)
-        for b in range(BRANCHES):
+        branches_at(chain, k, T, False, q, exists, inside, memory)
+        for b in range(len(exists)):
             if exists[b]:
                 return True
     return False

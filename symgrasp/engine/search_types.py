@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symgrasp.ik.branches import Memory
 from symgrasp.poses import Array
 
 __all__ = [
@@ -103,11 +104,12 @@ class BranchScratch(NamedTuple):
     """Arrays that one thread writes inverse kinematics to: index 0 at the grasp, index 1 on the retreat.
 
     Attributes:
-        q: (2, BRANCHES, n) joint values.
-        exists: (2, BRANCHES) which branches reach the pose.
-        inside: (2, BRANCHES) which branches reach it inside the limits.
+        q: (2, B, n) joint values of the B branches that the arm may have.
+        exists: (2, B) which branches reach the pose.
+        inside: (2, B) which branches reach it inside the limits.
         at: (n,) present joint values on the retreat.
         T: (4, 4) present tool pose on the retreat.
+        memory: what the inverse kinematics needs.
     """
 
     q: Array
@@ -115,3 +117,4 @@ class BranchScratch(NamedTuple):
     inside: np.ndarray
     at: Array
     T: Array
+    memory: Memory

@@ -1,59 +1,98 @@
-"""Compiled closed forms: all inverse-kinematics branches at a tool pose and a redundancy value.
+"""Compiled inverse kinematics: all configurations at a tool pose and a redundancy value.
 
-Each branch is computed by itself, in plain IEEE arithmetic: the answer at a pose and a redundancy value
-does not depend on what else is asked.
+Each is computed by itself, in plain IEEE arithmetic: the answer at a pose and a redundancy value does not
+depend on what else is asked.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import THREE_PARALLEL
 from symgrasp.ik.joints import misses
+from symgrasp.ik.pair import NUMBERS, PAIR_BRANCHES, pair_branches
+from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.ik.parallel import parallel_branches
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
+from symgrasp.poses import Array
 
-__all__ = ["BRANCHES", "branches_at", "solve_range"]
+__all__ = ["Memory", "branch_count", "branches_at", "new_memory", "solve_range"]
 
-BRANCHES = 8
+CLOSED_FORM_BRANCHES = 8
 """Branches of every closed form here: three times two values."""
 
 
-@njit(cache=True, error_model="numpy")
-def solve_range(geometry, joint, limits, forward, T, first, last, q, exists, inside):
-    """Solve a pose T (4, 4) at the redundancy values from first to before last; see `branches_at`."""
-    for k in range(first, last):
-        i = k - first
-        branches_at(geometry, joint, limits, forward, k, T, False, q[i], exists[i], inside[i])
+class Memory(NamedTuple):
+    """Arrays that the inverse kinematics of one thread writes to.
+
+    Attributes:
+        numbers: (NUMBERS,) complex numbers of `pair_branches`.
+        J: (n, 6) for `polish_in`.
+        A: (n, n + 1) for `polish_in`.
+    """
+
+    numbers: np.ndarray
+    J: Array
+    A: Array
+
+
+@njit(cache=True)
+def new_memory(joints):
+    """Return memory for an arm of that many joints."""
+    return Memory(
+        np.empty(NUMBERS, dtype=np.complex128), np.empty((joints, 6)), np.empty((joints, joints + 1))
+    )
 
 
 @njit(**STRICT)
-def branches_at(geometry, joint, limits, forward, k, T, inside_only, q, exists, inside):
+def branch_count(chain):
+    """Return how many branches an arm's inverse kinematics may have."""
+    return PAIR_BRANCHES if chain.joint[8] == MEETING_PAIR else CLOSED_FORM_BRANCHES
+
+
+@njit(cache=True, error_model="numpy")
+def solve_range(chain, T, first, last, q, exists, inside):
+    """Solve a pose T (4, 4) at the redundancy values from first to before last; see `branches_at`."""
+    memory = new_memory(q.shape[2])
+    for k in range(first, last):
+        i = k - first
+        branches_at(chain, k, T, False, q[i], exists[i], inside[i], memory)
+
+
+@njit(**STRICT)
+def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
     """Solve one pose (4, 4) at redundancy sample k.
 
     Args:
-        geometry, joint, limits, forward: the arm, see `Chain`.
+        chain: the arm.
         k: index of the redundancy sample.
         T: tool pose (4, 4) in the base.
         inside_only: leave out branches outside the limits as early as possible; those that remain are
             bit for bit the same.
-        q: (BRANCHES, n) receives the joint values.
-        exists: (BRANCHES,) receives which branches reach the pose.
-        inside: (BRANCHES,) receives which branches reach it inside the limits.
+        q: (B, n) receives the joint values of the B = `branch_count` branches.
+        exists: (B,) receives which branches reach the pose.
+        inside: (B,) receives which branches reach it inside the limits.
+        memory: see `Memory`.
 
     Returns:
-        False where the first equation of the closed form has no solution, limits or not, so that no branch
-        reaches the pose.
+        False where it is known that no branch reaches the pose, limits or not.
     """
-    for b in range(BRANCHES):
+    g, joint, limits = chain.geometry[k], chain.joint, chain.limits
+    for b in range(exists.shape[0]):
         exists[b] = False
         inside[b] = False
+    if joint[8] == MEETING_PAIR:
+        return pair_branches(g, joint, limits, chain.forward, chain.fixed, T, q, exists, inside, memory)
     if joint[8] == THREE_PARALLEL:
-        solvable = parallel_branches(geometry[k], joint, limits, T, inside_only, q, exists, inside)
+        solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside)
     else:
-        solvable = spherical_branches(geometry[k], joint, limits, T, inside_only, q, exists, inside)
-    for b in range(BRANCHES):
-        if exists[b] and misses(forward, q[b], T):
+        solvable = spherical_branches(g, joint, limits, T, inside_only, q, exists, inside)
+    for b in range(exists.shape[0]):
+        if exists[b] and misses(chain.forward, q[b], T):
             exists[b] = False
             inside[b] = False
     return solvable

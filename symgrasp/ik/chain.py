@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from symgrasp.ik.pair_geometry import PairGeometry, pair_geometry
 from symgrasp.poses import Array, rotation_about
 from symgrasp.robot.robot import Arm
 
@@ -42,23 +43,25 @@ SPHERICAL, THREE_PARALLEL = 0, 1
 class Chain(NamedTuple):
     """The geometry of an arm at K redundancy values, packed into arrays for compiled code.
 
-    The arm has n joints, of which six are free, numbered 1 to 6 as in `symgrasp.ik.spherical` or
-    `symgrasp.ik.parallel`.
+    The arm has n joints, of which six are free, numbered 1 to 6 as in `symgrasp.ik.spherical`,
+    `symgrasp.ik.parallel` or `symgrasp.ik.pair`.
 
     Attributes:
-        geometry: (K, m) a `SphericalGeometry` or `ParallelGeometry` in each row.
+        geometry: (K, m) a geometry of one of the families in each row.
         joint: (9,) index of each free joint in the arm, of the locked one (or -1), whether the arm is
             read backwards, and its family.
         limits: (6, n) lower limit, upper limit, middle of the range, cosine and sine of the middle, and
             the cosine of half the range, less `COSINE_TOLERANCE`.
         forward: (2 n + 5, 3) for forward kinematics: H (n rows), P (n + 1), R0 (3) of the arm, and the
             tolerances (m, rad, unused).
+        fixed: (n,) which joints are locked.
     """
 
     geometry: Array
     joint: np.ndarray
     limits: Array
     forward: Array
+    fixed: np.ndarray
 
 
 class SphericalGeometry(NamedTuple):
@@ -148,7 +151,7 @@ class ParallelGeometry(NamedTuple):
         return np.concatenate([np.ravel(part) for part in self[1:]])
 
 
-ChainGeometry: TypeAlias = SphericalGeometry | ParallelGeometry
+ChainGeometry: TypeAlias = SphericalGeometry | ParallelGeometry | PairGeometry
 
 
 class _Joints(NamedTuple):
@@ -172,17 +175,26 @@ class _Joints(NamedTuple):
 
 
 def chain_geometries(arm: Arm, locked: int | None, phi: Array) -> Sequence[ChainGeometry] | None:
-    """Return the arm's geometry at every redundancy value, or None where no closed form is compiled for it.
+    """Return the arm's geometry at every redundancy value, or None where it is of no compiled family.
 
     Args:
         arm: the arm.
         locked: index of the locked joint; None for a 6-joint arm.
         phi: (K,) values of the locked joint (rad).
+
+    Returns:
+        K geometries of one family.
     """
-    for find in (_spherical, _three_parallel):
+    for find in (_spherical, _three_parallel, _meeting_pair):
         for backwards in (False, True):
             rows = [find(_joints(arm, locked, float(value), backwards)) for value in phi]
             known = [row for row in rows if row is not None]
+            if find is _meeting_pair and known:
+                # At single values the axes of a pair may be parallel: nothing is found there.
+                nowhere = known[0]._replace(W=np.full(3, np.nan))
+                return [
+                    row or nowhere._replace(phi=float(value)) for row, value in zip(rows, phi, strict=True)
+                ]
             if len(known) == len(rows):
                 return known
     return None
@@ -230,6 +242,13 @@ def _three_parallel(joints: _Joints) -> ParallelGeometry | None:
     if bend[1] <= PARALLEL * MEETING_DISTANCE or turn[1] <= PARALLEL:
         return None
     return ParallelGeometry(backwards, h, R0, p0, o[0], W, O2, O3, O4 - O3, W - O4, bend, turn, phi)
+
+
+def _meeting_pair(joints: _Joints) -> PairGeometry | None:
+    """Return the geometry of joints of which 5 and 6 meet, else None."""
+    backwards, h, o, R0, p0, phi = joints
+    W = _common_point(h[4:], o[4:])
+    return None if W is None else pair_geometry(backwards, h, o, R0, p0, W, phi)
 
 
 def _distance_constants(k: Array, a: Array, b: Array) -> Array:

@@ -1,20 +1,21 @@
-"""The compiled closed forms as a solver: the same solutions as EAIK's, much faster."""
+"""The compiled inverse kinematics as a solver."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from symgrasp.ik.branches import BRANCHES, solve_range
+from symgrasp.ik.arm_ik import ArmIK, Solutions, Tolerance
+from symgrasp.ik.branches import branch_count, solve_range
 from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries
-from symgrasp.ik.closed_form import ClosedFormIK, Solutions, Tolerance
+from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm
 
 __all__ = ["CompiledIK"]
 
 
-class CompiledIK(ClosedFormIK):
-    """`ClosedFormIK` for arms whose closed form is compiled: the same solutions, much faster.
+class CompiledIK(ArmIK):
+    """The inverse kinematics of arms of one of the compiled families.
 
     Args:
         arm: the arm.
@@ -22,8 +23,8 @@ class CompiledIK(ClosedFormIK):
         tolerance: largest error of a solution.
 
     Raises:
-        UrdfError: no closed form is known for the arm, whichever joint is locked.
-        ValueError: a closed form is known, but it is of neither compiled family; see `fits`.
+        UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
+        ValueError: one is known, but the arm is of no compiled family; see `fits`.
 
     Attributes:
         chain: the arm's geometry at every redundancy sample, for compiled code.
@@ -33,9 +34,14 @@ class CompiledIK(ClosedFormIK):
         super().__init__(arm, samples, tolerance)
         self.chain = self._pack_chain()
 
+    @property
+    def complete(self) -> bool:
+        """Whether every configuration at the redundancy samples is found: where a closed form is compiled."""
+        return bool(self.chain.joint[8] != MEETING_PAIR)
+
     @staticmethod
-    def fits(ik: ClosedFormIK) -> bool:
-        """Whether a closed form is compiled for an arm, with the joint locked that its solver locks."""
+    def fits(ik: ArmIK) -> bool:
+        """Whether an arm is of one of the compiled families, with the joint locked that its solver locks."""
         return chain_geometries(ik.arm, ik.locked, ik.phi) is not None
 
     def solve(self, T_base_tool: Array) -> Solutions:
@@ -51,9 +57,9 @@ class CompiledIK(ClosedFormIK):
         """Return the solutions of a pose (4, 4) at the redundancy samples from first to before last."""
         T = np.ascontiguousarray(T_base_tool, dtype=float)
         # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
-        q = np.empty((last - first, BRANCHES, self.arm.dof))
+        q = np.empty((last - first, branch_count(self.chain), self.arm.dof))
         exists, inside = np.empty(q.shape[:-1], dtype=bool), np.empty(q.shape[:-1], dtype=bool)
-        solve_range(*self.chain, T, first, last, q, exists, inside)
+        solve_range(self.chain, T, first, last, q, exists, inside)
         sample, branch = np.nonzero(exists)
         return Solutions(q[exists], sample + first, branch, inside[exists])
 
@@ -62,7 +68,7 @@ class CompiledIK(ClosedFormIK):
         arm = self.arm
         rows = chain_geometries(arm, self.locked, self.phi)
         if rows is None:
-            raise ValueError(f"{arm.name}: no spherical triple and pair of joints, nor three parallel joints")
+            raise ValueError(f"{arm.name}: no axes meet in a point at either end of the arm")
         locked = -1 if self.locked is None else self.locked
         free = [j for j in range(arm.dof) if j != locked]
         backwards = rows[0].backwards
@@ -77,4 +83,5 @@ class CompiledIK(ClosedFormIK):
             joint=np.array([*(free[::-1] if backwards else free), locked, backwards, rows[0].family]),
             limits=np.array([arm.lower, arm.upper, middle, np.cos(middle), np.sin(middle), least]),
             forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
+            fixed=np.arange(arm.dof) == locked,
         )

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from symgrasp.ik.closed_form import Solutions
+from symgrasp.ik.arm_ik import Solutions
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm
 

@@ -9,7 +9,7 @@ import numpy as np
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import ClosedFormIK, over_torso
+from symgrasp.ik import independent_solver, over_torso
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
@@ -41,8 +41,7 @@ def assert_true(
         m: the map.
         cells: the cells to check; all of them if None.
     """
-    # EAIK: the engine has another solver
-    ik = over_torso(arm, lambda alone: ClosedFormIK(alone, scene.settings.redundancy))
+    ik = over_torso(arm, lambda alone: independent_solver(alone, scene.settings.redundancy))
     checker = CandidateChecker(world, arm, ik, scene.settings.approach)
     tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
     world.margin = scene.settings.margin

@@ -21,6 +21,8 @@ MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
 ARMS = {
     "three_parallel": [0.0, -1.2, -1.5, -0.4, 1.5, 0.0],
     "offset_shoulder": [0.0, 0.0, 0.0, 0.9, 0.0, 0.6, 0.0],
+    "offset_arm": [0.0, -0.6, 0.0, 1.2, 0.0, 0.6, 0.0],
+    "offset_wrist": [0.0, -0.5, -1.0, 0.0, 1.0, 0.0],
 }
 """URDF in tests/data → a home in which the arm is free."""
 

@@ -53,7 +53,7 @@ def test_random_scenes_have_the_same_maps(first, tmp_path_factory):
 
 @pytest.mark.parametrize("arm", ARMS)
 def test_other_arms_have_the_same_maps(arm):
-    """One whose three parallel joints make its closed form, and one whose first joint is locked."""
+    """One of three parallel joints, one whose first joint is locked, and two of which only two axes meet."""
     feasible = sum(check(random_scene(seed, arm)) for seed in range(AT_ONCE))
     assert feasible > 50
 

@@ -12,7 +12,7 @@ from symgrasp.feasibility import exact
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker, create_map, explain
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import ClosedFormIK
+from symgrasp.ik import ClosedFormIK, CompiledIK
 from symgrasp.object.manifold import ROLLS
 from symgrasp.poses import from_position_rpy, inverse, pose_error, rotation_z, translation
 from symgrasp.reason import Reason
@@ -309,7 +309,7 @@ def test_what_a_search_does_not_reach_is_not_found(monkeypatch, method):
     """The same map but for the word: a search may have missed a configuration."""
     scene = load_small("soda_can", 6, 12, 2)
     proven = create_map(scene, method=method)
-    monkeypatch.setattr(ClosedFormIK, "complete", False)
+    monkeypatch.setattr(CompiledIK, "complete", False)
     searched = create_map(scene, method=method)
     renamed = np.where(proven.reason == Reason.UNREACHABLE, Reason.NOT_FOUND, proven.reason)
     assert (renamed == Reason.NOT_FOUND).any()

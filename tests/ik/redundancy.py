@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import copy
 
-from symgrasp.ik import ClosedFormIK, Solutions
+from symgrasp.ik import ArmIK, Solutions
 from symgrasp.poses import Array
 
 
-def solve_at(ik: ClosedFormIK, T_base_tool: Array, phi: float) -> Solutions:
+def solve_at(ik: ArmIK, T_base_tool: Array, phi: float) -> Solutions:
     """Return every configuration that reaches a pose (4, 4) with the locked joint at ``phi`` (rad).
 
     Asked of a solver of the same kind for an arm whose locked joint can take that value only; the

@@ -104,12 +104,12 @@ def test_ssik_agrees_on_reachability(arm):
     assert missed > 20
 
 
-def test_an_arm_without_a_closed_form(kuka):
+def test_an_arm_of_which_no_axes_meet(kuka):
     skewed = object.__new__(Arm)
     skewed.__dict__.update(kuka.__dict__)
     rng = np.random.default_rng(3)
     H = rng.normal(size=(7, 3))
     skewed.H = H / np.linalg.norm(H, axis=1, keepdims=True)
     skewed.P = rng.normal(size=(8, 3))
-    with pytest.raises(UrdfError, match="closed-form"):
+    with pytest.raises(UrdfError, match="meet in a point"):
         ClosedFormIK(skewed, 4)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -13,30 +11,13 @@ from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
 from tests.ik.redundancy import solve_at
+from tests.ik.synthetic import distance, samples, synthetic
 
 ARMS = ("panda", "iiwa", "backwards", "six", "pr2", "ur5", "ur5_backwards", "skew", "seven")
 
 
 def arm_of(scene: Scene, name: str) -> Arm:
     return scene.arm(name)
-
-
-def synthetic(H, P, R0=None) -> Arm:
-    """Return an arm that is its axes alone: what a solver reads of it."""
-    n = len(H)
-    arm = object.__new__(Arm)
-    H = np.array(H, dtype=float)
-    arm.__dict__.update(
-        name="synthetic",
-        H=H / np.linalg.norm(H, axis=1, keepdims=True),
-        P=np.array(P, dtype=float),
-        R0=np.eye(3) if R0 is None else R0,
-        joint_names=tuple(f"j{k}" for k in range(n)),
-        lower=np.full(n, -2.9),
-        upper=np.full(n, 2.9),
-        robot=SimpleNamespace(model=SimpleNamespace(path="synthetic")),
-    )
-    return arm
 
 
 @pytest.mark.filterwarnings("error")
@@ -96,15 +77,6 @@ def arms() -> dict[str, Arm]:
         # A UR5 on a turntable: its first joint is locked.
         "seven": synthetic([z, z + 0.3 * x, y, y, y, -z, y], [[0.1, 0, 0.2], *ur5], R0),
     }  # fmt: skip
-
-
-def distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Largest joint difference modulo full turns."""
-    return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
-
-
-def samples(arm: Arm, count: int, seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, len(arm.lower)))
 
 
 def test_the_lock_is_chosen_so_that_the_compiled_closed_form_applies(arms):
@@ -207,11 +179,19 @@ def test_aligned_axes_of_the_triple(arms):
 def test_solver_for_takes_the_compiled_one_where_it_can(arms):
     assert isinstance(solver_for(arms["panda"], 2), CompiledIK)
     _, y, z = np.eye(3)
-    # Three parallel axes as a UR5 has them, but the last two do not meet: a closed form that is not compiled.
+    # Three parallel axes, but neither the first two meet nor the last two: EAIK alone knows it.
     parallel = synthetic(
         [z, y, y, y, z, y],
-        [[0, 0, 0.09], [0, 0.1, 0], [0.42, 0, 0], [0.39, 0, 0], [0, 0.1, 0], [0.05, 0, -0.09], [0, 0.08, 0]],
+        [
+            [0, 0, 0.09],
+            [0.05, 0.1, 0],
+            [0.42, 0, 0],
+            [0.39, 0, 0],
+            [0, 0.1, 0],
+            [0.05, 0, -0.09],
+            [0, 0.08, 0],
+        ],
     )
     assert type(solver_for(parallel, 2)) is ClosedFormIK
-    with pytest.raises(ValueError, match="no spherical triple"):
+    with pytest.raises(ValueError, match="no axes meet"):
         CompiledIK(parallel, 2)

@@ -12,16 +12,13 @@ from hypothesis import strategies as st
 from symgrasp.ik.newton import POLISHED, polish
 from symgrasp.poses import from_position_quat, pose_error, rotation_about
 from symgrasp.robot.robot import Arm
+from tests.ik.synthetic import synthetic
 
 
 def any_arm(rng: np.random.Generator, joints: int) -> Arm:
     """Return an arm that is its axes alone, in any directions."""
-    arm = object.__new__(Arm)
-    H = rng.normal(size=(joints, 3))
-    arm.H = H / np.linalg.norm(H, axis=1, keepdims=True)
-    arm.P = rng.normal(size=(joints + 1, 3)) * 0.4
-    arm.R0 = rotation_about(arm.H[0], 1.0)
-    return arm
+    H, P = rng.normal(size=(joints, 3)), 0.4 * rng.normal(size=(joints + 1, 3))
+    return synthetic(H, P, rotation_about(H[0] / np.linalg.norm(H[0]), 1.0))
 
 
 def packed(arm: Arm) -> np.ndarray:
@@ -71,10 +68,9 @@ def test_singular_poses(gap):
     """A wrist that is straight, or nearly: joints 4 and 6 share their work, and some split of it is found."""
     rng = np.random.default_rng(1)
     x, y, z = np.eye(3)
-    arm = object.__new__(Arm)
-    arm.H, arm.R0 = np.array([z, y, y, x, y, x]), np.eye(3)
-    arm.P = np.array(
-        [[0, 0, 0.3], [0, 0, 0], [0.4, 0, 0], [0.35, 0, 0.03], [0, 0, 0], [0, 0, 0], [0.1, 0, 0]]
+    arm = synthetic(
+        [z, y, y, x, y, x],
+        [[0, 0, 0.3], [0, 0, 0], [0.4, 0, 0], [0.35, 0, 0.03], *[[0, 0, 0]] * 2, [0.1, 0, 0]],
     )
     for _ in range(200):
         goal = rng.uniform(-2.5, 2.5, 6)

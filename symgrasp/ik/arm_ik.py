@@ -1,0 +1,93 @@
+"""What every inverse kinematics of an arm has in common: the samples of its redundancy, and its answers.
+
+Locking a joint turns a 7-joint arm into a 6-joint arm. The locked joint's value is the redundancy φ.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.ik.locking import joint_to_lock
+from symgrasp.poses import Array
+from symgrasp.robot.robot import Arm
+
+__all__ = ["ArmIK", "Solutions", "Tolerance"]
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Largest error of the tool pose of a returned configuration.
+
+    Attributes:
+        position: distance (m).
+        rotation: angle (rad).
+    """
+
+    position: float = 1e-6
+    rotation: float = 1e-6
+
+
+class Solutions(NamedTuple):
+    """Candidate configurations of one pose, in the order of Algorithm 1: by φ, then by branch.
+
+    Attributes:
+        q: (m, n) joint values (rad), inside the limits where full turns can bring them there.
+        sample: (m,) index of the redundancy sample.
+        branch: (m,) index of the closed form's branch at that sample.
+        inside: (m,) whether all joints are inside their limits.
+    """
+
+    q: Array
+    sample: np.ndarray
+    branch: np.ndarray
+    inside: np.ndarray
+
+
+class ArmIK(ABC):
+    """Every configuration of an arm that reaches a pose, at samples of its redundancy.
+
+    Args:
+        arm: the arm.
+        samples: number of redundancy samples; a 6-joint arm always has one.
+        tolerance: largest error of a solution.
+
+    Raises:
+        UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
+
+    Attributes:
+        locked: index of the locked joint, or None for a 6-joint arm.
+        phi: (samples,) values of the locked joint: centres of equal parts of its range.
+    """
+
+    def __init__(self, arm: Arm, samples: int, tolerance: Tolerance | None = None) -> None:
+        self.arm = arm
+        self.tolerance = tolerance or Tolerance()
+        self.locked = joint_to_lock(arm)
+        if self.locked is None:
+            self.phi = np.zeros(1)
+        else:
+            lower, upper = arm.lower[self.locked], arm.upper[self.locked]
+            if not np.isfinite(upper - lower):
+                lower, upper = -np.pi, np.pi
+            self.phi = lower + (np.arange(samples) + 0.5) * (upper - lower) / samples
+
+    @property
+    @abstractmethod
+    def complete(self) -> bool:
+        """Whether every configuration at the redundancy samples is found, up to rounding.
+
+        A closed form finds all of them: what it does not reach is unreachable. A search may miss one: what it
+        does not reach is *not found*.
+        """
+
+    @abstractmethod
+    def solve(self, T_base_tool: Array) -> Solutions:
+        """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""
+
+    @abstractmethod
+    def solve_sample(self, T_base_tool: Array, sample: int) -> Solutions:
+        """Return every configuration that reaches a pose (4, 4) at one redundancy sample."""

@@ -1,0 +1,56 @@
+"""Which joint of a 7-joint arm is locked, so that the others have an inverse kinematics that is known."""
+
+from __future__ import annotations
+
+import numpy as np
+from eaik.IK_HP import HPRobot
+
+from symgrasp.errors import UrdfError
+from symgrasp.ik.chain import chain_geometries
+from symgrasp.ik.pair_geometry import MEETING_PAIR
+from symgrasp.robot.robot import Arm
+
+__all__ = ["joint_to_lock"]
+
+LOCK_PREFERENCE = (6, 2, 0, 4, 1, 5, 3)
+"""Which of seven joints to lock, first choice first among those that leave an arm of the same kind. Locking
+the last one keeps the arm's whole reach; locking the elbow (index 3) would fix its distance."""
+
+GENERIC_ANGLE = 0.3
+"""Value (rad) at which locks are tried: the answer is the same at almost any value, but at zero axes may
+happen to be parallel."""
+
+CLOSED_FORM, FIXED_PAIR, TURNED_PAIR, EAIK_ALONE, UNKNOWN = range(5)
+"""What a lock leaves, best first: a closed form that is compiled; two axes that meet at one end of the arm;
+the same on both sides of the locked joint, so that the point where they meet depends on φ, and may be far
+away; an arm that EAIK alone knows; an arm that nothing here solves."""
+
+
+def joint_to_lock(arm: Arm) -> int | None:
+    """Return the index of the joint to lock, or None for a 6-joint arm.
+
+    Raises:
+        UrdfError: no inverse kinematics is known, whichever joint is locked.
+    """
+    choices = [None] if arm.dof == 6 else list(LOCK_PREFERENCE)
+    kinds = [_kind(arm, joint) for joint in choices]
+    if min(kinds) == UNKNOWN:
+        raise UrdfError(
+            arm.robot.model.path,
+            f"arm {arm.name}",
+            list(arm.joint_names),
+            "two axes at one end of the arm that meet in a point, with any joint of seven locked",
+        )
+    return choices[kinds.index(min(kinds))]
+
+
+def _kind(arm: Arm, joint: int | None) -> int:
+    """Return what locking a joint leaves."""
+    geometry = chain_geometries(arm, joint, np.array([GENERIC_ANGLE]))
+    if geometry is None:
+        locks = [] if joint is None else [(joint, GENERIC_ANGLE)]
+        return EAIK_ALONE if HPRobot(arm.H, arm.P, locks).hasKnownDecomposition() else UNKNOWN
+    if geometry[0].family != MEETING_PAIR:
+        return CLOSED_FORM
+    between = (1,) if geometry[0].backwards else (arm.dof - 2,)
+    return TURNED_PAIR if joint in between else FIXED_PAIR
