@@ -21,7 +21,7 @@ from symgrasp.errors import InputError
 from symgrasp.object.profile import Profile
 from symgrasp.robot.assembly import Frame
 
-__all__ = ["HANDS", "Hand", "JointTable"]
+__all__ = ["HANDS", "SIDED_HANDS", "Hand", "JointTable"]
 
 JointTable = float | Sequence[tuple[float, float]]
 """Joint value as a function of the opening: the ratio of value (rad or m) to opening (m), or knots
@@ -137,7 +137,100 @@ def _value(table: JointTable, opening: float) -> float:
     return float(np.interp(opening, at, values))
 
 
-PR2_TABLE = ((0.0, 0.05533), (0.0507, 0.33394), (0.0853, 0.53087), (0.0886, 0.548))
+def _pr2(side: str) -> Hand:
+    """Return the gripper on the left or right arm of the PR2 of example-robot-data."""
+    fingers = ("l_finger_link", "r_finger_link", "l_finger_tip_link", "r_finger_tip_link")
+    table = ((0.0, 0.00856), (0.0309, 0.17981), (0.0533, 0.30825), (0.0733, 0.42813), (0.092, 0.548))
+    hand = Hand(
+        name=f"pr2_{side}",
+        links=("palm_link", *fingers),
+        touch_links=fingers,
+        joints={"l_finger_joint": table},
+        min_opening=0.0,
+        max_opening=0.092,
+        finger_depth=0.0507,
+        pad_width=0.0207,
+        palm_width=0.0452,
+        palm_depth=0.0597,
+        tool=Frame("tool_frame", quat_wxyz=(np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)),
+    )
+    return hand.prefixed(f"{side[0]}_gripper_")
+
+
+def _talos(side: str) -> Hand:
+    """Return the gripper on the left or right arm of TALOS: two fingers close against one."""
+    fingers = (
+        "motor_double_link", "inner_double_link", "motor_single_link", "inner_single_link",
+        "fingertip_1_link", "fingertip_2_link", "fingertip_3_link",
+    )  # fmt: skip
+    table = ((0.0, -0.61496), (0.0356, -0.38997), (0.0564, -0.25498), (0.0762, -0.11999), (0.0926, 0.0))
+    hand = Hand(
+        name=f"talos_{side}",
+        links=("base_link", *fingers),
+        touch_links=fingers,
+        joints={"joint": table},
+        min_opening=0.0,
+        max_opening=0.0926,
+        finger_depth=0.0826,
+        pad_width=0.0854,
+        palm_width=0.1,
+        palm_depth=0.0916,
+        tool=Frame("base_link", (0.0, 0.0, -0.1416), (0.0, 0.0, 1.0, 0.0)),
+    )
+    return hand.prefixed(f"gripper_{side}_")
+
+
+def _dex3(side: str) -> Hand:
+    """Return the left or right hand of a G1: a thumb closes against two fingers. One mirrors the other."""
+    way = 1.0 if side == "left" else -1.0
+    proximal = (
+        (0.0032, -0.98175), (0.0483, -0.70956), (0.0533, -0.67859), (0.055, -0.66533), (0.0583, -0.62149),
+        (0.0616, -0.57375), (0.065, -0.52272), (0.0683, -0.46748), (0.07, -0.44581), (0.0717, -0.43311),
+        (0.08, -0.37811), (0.09, -0.32051), (0.1001, -0.27044), (0.1101, -0.22662),
+    )  # fmt: skip
+    distal = (
+        (0.0032, -1.09083), (0.0483, -0.7884), (0.0533, -0.75399), (0.055, -0.73926), (0.0583, -0.69054),
+        (0.0616, -0.6375), (0.065, -0.5808), (0.0683, -0.51943), (0.07, -0.49535), (0.0717, -0.48123),
+        (0.08, -0.42012), (0.09, -0.35612), (0.1001, -0.30049), (0.1101, -0.2518),
+    )  # fmt: skip
+    tables = {
+        "thumb_1_joint": (
+            (0.0032, 0.42426), (0.0433, 0.23379), (0.0633, 0.13516), (0.07, 0.10022), (0.075, 0.06901),
+            (0.0817, 0.03038), (0.0917, -0.02188), (0.1017, -0.06831), (0.1101, -0.10313),
+        ),
+        "thumb_2_joint": (
+            (0.0032, 1.08961), (0.0433, 0.88911), (0.0633, 0.78529), (0.07, 0.74851), (0.075, 0.71566),
+            (0.0817, 0.675), (0.0917, 0.61999), (0.1017, 0.57111), (0.1101, 0.53446),
+        ),
+        "middle_0_joint": proximal,
+        "middle_1_joint": distal,
+        "index_0_joint": proximal,
+        "index_1_joint": distal,
+    }  # fmt: skip
+    joints = {name: tuple((opening, way * value) for opening, value in t) for name, t in tables.items()}
+    fingers = (
+        "thumb_0_link", "middle_0_link", "index_0_link", "thumb_1_link", "middle_1_link", "index_1_link",
+        "thumb_2_link",
+    )  # fmt: skip
+    half = np.deg2rad(31.029)
+    c, s = np.sqrt(0.5) * np.cos(half), np.sqrt(0.5) * np.sin(half)
+    hand = Hand(
+        name=f"dex3_{side}",
+        links=("palm_link", *fingers),
+        touch_links=fingers,
+        joints={**joints, "thumb_0_joint": 0.0},
+        min_opening=0.0032,
+        max_opening=0.1101,
+        finger_depth=0.0347,
+        pad_width=0.0738,
+        palm_width=0.0815,
+        palm_depth=0.0458,
+        tool=Frame(
+            "palm_link", (0.0815, -0.055 * way, 0.0002 * way), (c, s, c, -s) if way > 0 else (s, -c, -s, -c)
+        ),
+    )
+    return hand.prefixed(f"{side}_hand_")
+
 
 HANDS: Mapping[str, Hand] = {
     # Each as measured by `symgrasp hand`; where the maker states a length, that one is taken.
@@ -170,21 +263,34 @@ HANDS: Mapping[str, Hand] = {
         tool=Frame("wsg50_tool"),
         urdf="package://static_scenes/hands/wsg50.urdf",
     ),
-    # PR2 gripper of pybullet_data, whose fingers turn: the pads are parallel only when closed.
-    # The opening is that of their narrow end, and the pads meet 6 mm beside the gripper's axis.
+    # PR2 gripper of pybullet_data, whose fingers turn: the pads are parallel only when closed, and meet 6 mm
+    # beside the gripper's axis.
     "pr2": Hand(
         name="pr2",
         links=("gripper_pole", "left_gripper", "right_gripper", "left_tip", "right_tip"),
         touch_links=("left_gripper", "right_gripper", "left_tip", "right_tip"),
-        joints=dict.fromkeys(("left_gripper_joint", "right_gripper_joint"), PR2_TABLE),
+        joints={
+            "left_gripper_joint": (
+                (0.0, 0.05994), (0.0387, 0.26314), (0.0789, 0.48352), (0.0867, 0.51099), (0.0991, 0.548),
+            ),
+            "right_gripper_joint": (
+                (0.0, 0.03425), (0.0015, 0.05017), (0.0279, 0.18875), (0.0774, 0.459), (0.0805, 0.47399),
+                (0.0867, 0.49875), (0.0991, 0.54214),
+            ),
+        },
         min_opening=0.0,
-        max_opening=0.0886,
-        finger_depth=0.0201,
+        max_opening=0.0991,
+        finger_depth=0.0395,
         pad_width=0.02,
         palm_width=0.0162,
-        palm_depth=0.1078,
-        tool=Frame("gripper_pole", (0.3028, 0.0059, 0.0), (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)),
+        palm_depth=0.1026,
+        tool=Frame("gripper_pole", (0.2976, 0.0059, 0.0), (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)),
         urdf="package://pybullet_data/pr2_gripper.urdf",
     ),
+}  # fmt: skip
+"""Name → hand, of the hands that a scene may refer to by name on any robot that has them."""
+
+SIDED_HANDS: Mapping[str, Hand] = {
+    hand.name: hand for side in ("left", "right") for hand in (_pr2(side), _talos(side), _dex3(side))
 }
-"""Name → hand, of the hands that a scene may refer to by name."""
+"""Name → hand, of those of robots with two arms, whose links have other names on either side."""

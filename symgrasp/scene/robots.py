@@ -11,7 +11,7 @@ from symgrasp.poses import Array
 from symgrasp.references import resolve
 from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
 from symgrasp.robot.assembly import Mount
-from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.robot.torso import Torso
@@ -164,9 +164,10 @@ class RobotBuilder:
     def _hand(self, field: str, arm: ArmFile) -> Hand:
         """Return an arm's hand, with the prefix of its mount."""
         if isinstance(arm.hand, str):
-            if arm.hand not in HANDS:
-                raise SceneError(self._source, f"{field}.hand", arm.hand, one_of(HANDS, arm.hand))
-            hand = HANDS[arm.hand]
+            named = {**HANDS, **SIDED_HANDS}
+            if arm.hand not in named:
+                raise SceneError(self._source, f"{field}.hand", arm.hand, one_of(named, arm.hand))
+            hand = named[arm.hand]
         else:
             tool = arm.hand.tool
             fields = {**dict(arm.hand), "tool": tool and tool.frame()}

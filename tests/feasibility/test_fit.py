@@ -20,7 +20,7 @@ JAR = Profile([[0, 0.045], [0.1, 0.045], [0.12, 0.015], [0.2, 0.015]])
     ("name", "h", "reason"),
     [
         ("franka", 0.05, Reason.HAND_TOO_SMALL),  # 90 mm across
-        ("pr2", 0.05, Reason.HAND_TOO_SMALL),
+        ("pr2", 0.05, None),
         ("wsg50", 0.05, None),
         ("franka", 0.115, Reason.HAND_TOO_SMALL),  # the palm meets the shoulder
         ("franka", 0.119, Reason.SURFACE_TOO_STEEP),

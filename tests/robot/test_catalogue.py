@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueRobot
-from symgrasp.robot.hand import HANDS
+from symgrasp.robot.hand import HANDS, SIDED_HANDS
 
 NAMES = [robot.name for robot in CATALOGUE]
 
@@ -39,7 +39,7 @@ def test_arms_are_there(name):
     root = ET.parse(urdf(robot)).getroot()
     above = {link(joint, "child"): joint for joint in root.findall("joint")}
     for arm in robot.arms:
-        assert arm.hand is None or arm.hand in HANDS
+        assert arm.hand is None or arm.hand in {**HANDS, **SIDED_HANDS}
         chain, at = [], arm.tool
         while at in above:
             joint = above[at]

@@ -90,13 +90,13 @@ def test_where_there_is_no_room_the_palm_is_inside_the_object(name):
 @pytest.mark.parametrize("name", sorted(HANDS))
 @pytest.mark.parametrize("opening", [0.012, 0.03, 0.06, 0.0797])
 def test_the_fingers_of_the_shipped_hands_stand_as_far_open_as_asked(name, opening):
-    """Between the fingers, from the finger depth to the tips, no point is nearer than the opening."""
+    """No point of the fingers is nearer to the axis of an object as thick as the opening than its surface."""
     arm = arms_with_hands()[name]
     palms = len([link for link in arm.hand.links if link not in arm.hand.touch_links])
     points = random_points_in(arm.hand_hulls(opening)[palms:], np.random.default_rng(0), 100_000)
-    y = points[points[:, 2] >= -arm.hand.finger_depth, 1]
-    assert y[y > 0].min() - y[y < 0].max() == pytest.approx(opening, abs=1e-3)
-    assert abs(y[y > 0].min() + y[y < 0].max()) < 4e-3  # the tool frame is in the middle
+    distance = np.hypot(points[:, 1], points[:, 2] - arm.hand.standoff(opening / 2))
+    for side in (points[:, 1] > 0, points[:, 1] < 0):
+        assert distance[side].min() == pytest.approx(opening / 2, abs=1e-3)
 
 
 def test_a_prefix_renames_all_that_belongs_to_the_robot():

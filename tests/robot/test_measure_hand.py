@@ -13,7 +13,7 @@ from symgrasp.cli.main import main
 from symgrasp.errors import UrdfError
 from symgrasp.poses import from_rotation, rpy
 from symgrasp.references import resolve
-from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.measure_hand import hand_yaml, measure_hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
@@ -21,6 +21,8 @@ from tests.robot.hands import FLANGE, IIWA
 
 PANDA = "package://pybullet_data/franka_panda/panda.urdf"
 PR2 = "package://pybullet_data/pr2_gripper.urdf"
+EXAMPLES = "package://example-robot-data/robots"
+G1 = "g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf"
 WSG = "package://static_scenes/hands/wsg50.urdf"
 
 
@@ -30,10 +32,20 @@ def model(reference: str) -> RobotModel:
 
 @pytest.mark.parametrize(
     ("name", "reference", "tool"),
-    [("franka", PANDA, "panda_grasptarget"), ("wsg50", WSG, "wsg50_tool"), ("pr2", PR2, None)],
+    [
+        ("franka", PANDA, "panda_grasptarget"),
+        ("wsg50", WSG, "wsg50_tool"),
+        ("pr2", PR2, None),
+        ("pr2_left", f"{EXAMPLES}/pr2_description/urdf/pr2.urdf", "l_gripper_tool_frame"),
+        ("pr2_right", f"{EXAMPLES}/pr2_description/urdf/pr2.urdf", "r_gripper_tool_frame"),
+        ("talos_left", f"{EXAMPLES}/talos_data/robots/talos_full_v2.urdf", "gripper_left_base_link"),
+        ("talos_right", f"{EXAMPLES}/talos_data/robots/talos_full_v2.urdf", "gripper_right_base_link"),
+        ("dex3_left", f"{EXAMPLES}/{G1}", "left_hand_palm_link"),
+        ("dex3_right", f"{EXAMPLES}/{G1}", "right_hand_palm_link"),
+    ],
 )
 def test_the_shipped_hands_are_as_measured(name, reference, tool):
-    measured, shipped = measure_hand(model(reference), tool), HANDS[name]
+    measured, shipped = measure_hand(model(reference), tool), {**HANDS, **SIDED_HANDS}[name]
     assert (set(measured.links), set(measured.touch_links)) == (set(shipped.links), set(shipped.touch_links))
     for field in ("min_opening", "max_opening", "finger_depth", "pad_width", "palm_width", "palm_depth"):
         assert getattr(measured, field) == pytest.approx(getattr(shipped, field), abs=5e-4), field
@@ -41,7 +53,7 @@ def test_the_shipped_hands_are_as_measured(name, reference, tool):
     assert shipped.tool is not None
     assert measured.tool.link == shipped.tool.link
     np.testing.assert_allclose(measured.tool.matrix(), shipped.tool.matrix(), atol=1e-4)
-    for opening in np.linspace(0, measured.max_opening, 9):
+    for opening in np.linspace(measured.min_opening + 0.003, measured.max_opening, 9):
         ours, theirs = shipped.joint_values(opening), measured.joint_values(opening)
         assert ours == pytest.approx(theirs, abs=2e-3)
 
@@ -99,8 +111,10 @@ def test_a_hand_of_boxes_is_measured_as_it_was_built(tmp_path_factory, axes, ope
     assert hand.links == ("palm", "one", "two")
     assert hand.touch_links == ("one", "two")
     assert hand.min_opening == 0.0
-    assert hand.max_opening == pytest.approx(2 * sizes["stroke"], abs=1e-4)
-    assert hand.finger_depth == pytest.approx(sizes["length"] - 0.01 - 0.004, abs=2e-4)
+    depth = sizes["length"] - 0.01 - 0.004
+    # The axis of an object is no further out than the tips of the fingers, 10 mm in front of the tool frame.
+    assert hand.max_opening == pytest.approx(2 * min(sizes["stroke"], depth + 0.01), abs=1e-4)
+    assert hand.finger_depth == pytest.approx(depth, abs=1e-4)
     assert hand.pad_width == pytest.approx(sizes["width"], abs=1e-4)
     assert hand.palm_width == pytest.approx(2 * sizes["width"], abs=1e-4)
     for name, way in zip(("slide_one", "slide_two"), opens, strict=True):
@@ -218,7 +232,8 @@ def test_the_command_prints_one_hand_for_each_tool(capsys):
     assert capsys.readouterr().out.count("hand:") == 2
     assert main(["hand", "no.urdf"]) == 2
     assert (
-        capsys.readouterr().err == "symgrasp: command line: URDF: 'no.urdf': expected an existing URDF file\n"
+        capsys.readouterr().err
+        == "symgrasp: command line: URDF: 'no.urdf': expected an existing URDF file; there is no no.urdf\n"
     )
 
 

@@ -1,0 +1,77 @@
+"""Which links of a URDF are the palm of a hand, and which its fingers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from symgrasp.errors import UrdfError, one_of
+from symgrasp.robot.model import RobotModel
+
+__all__ = ["HandStructure", "find_hand_structure", "links_with_shapes"]
+
+
+class HandStructure(NamedTuple):
+    """Which links of a URDF are the palm and which the fingers of a hand, by name.
+
+    Attributes:
+        base: the link that carries all fingers.
+        palm: the links that are fixed to the base, and the base.
+        fingers: for each moving joint on the palm, the links that it moves.
+        standalone: whether the URDF holds the hand only, and no robot.
+    """
+
+    base: str
+    palm: list[str]
+    fingers: list[list[str]]
+    standalone: bool
+
+
+def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
+    """Find the palm that carries two or more fingers.
+
+    Args:
+        model: the URDF.
+        tool: a link fixed to the palm; may be None where there is one palm only.
+
+    Raises:
+        UrdfError: there is no such palm, or several.
+    """
+    chains = {link: model.chain(link) for link in model.link_names}
+    moving = {link: [j for j in chain if j.source >= 0] for link, chain in chains.items()}
+    # Links that only fixed joints connect move as one rigid group. A group is named by the last joint that
+    # moves it, None where no joint does.
+    fingers_of: dict[str | None, list[list[str]]] = {}
+    for joint in model.joints:
+        if joint.source >= 0:
+            finger = [link for link in model.link_names if joint in chains[link]]
+            above = moving[model.link_names[joint.parent]]
+            if links_with_shapes(model, finger):
+                fingers_of.setdefault(above[-1].name if above else None, []).append(finger)
+    hands = {mover: fingers for mover, fingers in fingers_of.items() if len(fingers) > 1}
+    group = {link: joints[-1].name if joints else None for link, joints in moving.items()}
+    if tool is not None:
+        mover = group[model.link_names[model.link_index(tool)]]
+        if mover not in hands:
+            raise UrdfError(model.path, "tool", tool, "a link of a palm that two or more fingers hang on")
+    else:
+        # A group whose "fingers" carry fingers themselves is the torso of a robot, not a palm.
+        inner = [m for m, fs in hands.items() if not any(group[link] in hands for f in fs for link in f)]
+        if len(inner) != 1:
+            palms = [link for link in model.link_names if group[link] in inner]
+            expected = f"--tool, {one_of(palms)}" if palms else "a palm with two or more moving fingers"
+            raise UrdfError(model.path, "hand", f"{len(inner)} hands", expected)
+        mover = inner[0]
+    together = [link for link in model.link_names if group[link] == mover]
+    parents = [chains[finger[0]][:-1] for finger in hands[mover]]
+    shared = [j for j in parents[0] if all(j in chain for chain in parents)]
+    base = model.link_names[shared[-1].child] if shared else model.root
+    # On a robot the last link of the arm moves with the palm, but is not part of the hand.
+    palm = together if mover is None else [link for link in together if chains[link][: len(shared)] == shared]
+    return HandStructure(base, palm, hands[mover], mover is None)
+
+
+def links_with_shapes(model: RobotModel, *links: Iterable[str]) -> tuple[str, ...]:
+    """Return the links of several groups that have a collision shape, in the model's order."""
+    wanted = {link for group in links for link in group}
+    return tuple(link for link in model.colliding_links() if link in wanted)
