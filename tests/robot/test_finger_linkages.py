@@ -145,7 +145,7 @@ def test_the_pads_stand_as_far_apart_as_asked(tmp_path_factory, signs, chained, 
     try:
         placed.set_crank(0.0)
         assert placed.gap() + 2 * root == pytest.approx(2 * (PIVOT_Y + CRANK * np.sin(TILT) - FACE), abs=1e-4)
-        assert -6e-4 <= hand.max_opening - placed.gap() - 2 * root <= 1e-4  # roots may be a little in the way
+        assert -1e-3 <= hand.max_opening - placed.gap() - 2 * root <= 1e-4  # roots may be a little in the way
         assert hand.min_opening == 0.0
         assert hand.tool is not None
         top = hand.tool.position[2]
@@ -180,9 +180,10 @@ def rooted(opening: float, step: float) -> str:
 @pytest.mark.parametrize("step", [0.001, 0.004, 0.008])
 def test_roots_that_no_round_object_reaches_change_nothing(closed, step, tmp_path):
     """An object is thinner where it reaches back to them than roots are closer together than pads."""
+    widest = min(closed + 0.085, 2 * (0.066 + 0.01))  # its axis is no further out than the tips
     hand, _ = measured(tmp_path / "rooted.urdf", rooted(closed, step))
     plain, _ = measured(tmp_path / "plain.urdf", rooted(closed, 0.0))
-    assert (hand.min_opening, hand.max_opening) == (closed, pytest.approx(closed + 0.085, abs=1e-4))
+    assert (hand.min_opening, hand.max_opening) == (closed, pytest.approx(widest, abs=1e-4))
     assert (hand.min_opening, hand.max_opening) == (plain.min_opening, plain.max_opening)
     assert hand.joint_values(closed + 0.03) == pytest.approx(plain.joint_values(closed + 0.03), abs=1e-4)
     assert hand.finger_depth == plain.finger_depth == 0.066

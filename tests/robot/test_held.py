@@ -75,8 +75,10 @@ class Cylinders:
             if joint.source >= 0:
                 value = joint.ratio * values[robot.joint_names[joint.source]] + joint.offset
                 pose[child] = pose[child] @ joint_motion(joint, np.asarray(value))
-                at = self.joints[joint.name]
-                pybullet.resetJointState(self.body, at, value, physicsClientId=self.client)
+                if joint.name in self.joints:  # those that move nothing are left out
+                    pybullet.resetJointState(
+                        self.body, self.joints[joint.name], value, physicsClientId=self.client
+                    )
         T = pose[hand.tool.link] @ hand.tool.matrix()
         turns = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
         around = [np.sin(turns), hand.standoff(radius) / radius + np.cos(turns)]
@@ -93,7 +95,7 @@ class Cylinders:
         pybullet.performCollisionDetection(physicsClientId=self.client)
         found = pybullet.getClosestPoints(self.body, cylinder, 0.1, physicsClientId=self.client)
         pybullet.removeBody(cylinder, physicsClientId=self.client)
-        fingers = {self.links[link] for link in hand.touch_links}
+        fingers = {self.links[link] for link in hand.touch_links if link in self.links}
         return min((point[8] for point in found if point[3] in fingers), default=0.1)
 
 
