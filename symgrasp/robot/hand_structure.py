@@ -8,7 +8,7 @@ from typing import NamedTuple
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.robot.model import RobotModel
 
-__all__ = ["HandStructure", "find_hand_structure", "links_with_shapes"]
+__all__ = ["HandStructure", "find_hand_structure", "links_with_shapes", "palm_candidates"]
 
 
 class HandStructure(NamedTuple):
@@ -38,25 +38,13 @@ def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
         UrdfError: there is no such palm, or several.
     """
     chains = {link: model.chain(link) for link in model.link_names}
-    moving = {link: [j for j in chain if j.source >= 0] for link, chain in chains.items()}
-    # Links that only fixed joints connect move as one rigid group. A group is named by the last joint that
-    # moves it, None where no joint does.
-    fingers_of: dict[str | None, list[list[str]]] = {}
-    for joint in model.joints:
-        if joint.source >= 0:
-            finger = [link for link in model.link_names if joint in chains[link]]
-            above = moving[model.link_names[joint.parent]]
-            if links_with_shapes(model, finger):
-                fingers_of.setdefault(above[-1].name if above else None, []).append(finger)
-    hands = {mover: fingers for mover, fingers in fingers_of.items() if len(fingers) > 1}
-    group = {link: joints[-1].name if joints else None for link, joints in moving.items()}
+    hands, group = _hands(model)
     if tool is not None:
         mover = group[model.link_names[model.link_index(tool)]]
         if mover not in hands:
             raise UrdfError(model.path, "tool", tool, "a link of a palm that two or more fingers hang on")
     else:
-        # A group whose "fingers" carry fingers themselves is the torso of a robot, not a palm.
-        inner = [m for m, fs in hands.items() if not any(group[link] in hands for f in fs for link in f)]
+        inner = _innermost(hands, group)
         if len(inner) != 1:
             palms = [link for link in model.link_names if group[link] in inner]
             expected = f"--tool, {one_of(palms)}" if palms else "a palm with two or more moving fingers"
@@ -69,6 +57,40 @@ def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
     # On a robot the last link of the arm moves with the palm, but is not part of the hand.
     palm = together if mover is None else [link for link in together if chains[link][: len(shared)] == shared]
     return HandStructure(base, palm, hands[mover], mover is None)
+
+
+def palm_candidates(model: RobotModel) -> list[str]:
+    """Return a link of each rigid group that two or more moving parts hang on, none of them such a group.
+
+    Palms are among them, and so may be the body of a robot whose arms and legs carry no hands.
+    """
+    hands, group = _hands(model)
+    firsts = {mover: next(link for link in model.link_names if group[link] == mover) for mover in hands}
+    return [firsts[mover] for mover in _innermost(hands, group)]
+
+
+def _hands(model: RobotModel) -> tuple[dict[str | None, list[list[str]]], dict[str, str | None]]:
+    """Return the parts that hang on groups of links, and the group that each link belongs to.
+
+    Links that only fixed joints connect move as one rigid group. A group is named by the last joint that
+    moves it, None where no joint does.
+    """
+    chains = {link: model.chain(link) for link in model.link_names}
+    moving = {link: [j for j in chain if j.source >= 0] for link, chain in chains.items()}
+    fingers_of: dict[str | None, list[list[str]]] = {}
+    for joint in model.joints:
+        if joint.source >= 0:
+            finger = [link for link in model.link_names if joint in chains[link]]
+            above = moving[model.link_names[joint.parent]]
+            if links_with_shapes(model, finger):
+                fingers_of.setdefault(above[-1].name if above else None, []).append(finger)
+    hands = {mover: fingers for mover, fingers in fingers_of.items() if len(fingers) > 1}
+    return hands, {link: joints[-1].name if joints else None for link, joints in moving.items()}
+
+
+def _innermost(hands: dict[str | None, list[list[str]]], group: dict[str, str | None]) -> list[str | None]:
+    """Return the groups without those whose "fingers" carry fingers themselves: the torso is no palm."""
+    return [m for m, fs in hands.items() if not any(group[link] in hands for f in fs for link in f)]
 
 
 def links_with_shapes(model: RobotModel, *links: Iterable[str]) -> tuple[str, ...]:

@@ -1,0 +1,148 @@
+"""``symgrasp robot``: say what a URDF holds, and write a scene to start from."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symgrasp.cli.shared import Commands, add_command, say, write_out
+from symgrasp.errors import InputError, SymgraspError, one_of
+
+if TYPE_CHECKING:
+    from symgrasp.robot.model import RobotModel
+    from symgrasp.robot.survey import FoundArm
+
+__all__ = ["add_parser", "run"]
+
+
+def add_parser(commands: Commands) -> None:
+    """Add the command to the parser."""
+    command = add_command(commands, "robot", run, "Say what a URDF holds: arms, hands, solvers.")
+    command.add_argument("urdf", metavar="URDF", help="a file, or package://<package>/<path>")
+    text = "write a scene to start from: the robot, and a can where its first arm reaches"
+    command.add_argument("--scene", metavar="FILE.yaml", type=Path, help=text)
+    command.add_argument(
+        "--arm", metavar="NAME", help="the arm that is to reach the can; the first by default"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what the URDF holds and write the scene if asked to; return the exit status."""
+    from symgrasp.references import portable, resolve, sought
+
+    path = resolve(args.urdf, Path())
+    if path is None:
+        raise InputError("command line", "URDF", args.urdf, sought(args.urdf, Path(), "URDF"))
+    if args.scene and args.scene.suffix not in (".yaml", ".yml"):
+        raise InputError("command line", "--scene", str(args.scene), "a name that ends in .yaml")
+
+    from symgrasp.feasibility.starter import robot_content
+    from symgrasp.robot.model import RobotModel
+    from symgrasp.robot.survey import find_arms, in_catalogue
+
+    model = RobotModel(path)
+    known = in_catalogue(model)
+    say(f"{model.name}: {len(model.link_names)} links, {len(model.joint_names)} joints that take a value")
+    arms = find_arms(model)
+    usable = [arm for arm in arms if arm.joints and arm.hand is not None]
+    name = known.name if known else re.sub(r"\W+", "_", model.name).strip("_") or "robot"
+    reference = portable(args.urdf, path) or str(path.resolve())
+    entry = robot_content(name, reference, usable) if usable else {}
+    solved = []
+    for arm in arms:
+        _say_arm(arm)
+        if arm in usable and _solver_said(entry, arm):
+            solved.append(arm)
+    if solved:
+        _say_home(robot_content(name, reference, solved), solved[0].name)
+    if not arms:
+        say("  no arm: no chain of five or more joints that turn")
+    _say_missing(model)
+    if args.arm:
+        if args.arm not in [arm.name for arm in solved]:
+            raise InputError("command line", "--arm", args.arm, one_of(arm.name for arm in solved))
+        solved.sort(key=lambda arm: arm.name != args.arm)
+    if args.scene:
+        _write_scene(args.scene, name, reference, solved, path)
+    return 0
+
+
+def _write_scene(out: Path, name: str, reference: str, arms: list[FoundArm], path: Path) -> None:
+    """Write a scene with a can for the first of the arms."""
+    if not arms:
+        raise InputError(path, "robot", name, "an arm with a solver and a hand")
+
+    import yaml
+
+    from symgrasp.feasibility.starter import starter_scene
+
+    content = starter_scene(name, reference, arms)
+    x, y, z = content["tasks"][0]["pose"]["position"]
+    say(f"  a can 5 cm thick at {x:g}, {y:g}, {z:g} m is in reach of {arms[0].name}")
+    text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=100)
+    write_out(out, text.encode())
+
+
+def _say_arm(arm: FoundArm) -> None:
+    """Print the joints and the hand of an arm."""
+    if arm.joints:
+        say(f"  arm {arm.name}: {len(arm.joints)} joints, {arm.joints[0]} to {arm.joints[-1]}")
+    else:
+        say(f"  arm {arm.name}")
+    if arm.resting:
+        say(f"    at rest: {', '.join(arm.resting)}")
+    if arm.hand and arm.named:
+        say(f"    tool {arm.tool}, no hand of its own; {arm.hand.name} is mounted on it")
+    elif arm.hand:
+        opening = f"opens from {1e3 * arm.hand.min_opening:.0f} to {1e3 * arm.hand.max_opening:.0f} mm"
+        say(f"    hand at {arm.tool}: {opening}, {1e3 * arm.hand.finger_depth:.0f} mm deep")
+    if arm.trouble:
+        say(f"    {arm.trouble}")
+
+
+def _say_missing(model: RobotModel) -> None:
+    """Print what the URDF lacks."""
+    bare = [link for link in model.link_names if not model.has_shape(link)]
+    if len(bare) == len(model.link_names):
+        say("  missing: no link has a collision shape, so nothing of it collides")
+    free = [
+        joint.name for joint in model.joints
+        if joint.kind != "continuous" and joint.source >= 0 and not abs(joint.upper - joint.lower) < 1e4
+    ]  # fmt: skip
+    if free:
+        say(f"  missing: limits of {', '.join(free)}")
+
+
+def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
+    """Print how the configurations of an arm are found; return whether they can be."""
+    from symgrasp.feasibility.starter import scene_content
+    from symgrasp.ik import ClosedFormIK, CompiledIK, solver_for
+    from symgrasp.scene.scene import Scene
+
+    one = {**entry, "arms": [a for a in entry["arms"] if a["name"] == arm.name]}
+    try:
+        scene = Scene.from_content(scene_content(one, arm.name))
+        solver = solver_for(scene.arm(arm.name), 1)
+    except SymgraspError as error:
+        say(f"    no solver: {error}")
+        return False
+    how = "closed form" if solver.complete else "search, which may miss some"
+    compiled = ", compiled" if isinstance(solver, CompiledIK) else ""
+    locked = solver.locked if isinstance(solver, ClosedFormIK) else None
+    say(f"    solver: {how}{compiled}" + ("" if locked is None else f", {arm.joints[locked]} locked"))
+    return True
+
+
+def _say_home(entry: dict[str, Any], arm: str) -> None:
+    """Print whether the robot is free of collisions at home."""
+    from symgrasp.feasibility.starter import scene_content
+    from symgrasp.scene.scene import Scene
+    from symgrasp.world import open_world
+
+    scene = Scene.from_content(scene_content(entry, arm))
+    with open_world(scene) as world:
+        hits = world.collisions(list(scene.arms.values()))
+    hit = f"{hits[0].a} is in {hits[0].b}: the scene needs a home" if hits else "free of collisions"
+    say(f"  home: {hit}")

@@ -1,0 +1,124 @@
+"""A scene to start from, for a robot that has none: its arms, and a can where one of them reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import yaml
+
+from symgrasp.errors import SceneError
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.object.manifold import Manifold
+from symgrasp.poses import Array, translation
+from symgrasp.robot.measure_hand import hand_yaml
+from symgrasp.robot.robot import Arm
+from symgrasp.robot.survey import FoundArm
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+from symgrasp.world import open_world
+
+__all__ = ["robot_content", "scene_content", "starter_scene"]
+
+RADIUS, HEIGHT = 0.025, 0.12
+"""Radius and height (m) of the can."""
+
+FAR = 100.0
+"""Where the can stands (m) while no place is known for it."""
+
+SAMPLES = 20_000
+"""Number of random configurations in which the arm is looked at."""
+
+UPRIGHT = 0.94
+"""Cosine of the angle by which the object may be out of upright in them: 20°."""
+
+TRIALS = 12
+"""Number of poses for which a coarse map is computed."""
+
+COARSE = (4, 16)
+"""Heights and angles of that map."""
+
+
+def robot_content(name: str, urdf: str, arms: Sequence[FoundArm]) -> dict[str, Any]:
+    """Return a robot as scene files have it.
+
+    Args:
+        name: its name.
+        urdf: the reference to its URDF.
+        arms: its arms, all with joints and a hand.
+    """
+    return {"name": name, "urdf": urdf, "arms": [_arm_entry(arm) for arm in arms]}
+
+
+def scene_content(robot: dict[str, Any], arm: str) -> dict[str, Any]:
+    """Return the content of a scene with a robot, and a can for an arm that stands far away."""
+    name = robot["name"]
+    return {
+        "schema_version": 1,
+        "name": name,
+        "description": f"{name} and a can, to start from",
+        "robots": [robot],
+        "object": {"name": "can", "profile": [[0.0, RADIUS], [HEIGHT, RADIUS]]},
+        "tasks": [{"name": "hold", "arms": [arm], "pose": {"position": [FAR, 0.0, 0.0]}}],
+        "map": {"heights": 12, "angles": 36, "redundancy": 16},
+    }
+
+
+def starter_scene(name: str, urdf: str, arms: Sequence[FoundArm]) -> dict[str, Any]:
+    """Return the content of a scene with a robot, and a can that stands where its first arm reaches it best.
+
+    Args:
+        name: the robot's name.
+        urdf: the reference to its URDF.
+        arms: its arms, that which is to reach the can first.
+
+    Raises:
+        SceneError: the arm reaches no can.
+        SymgraspError: a scene with that robot cannot be loaded.
+    """
+    content = scene_content(robot_content(name, urdf, arms), arms[0].name)
+    scene = Scene.from_content(content)
+    best, place = 0, None
+    with open_world(scene) as world:
+        maker, arm = MapMaker(world), scene.arm(arms[0].name)
+        grid = Manifold(scene.profile, *COARSE)
+        for position in _places(arm):
+            task = Task("hold", (arm.name,), translation(position))
+            found = int(maker.map(task=task, manifold=grid).feasible.sum())
+            if found > best:
+                best, place = found, position
+    if place is None:
+        raise SceneError(name, f"arm {arms[0].name}", TRIALS, "a place where it reaches an upright can")
+    content["tasks"][0]["pose"] = {"position": [round(float(v), 3) for v in place]}
+    return content
+
+
+def _arm_entry(arm: FoundArm) -> dict[str, Any]:
+    """Return an arm as scene files have it."""
+    entry: dict[str, Any] = {"name": arm.name, "joints": [arm.joints[0], arm.joints[-1]]}
+    hand = arm.hand
+    assert hand is not None
+    if not arm.named:
+        inline = yaml.safe_load(hand_yaml(hand))["hand"]
+        return {**entry, "hand": inline}
+    position, turn = arm.mount
+    mount: dict[str, Any] = {"link": arm.tool, "prefix": f"{arm.name}_"}
+    if any(position) or any(turn):
+        mount["pose"] = {"position": list(position), "rpy_deg": list(turn)}
+    return {**entry, "hand": hand.name, "mount": mount}
+
+
+def _places(arm: Arm) -> list[Array]:
+    """Return positions (3,) of an upright can that the arm holds from the side in random configurations."""
+    rng = np.random.default_rng(0)
+    bounded = np.isfinite(arm.upper - arm.lower)
+    lower, upper = np.where(bounded, arm.lower, -np.pi), np.where(bounded, arm.upper, np.pi)
+    q = rng.uniform(lower, upper, (SAMPLES, arm.dof))
+    # Far from their limits, so that there is room for other grasps.
+    margin = (np.minimum(q - lower, upper - q) / (upper - lower)).min(axis=1)
+    T = arm.world_tool_pose(q)
+    upright = np.abs(T[:, 2, 0]) > UPRIGHT
+    order = np.argsort(-np.where(upright, margin, -1.0))[:TRIALS]
+    axis = T[:, :3, 3] + arm.hand.standoff(RADIUS) * T[:, :3, 2]
+    return [axis[k] - [0.0, 0.0, HEIGHT / 2] for k in order if upright[k]]

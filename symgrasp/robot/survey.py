@@ -1,0 +1,147 @@
+"""What a URDF holds: the arms that it seems to have, with their tools and hands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from symgrasp.errors import SymgraspError
+from symgrasp.references import resolve
+from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
+from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
+from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.hand_structure import find_hand_structure, palm_candidates
+from symgrasp.robot.measure_hand import measure_hand
+from symgrasp.robot.model import RobotModel
+
+__all__ = ["FoundArm", "find_arms", "in_catalogue"]
+
+LEAST_JOINTS = 5
+"""A chain of fewer revolute joints than this is no arm."""
+
+LEGS = ("leg", "foot", "ankle", "hip", "knee", "toe", "head", "neck", "camera", "wheel", "caster")
+"""A chain whose last joint or link has one of these in its name is no arm."""
+
+FLANGES = ("tool0", "tcp", "eef", "ee_link", "flange", "grasp")
+"""Of several links at the end of an arm, one with one of these in its name is its tool, in this order."""
+
+
+@dataclass(frozen=True)
+class FoundArm:
+    """An arm that a URDF seems to have.
+
+    Attributes:
+        name: what it is called in a scene.
+        tool: the link that its hand is on.
+        joints: its joints, from base to tool.
+        resting: the joints before them that turn, a torso's.
+        hand: its hand.
+        named: whether the hand is a named one with a URDF of its own, to be mounted on the tool.
+        mount: where it is mounted: position (m) and roll, pitch and yaw (degrees).
+        trouble: what is wrong with the hand or the joints; empty where nothing is.
+    """
+
+    name: str
+    tool: str
+    joints: tuple[str, ...]
+    resting: tuple[str, ...]
+    hand: Hand | None
+    named: bool = False
+    mount: tuple[tuple[float, float, float], tuple[float, float, float]] = ((0, 0, 0), (0, 0, 0))
+    trouble: str = ""
+
+
+def in_catalogue(model: RobotModel) -> CatalogueRobot | None:
+    """Return the robot of the catalogue that a URDF is, if any."""
+    for robot in CATALOGUE:
+        path = resolve(robot.urdf, Path())
+        if path is not None and path.resolve() == model.path.resolve():
+            return robot
+    return None
+
+
+def find_arms(model: RobotModel) -> list[FoundArm]:
+    """Return the arms of a robot: those of the catalogue, else those with hands, else all long chains.
+
+    An arm without a hand that can be measured gets a gripper, the WSG 50, mounted on its last link.
+    """
+    known = in_catalogue(model)
+    if known is not None:
+        return [_known_arm(model, arm) for arm in known.arms]
+    arms = [
+        _arm(model, link)
+        for link in palm_candidates(model)
+        if len(revolute_joints(model, link)) >= LEAST_JOINTS and not _is_leg(model, link)
+    ]
+    arms = [arm for arm in arms if arm.hand is not None] or [
+        _arm(model, link, mounted=True) for link in _ends(model)
+    ]
+    return arms if len(arms) != 1 else [_renamed(arms[0], "arm")]
+
+
+def _renamed(arm: FoundArm, name: str) -> FoundArm:
+    return FoundArm(**{**arm.__dict__, "name": name})
+
+
+def _known_arm(model: RobotModel, arm: CatalogueArm) -> FoundArm:
+    """Return an arm of the catalogue; a hand in the URDF is measured."""
+    joints = tuple(joints_between(model, arm.tool, *arm.joints))
+    resting = tuple(name for name in revolute_joints(model, arm.tool) if name not in joints)
+    if arm.hand is not None:
+        hand = HANDS[arm.hand]
+        return FoundArm(arm.name, arm.tool, joints, resting, hand, hand.urdf is not None, arm.mount)
+    hand, trouble = _measured(model, arm.tool)
+    if hand is None:
+        hand, named = HANDS["wsg50"], True
+        return FoundArm(arm.name, arm.tool, joints, resting, hand, named, trouble=trouble)
+    return FoundArm(arm.name, arm.tool, joints, resting, hand)
+
+
+def _measured(model: RobotModel, link: str) -> tuple[Hand | None, str]:
+    """Return the hand at a link, or why there is none."""
+    try:
+        return measure_hand(model, link), ""
+    except SymgraspError as error:
+        return None, str(error).removeprefix(f"{model.path}: ")
+
+
+def _arm(model: RobotModel, link: str, mounted: bool = False) -> FoundArm:
+    """Return the arm that ends at a link, whose hand is measured, or the WSG 50 where it is to be mounted."""
+    if mounted:
+        hand, trouble = HANDS["wsg50"], ""
+    else:
+        link = find_hand_structure(model, link).base
+        hand, trouble = _measured(model, link)
+    others = frozenset(hand.joints) if hand and not mounted else frozenset[str]()
+    turning = [name for name in revolute_joints(model, link) if name not in others]
+    joints: list[str] = []
+    try:
+        joints = guess_arm_joints(model, link, others)
+    except SymgraspError as error:
+        trouble = trouble or str(error).removeprefix(f"{model.path}: ")
+    resting = tuple(name for name in turning if name not in joints)
+    return FoundArm(link, link, tuple(joints), resting if joints else (), hand, mounted, trouble=trouble)
+
+
+def _ends(model: RobotModel) -> Iterator[str]:
+    """Yield the link at the end of every chain that is long enough to be an arm."""
+    parents = {joint.parent for joint in model.joints if joint.source >= 0}
+    for joint in model.joints:
+        if joint.source < 0:
+            continue
+        child = model.link_names[joint.child]
+        rigid = [
+            link for link in model.link_names
+            if [j for j in model.chain(link) if j.source >= 0][-1:] == [joint]
+        ]  # fmt: skip
+        if any(model.link_index(link) in parents for link in rigid) or _is_leg(model, child):
+            continue
+        if len(revolute_joints(model, child)) >= LEAST_JOINTS:
+            flange = [link for word in FLANGES for link in rigid if word in link.lower()]
+            yield flange[0] if flange else child
+
+
+def _is_leg(model: RobotModel, link: str) -> bool:
+    names = [link, *(joint.name for joint in model.chain(link)[-1:])]
+    return any(word in name.lower() for word in LEGS for name in names)
