@@ -118,7 +118,8 @@ def _say_missing(model: RobotModel) -> None:
 def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     """Print how the configurations of an arm are found; return whether they can be."""
     from symgrasp.feasibility.starter import scene_content
-    from symgrasp.ik import ClosedFormIK, CompiledIK, solver_for
+    from symgrasp.ik import CompiledIK, solver_for
+    from symgrasp.ik.arm_ik import ArmIK
     from symgrasp.scene.scene import Scene
 
     one = {**entry, "arms": [a for a in entry["arms"] if a["name"] == arm.name]}
@@ -130,7 +131,7 @@ def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
         return False
     how = "closed form" if solver.complete else "search, which may miss some"
     compiled = ", compiled" if isinstance(solver, CompiledIK) else ""
-    locked = solver.locked if isinstance(solver, ClosedFormIK) else None
+    locked = solver.locked if isinstance(solver, ArmIK) else None
     say(f"    solver: {how}{compiled}" + ("" if locked is None else f", {arm.joints[locked]} locked"))
     return True
 
@@ -139,10 +140,12 @@ def _say_home(entry: dict[str, Any], arm: str) -> None:
     """Print whether the robot is free of collisions at home."""
     from symgrasp.feasibility.starter import scene_content
     from symgrasp.scene.scene import Scene
-    from symgrasp.world import open_world
+    from symgrasp.world import open_world, with_free_homes
 
-    scene = Scene.from_content(scene_content(entry, arm))
+    scene = with_free_homes(Scene.from_content(scene_content(entry, arm)))
     with open_world(scene) as world:
         hits = world.collisions(list(scene.arms.values()))
     hit = f"{hits[0].a} is in {hits[0].b}: the scene needs a home" if hits else "free of collisions"
     say(f"  home: {hit}")
+    for note in scene.notes:
+        say(f"    {note}")

@@ -17,7 +17,7 @@ from symgrasp.robot.robot import Arm
 from symgrasp.robot.survey import FoundArm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import open_world
+from symgrasp.world import open_world, with_free_homes
 
 __all__ = ["robot_content", "scene_content", "starter_scene"]
 
@@ -33,8 +33,11 @@ SAMPLES = 20_000
 UPRIGHT = 0.94
 """Cosine of the angle by which the object may be out of upright in them: 20°."""
 
-TRIALS = 12
+TRIALS = 8
 """Number of poses for which a coarse map is computed."""
+
+ENOUGH = 0.3
+"""No further pose is tried after one with this share of feasible cells."""
 
 COARSE = (4, 16)
 """Heights and angles of that map."""
@@ -61,7 +64,7 @@ def scene_content(robot: dict[str, Any], arm: str) -> dict[str, Any]:
         "robots": [robot],
         "object": {"name": "can", "profile": [[0.0, RADIUS], [HEIGHT, RADIUS]]},
         "tasks": [{"name": "hold", "arms": [arm], "pose": {"position": [FAR, 0.0, 0.0]}}],
-        "map": {"heights": 12, "angles": 36, "redundancy": 16},
+        "map": {"heights": 12, "angles": 36, "redundancy": 8},
     }
 
 
@@ -78,7 +81,10 @@ def starter_scene(name: str, urdf: str, arms: Sequence[FoundArm]) -> dict[str, A
         SymgraspError: a scene with that robot cannot be loaded.
     """
     content = scene_content(robot_content(name, urdf, arms), arms[0].name)
-    scene = Scene.from_content(content)
+    scene = with_free_homes(Scene.from_content(content))
+    home = scene.file.robots[0].home
+    if home is not None:
+        content["robots"][0]["home"] = dict(home) if isinstance(home, dict) else list(home)
     best, place = 0, None
     with open_world(scene) as world:
         maker, arm = MapMaker(world), scene.arm(arms[0].name)
@@ -88,6 +94,8 @@ def starter_scene(name: str, urdf: str, arms: Sequence[FoundArm]) -> dict[str, A
             found = int(maker.map(task=task, manifold=grid).feasible.sum())
             if found > best:
                 best, place = found, position
+            if best > ENOUGH * 2 * np.prod(COARSE):
+                break
     if place is None:
         raise SceneError(name, f"arm {arms[0].name}", TRIALS, "a place where it reaches an upright can")
     content["tasks"][0]["pose"] = {"position": [round(float(v), 3) for v in place]}

@@ -17,7 +17,7 @@ from symgrasp.scene.scene import Scene
 CATALOGUED = {robot.name: robot for robot in CATALOGUE}
 
 
-@pytest.mark.parametrize("name", ["iiwa", "ur5", "pr2"])
+@pytest.mark.parametrize("name", ["iiwa", "ur5"])
 def test_the_scene_has_feasible_cells(name, tmp_path, capsys):
     out = tmp_path / "scene.yaml"
     assert main(["robot", CATALOGUED[name].urdf, "--scene", str(out)]) == 0
