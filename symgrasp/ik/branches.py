@@ -12,7 +12,8 @@ import numpy as np
 
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import THREE_PARALLEL
-from symgrasp.ik.joints import misses
+from symgrasp.ik.joints import misses, settle
+from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair import NUMBERS, PAIR_BRANCHES, pair_branches
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.ik.parallel import parallel_branches
@@ -81,7 +82,7 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
     Returns:
         False where it is known that no branch reaches the pose, limits or not.
     """
-    g, joint, limits = chain.geometry[k], chain.joint, chain.limits
+    g, joint, limits = chain.geometry[k], chain.joint, chain.leeway
     for b in range(exists.shape[0]):
         exists[b] = False
         inside[b] = False
@@ -92,7 +93,11 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
     else:
         solvable = spherical_branches(g, joint, limits, T, inside_only, q, exists, inside)
     for b in range(exists.shape[0]):
-        if exists[b] and misses(chain.forward, q[b], T):
-            exists[b] = False
-            inside[b] = False
+        if exists[b] and joint[9]:
+            exists[b] = polish_in(chain.forward, chain.fixed, q[b], T, memory.J, memory.A)
+            # Inside the leeway before, too: so an answer does not depend on what was left out early.
+            inside[b] = settle(chain.limits, q[b]) and inside[b]
+        elif exists[b]:
+            exists[b] = not misses(chain.forward, q[b], T)
+        inside[b] = inside[b] and exists[b]
     return solvable

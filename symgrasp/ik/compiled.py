@@ -6,12 +6,16 @@ import numpy as np
 
 from symgrasp.ik.arm_ik import ArmIK, Solutions, Tolerance
 from symgrasp.ik.branches import branch_count, solve_range
-from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries
+from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries, is_rounded
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm
 
 __all__ = ["CompiledIK"]
+
+LEEWAY = 0.3
+"""How far (rad) outside its limits a joint of a rounded arm may be in the closed form: near singular poses
+Newton's method moves joints that far."""
 
 
 class CompiledIK(ArmIK):
@@ -72,16 +76,26 @@ class CompiledIK(ArmIK):
         locked = -1 if self.locked is None else self.locked
         free = [j for j in range(arm.dof) if j != locked]
         backwards = rows[0].backwards
-        bounded = np.isfinite(arm.lower) & np.isfinite(arm.upper)
-        middle = np.zeros(arm.dof)
-        middle[bounded] = 0.5 * (arm.lower[bounded] + arm.upper[bounded])
-        half = np.minimum(np.where(bounded, 0.5 * (arm.upper - arm.lower), np.inf), np.pi)
-        least = np.cos(half) - COSINE_TOLERANCE
+        rounded = is_rounded(rows)
         tolerance = [self.tolerance.position, self.tolerance.rotation, 0.0]
         return Chain(
             geometry=np.array([row.packed() for row in rows]),
-            joint=np.array([*(free[::-1] if backwards else free), locked, backwards, rows[0].family]),
-            limits=np.array([arm.lower, arm.upper, middle, np.cos(middle), np.sin(middle), least]),
+            joint=np.array(
+                [*(free[::-1] if backwards else free), locked, backwards, rows[0].family, rounded]
+            ),
+            limits=_limits(arm, 0.0),
+            leeway=_limits(arm, LEEWAY if rounded else 0.0),
             forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
             fixed=np.arange(arm.dof) == locked,
         )
+
+
+def _limits(arm: Arm, leeway: float) -> Array:
+    """Return the limits of an arm as `Chain.limits` has them, wider by some leeway (rad)."""
+    lower, upper = arm.lower - leeway, arm.upper + leeway
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    middle = np.zeros(arm.dof)
+    middle[bounded] = 0.5 * (arm.lower[bounded] + arm.upper[bounded])
+    half = np.minimum(np.where(bounded, 0.5 * (upper - lower), np.inf), np.pi)
+    least = np.cos(half) - COSINE_TOLERANCE
+    return np.array([lower, upper, middle, np.cos(middle), np.sin(middle), least])

@@ -13,6 +13,7 @@ __all__ = [
     "misses",
     "nearest_turn",
     "outside",
+    "settle",
     "sine",
     "tool_motion",
     "within",
@@ -69,6 +70,20 @@ def within(limits, joint, value):
 
 
 @njit(**STRICT)
+def settle(limits, row):
+    """Add the full turns to joint values (n,) that bring them nearest to the middle of their limits.
+
+    Returns:
+        Whether all of them are inside the limits.
+    """
+    fits = True
+    for k in range(row.shape[0]):
+        row[k] = nearest_turn(limits, k, row[k])
+        fits = fits and within(limits, k, row[k])
+    return fits
+
+
+@njit(**STRICT)
 def outside(limits, joint, s, c):
     """Whether an angle of this sine and cosine is outside the limits of a joint, with any full turns added.
 
@@ -78,10 +93,17 @@ def outside(limits, joint, s, c):
 
 
 @njit(**STRICT)
-def sine(cosine):
-    """Return the sine of the arc cosine, which is not negative, or -1 where there is none."""
+def sine(cosine, slack):
+    """Return the sine of the arc cosine, which is not negative, or -1 where there is none.
+
+    Args:
+        cosine: the cosine.
+        slack: of an arm whose geometry is rounded: its true square of the sine is known up to that. Where it
+            may be zero, two branches all but coincide, and each has to start on its own side for Newton's
+            method to find them both, so that the square is not taken for less. 0 for other arms.
+    """
     rest = 1.0 - cosine * cosine
-    return math.sqrt(max(rest, 0.0)) if rest >= -ROOT_TOLERANCE else -1.0
+    return math.sqrt(max(rest, slack)) if rest >= -(ROOT_TOLERANCE + slack) else -1.0
 
 
 @njit(**STRICT)

@@ -22,7 +22,19 @@ from __future__ import annotations
 import math
 
 from symgrasp.compiling import njit
-from symgrasp.ik.chain import AXES, BASE, BEND, ELBOW, FOREARM, HAND, MEETING, PARALLEL_PHI, SHOULDER, TURN
+from symgrasp.ik.chain import (
+    AXES,
+    BASE,
+    BEND,
+    ELBOW,
+    FOREARM,
+    HAND,
+    MEETING,
+    PARALLEL_PHI,
+    PARALLEL_SLACK,
+    SHOULDER,
+    TURN,
+)
 from symgrasp.ik.joints import nearest_turn, outside, sine, tool_motion, within, write_branch
 from symgrasp.ik.vectors import (
     STRICT,
@@ -54,7 +66,7 @@ def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside):
     sy, sx = dot(h2, cross(h1, a)), dot(h2, a) - part
     length = math.sqrt(sy * sy + sx * sx)
     c = (dot(h2, minus(wrist, base)) - part) / length
-    s = sine(c)
+    s = sine(c, g[PARALLEL_SLACK])
     if not s >= 0.0:
         return False
     sm, cm = sy / length, sx / length
@@ -78,7 +90,7 @@ def _wrist(g, joint, limits, R, seen, q1, s1, c1, branch, inside_only, q, exists
     middle, length, part = vec(g, TURN)
     sm, cm = g[TURN + 3], g[TURN + 4]
     c = (dot(h2, rotate(h1, -s1, c1, times(R, h6))) - part) / length
-    s = sine(c)
+    s = sine(c, g[PARALLEL_SLACK])
     if s < 0.0:
         return
     before = transposed_times(R, rotate(h1, s1, c1, h2))  # R_G⁻¹ R1 h2
@@ -113,7 +125,7 @@ def _elbow(g, joint, limits, t, total, q1, q5, q6, branch, inside_only, q, exist
     middle, length, part = vec(g, BEND)
     sm, cm = g[BEND + 3], g[BEND + 4]
     c = (-0.5 * dot(t, t) - part) / length
-    s = sine(c)
+    s = sine(c, g[PARALLEL_SLACK])
     if s < 0.0:
         return
     from_shoulder = minus(vec(g, ELBOW), vec(g, SHOULDER))

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from symgrasp.compiling import njit
-from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, PHI, TRIPLE, WRIST, WRIST_SEEN
+from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, PHI, SLACK, TRIPLE, WRIST, WRIST_SEEN
 from symgrasp.ik.joints import ROOT_TOLERANCE, nearest_turn, outside, sine, tool_motion, within, write_branch
 from symgrasp.ik.vectors import (
     STRICT,
@@ -49,7 +49,7 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside):
     middle, length, part = vec(g, MIDDLE)
     sm, cm = g[MIDDLE + 3], g[MIDDLE + 4]
     c = (-0.5 * dot(t, t) - part) / length
-    s = sine(c)
+    s = sine(c, g[SLACK])
     if s < 0.0:
         return False
     offset = math.atan2(s, c)
@@ -78,9 +78,10 @@ def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, insi
     alpha = (along5 - c * along6) / across
     beta = (along6 - c * along5) / across
     rest = (dot(u, u) - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / across
-    if rest < -ROOT_TOLERANCE:
+    slack = g[SLACK] * dot(u, u)
+    if rest < -(ROOT_TOLERANCE + slack):
         return
-    gamma = math.sqrt(max(rest, 0.0))
+    gamma = math.sqrt(max(rest, slack))
     normal = cross(h5, h6)
     h3 = vec(g, AXES + 6)
     side = perpendicular(h3)
@@ -119,7 +120,7 @@ def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, 
     middle, length, part = vec(g, TRIPLE)
     sm, cm = g[TRIPLE + 3], g[TRIPLE + 4]
     c = (dot(h1, M3) - part) / length
-    s = sine(c)
+    s = sine(c, g[SLACK])
     if s < 0.0:
         return
     for i in range(2):

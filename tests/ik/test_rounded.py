@@ -1,0 +1,181 @@
+"""Arms whose URDF rounds its angles: the closed form of axes where they are meant to be, ended by Newton."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import ssik
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from symgrasp.ik import CompiledIK
+from symgrasp.ik.branches import branch_count, branches_at, new_memory
+from symgrasp.poses import pose_error, rotation_about
+from symgrasp.references import resolve
+from symgrasp.robot.catalogue import CATALOGUE
+from symgrasp.robot.hand import Hand
+from symgrasp.robot.model import RobotModel
+from symgrasp.robot.robot import Arm, Robot
+from tests.ik.redundancy import solve_at
+from tests.ik.rounding import rounded
+from tests.ik.synthetic import distance, synthetic
+
+X, Y, Z = np.eye(3)
+ARMS = {
+    # PR2's axes, a Panda's with its elbow, a UR5's, and those of a 6-joint arm whose wrist is spherical.
+    "pr2": synthetic(
+        [Z, Y, X, Y, X, Y, X],
+        [[0, 0, 0], [0.1, 0, 0], [0, 0, 0], [0.4, 0, 0], [0, 0, 0], [0.32, 0, 0], [0, 0, 0], [0.18, 0, 0]],
+    ),
+    "panda": synthetic(
+        [Z, Y, Z, -Y, Z, -Y, -Z],
+        [[0, 0, 0.33], [0, 0, 0], [0, 0, 0.32], [0.08, 0, 0], [-0.08, 0, 0.38], [0, 0, 0], [0.09, 0, 0],
+         [0, 0, -0.2]],
+    ),
+    "ur5": synthetic(
+        [Z, Y, Y, Y, -Z, Y],
+        [[0, 0, 0.089], [0, 0.136, 0], [0.425, -0.12, 0], [0.392, 0, 0], [0, 0.093, 0], [0, 0, -0.095],
+         [0, 0.082, 0]],
+    ),
+    # A leaning base, an elbow that turns the other way, a wrist whose axes are not perpendicular.
+    "skew": synthetic(
+        [Z + 0.3 * Y, Y, -Y, Y, X + 0.3 * Z, Z + 0.4 * Y],
+        [[0, 0, 0.2], [0, 0.1, 0], [0.4, 0.1, 0], [0.3, 0, 0.1], [0, 0.1, 0], [0, 0, 0], [0.1, 0, 0]],
+    ),
+    "six": synthetic(
+        [Z, Y, Y, X, Y, X],
+        [[0, 0, 0.3], [0, 0, 0], [0.4, 0, 0], [0.35, 0, 0.03], [0, 0, 0], [0, 0, 0], [0.1, 0, 0]],
+    ),
+}  # fmt: skip
+
+
+def least_singular_value(arm: Arm, q: np.ndarray, locked: int | None) -> float:
+    """How far the free joints are from a singular pose."""
+    rotation, position, twists = np.eye(3), arm.P[0], []
+    for k, axis in enumerate(arm.H):
+        turned = rotation @ axis
+        twists.append(np.concatenate([np.cross(turned, -position), turned]))
+        rotation = rotation @ rotation_about(axis, q[k])
+        position = position + rotation @ arm.P[k + 1]
+    J = np.array(twists)
+    J[:, :3] += np.cross(J[:, 3:], position)
+    return float(np.linalg.svd(J if locked is None else np.delete(J, locked, axis=0))[1][-1])
+
+
+def found(ik: CompiledIK, q: np.ndarray) -> bool:
+    phi = 0.0 if ik.locked is None else float(q[ik.locked])
+    solutions = solve_at(ik, ik.arm.tool_pose(q), phi)
+    return bool(distance(solutions.q[solutions.inside], q).min(initial=np.inf) < 1e-5)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.sampled_from(list(ARMS)), st.integers(4, 6), st.integers(0, 2**32 - 1))
+def test_recall(name, digits, seed):
+    """Every random configuration is found, but for those that rounding makes singular."""
+    rng = np.random.default_rng(seed)
+    arm = rounded(ARMS[name], digits, rng)
+    ik = CompiledIK(arm, 1)
+    assert ik.complete
+    for q in rng.uniform(arm.lower, arm.upper, (40, arm.dof)):
+        assert found(ik, q) or least_singular_value(arm, q, ik.locked) < 100 * 10.0**-digits
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.sampled_from(list(ARMS)), st.integers(3, 6), st.integers(0, 2**32 - 1))
+def test_every_solution_reaches_the_pose(name, digits, seed):
+    rng = np.random.default_rng(seed)
+    arm = rounded(ARMS[name], digits, rng)
+    ik = CompiledIK(arm, 4)
+    for T in arm.tool_pose(rng.uniform(arm.lower, arm.upper, (20, arm.dof))):
+        solutions = ik.solve(T)
+        position, rotation = pose_error(arm.tool_pose(solutions.q), T)
+        assert max(position.max(initial=0.0), rotation.max(initial=0.0)) < 2e-9
+        within = (solutions.q >= arm.lower) & (solutions.q <= arm.upper)
+        np.testing.assert_array_equal(within.all(axis=1), solutions.inside)
+        if ik.locked is not None:
+            np.testing.assert_allclose(solutions.q[:, ik.locked], ik.phi[solutions.sample], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_same_poses_are_in_reach_as_of_the_exact_arm(name):
+    """But for those within the rounding of the limit of the reach, of which there is hardly any."""
+    rng = np.random.default_rng(0)
+    exact = ARMS[name]
+    arm = rounded(exact, 6, rng)
+    one, other = CompiledIK(exact, 4), CompiledIK(arm, 4)
+    assert one.locked == other.locked
+    differ = reached = 0
+    # Half of the poses are of arms with joints beyond their limits, and half of those further out.
+    for q in rng.uniform(1.5 * exact.lower, 1.5 * exact.upper, (300, exact.dof)):
+        T = exact.tool_pose(q)
+        T[:3, 3] *= rng.uniform(0.8, 1.4)
+        a, b = one.solve(T), other.solve(T)
+        reached += len(a.q) > 0
+        differ += (len(a.q) > 0, a.inside.any()) != (len(b.q) > 0, b.inside.any())
+    assert 60 < reached < 295
+    assert differ <= 1
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_at_the_limit_of_the_reach(name):
+    """A straight arm, moved back by less than the rounding and by a little more: both branches are there."""
+    rng = np.random.default_rng(1)
+    arm = rounded(ARMS[name], 6, rng)
+    ik = CompiledIK(arm, 1)
+    elbow = {"pr2": 3, "panda": 3, "ur5": 2, "skew": 2, "six": 2}[name]
+    for bend in (1e-4, 1e-3, 1e-2):
+        hits = 0
+        for q in rng.uniform(-1.5, 1.5, (30, arm.dof)):
+            q[elbow] = bend * rng.choice([-1, 1])
+            T = arm.tool_pose(q)
+            solutions = solve_at(ik, T, 0.0 if ik.locked is None else float(q[ik.locked]))
+            hits += len(solutions.q) > 0
+        assert hits == 30
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_an_answer_does_not_depend_on_what_is_left_out(name):
+    """Branches outside the limits are left out early; those that remain are the same, bit for bit."""
+    rng = np.random.default_rng(2)
+    arm = rounded(ARMS[name], 4, rng)
+    arm.lower, arm.upper = np.full(arm.dof, -1.8), np.full(arm.dof, 1.8)
+    ik = CompiledIK(arm, 1)
+    shape = (branch_count(ik.chain), arm.dof)
+    for T in arm.tool_pose(rng.uniform(-1.9, 1.9, (300, arm.dof))):
+        answers = []
+        for inside_only in (False, True):
+            q, exists, inside = (
+                np.empty(shape),
+                np.empty(shape[0], dtype=bool),
+                np.empty(shape[0], dtype=bool),
+            )
+            branches_at(ik.chain, 0, T, inside_only, q, exists, inside, new_memory(arm.dof))
+            answers.append((q[inside], inside))
+        np.testing.assert_array_equal(answers[0][1], answers[1][1])
+        np.testing.assert_array_equal(answers[0][0], answers[1][0])
+
+
+def test_xarm7_against_ssik():
+    """Its URDF gives a quarter turn as 1.5708."""
+    robot = next(robot for robot in CATALOGUE if robot.name == "xarm7")
+    path = resolve(robot.urdf, Path())
+    assert path
+    model = RobotModel(path)
+    bare = Hand("bare", (), (), {}, 0.0, 0.1, 0.0, 0.01)
+    arm = Arm("xarm7", Robot("xarm7", model, np.eye(4), model.default_values()), "link_eef", bare)
+    ik = CompiledIK(arm, 1)
+    other = ssik.Manipulator.from_urdf(path, base="link_base", ee="link_eef")
+    rng = np.random.default_rng(3)
+    lower, upper = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
+    checked = 0
+    for q in rng.uniform(lower, upper, (300, arm.dof)):
+        assert found(ik, q)
+    for q in rng.uniform(lower, upper, (20, arm.dof)):
+        T = arm.tool_pose(q)
+        for theirs in other.solve(T):
+            solutions = solve_at(ik, T, float(np.asarray(theirs.q)[ik.locked]))
+            assert distance(solutions.q, np.asarray(theirs.q)).min(initial=np.inf) < 1e-4
+            checked += 1
+    assert checked > 20
