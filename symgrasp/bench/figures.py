@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-__all__ = ["Figure", "report"]
+__all__ = ["Figure", "report", "with_machine"]
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,17 @@ class Figure:
 
 def report(figures: Sequence[Figure]) -> dict[str, Any]:
     """Return figures and the machine they were measured on as plain data for JSON."""
-    machine = {
+    return {"machine": _machine(), "figures": [figure.to_dict() for figure in figures]}
+
+
+def with_machine(name: str, rows: Sequence[Any]) -> dict[str, Any]:
+    """Return rows (dataclasses) of that name, and the machine they were measured on, as plain data."""
+    return {"machine": _machine(), name: [asdict(row) for row in rows]}
+
+
+def _machine() -> dict[str, Any]:
+    return {
         "python": platform.python_version(),
         "machine": platform.machine(),
         "cpus": os.cpu_count(),
     }
-    return {"machine": machine, "figures": [figure.to_dict() for figure in figures]}

@@ -1,33 +1,72 @@
-"""``symgrasp bench``: measure maps and planners."""
+"""``symgrasp bench``: measure maps and planners, or the robots of the catalogue."""
 
 from __future__ import annotations
 
 import argparse
 import json
+from typing import Any
 
-from symgrasp.cli.shared import Commands, add_command, add_out, check_out
+from symgrasp.cli.shared import Commands, add_command, add_out, check_out, say, whole, write_out
 
 __all__ = ["add_parser", "run"]
+
+POSES = 20_000
+"""Random configurations of an arm that ``bench ik`` looks for, unless told otherwise."""
 
 
 def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
-    text = "Measure maps and planners against what one would do otherwise."
-    add_out(add_command(commands, "bench", run, text), "write the figures as JSON")
+    text = "Measure maps and planners against what one would do otherwise, or the robots that packages ship."
+    command = add_command(commands, "bench", run, text)
+    choices = ("ik", "robots")
+    text = (
+        "ik: the inverse kinematics of every robot; robots: a map of every robot, checked by another search"
+    )
+    command.add_argument("what", metavar="{ik,robots}", nargs="?", choices=choices, help=text)
+    text = "random configurations that `bench ik` looks for (default: %(default)s)"
+    command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
+    add_out(command, "write the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print every figure as it is measured, and write them if asked to; return the exit status."""
     check_out(args.out)
+    content = {None: _figures, "ik": _ik, "robots": _robots}[args.what](args)
+    if args.out:
+        write_out(args.out, (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode())
+    return 0
 
+
+def _figures(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure maps and planners."""
     from symgrasp import bench
-    from symgrasp.files import write_atomically
 
     figures = []
     for figure in bench.run():
         print(figure.line(), flush=True)
         figures.append(figure)
-    if args.out:
-        with write_atomically(args.out) as file:
-            file.write((json.dumps(bench.report(figures), indent=2, ensure_ascii=False) + "\n").encode())
-    return 0
+    return bench.report(figures)
+
+
+def _ik(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure the inverse kinematics of robots."""
+    from symgrasp.bench import ik
+    from symgrasp.bench.figures import with_machine
+
+    rows = []
+    for row in ik.run(args.poses):
+        say(row.line())
+        rows.append(row)
+    return with_machine("arms", rows)
+
+
+def _robots(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure a map of every robot."""
+    from symgrasp.bench import robots
+    from symgrasp.bench.figures import with_machine
+
+    rows = []
+    for row in robots.run():
+        say(row.line())
+        rows.append(row)
+    return with_machine("robots", rows)

@@ -6,8 +6,9 @@ Locking a joint turns a 7-joint arm into a 6-joint arm. The locked joint's value
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from copy import copy
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -74,6 +75,12 @@ class ArmIK(ABC):
             if not np.isfinite(upper - lower):
                 lower, upper = -np.pi, np.pi
             self.phi = lower + (np.arange(samples) + 0.5) * (upper - lower) / samples
+
+    def at(self, phi: Array) -> Self:
+        """Return the solver of the same arm at other samples (K,) of its redundancy (rad)."""
+        other = copy(self)
+        other.phi = phi
+        return other
 
     @property
     @abstractmethod

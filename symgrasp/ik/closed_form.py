@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from eaik.IK_HP import HPRobot
@@ -58,6 +59,12 @@ class ClosedFormIK(ArmIK):
             if signs[before] * (self.arm.H[before] @ self.arm.H[j]) < OPPOSITE_COSINE:
                 signs[j] = -1.0
         return signs
+
+    def at(self, phi: Array) -> Self:
+        """Return the solver of the same arm at other samples (K,) of its redundancy (rad)."""
+        other = super().at(phi)
+        vars(other).pop("_solvers", None)  # those of the old samples
+        return other
 
     def solve(self, T_base_tool: Array) -> Solutions:
         """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from symgrasp.ik.arm_ik import ArmIK, Solutions, Tolerance
@@ -47,6 +49,12 @@ class CompiledIK(ArmIK):
     def fits(ik: ArmIK) -> bool:
         """Whether an arm is of one of the compiled families, with the joint locked that its solver locks."""
         return chain_geometries(ik.arm, ik.locked, ik.phi) is not None
+
+    def at(self, phi: Array) -> Self:
+        """Return the solver of the same arm at other samples (K,) of its redundancy (rad)."""
+        other = super().at(phi)
+        other.chain = other._pack_chain()
+        return other
 
     def solve(self, T_base_tool: Array) -> Solutions:
         """Return every configuration that reaches a pose (4, 4), at every redundancy sample."""

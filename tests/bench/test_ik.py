@@ -1,0 +1,57 @@
+"""The bench of the inverse kinematics counts what is found, and says what it could not measure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from symgrasp.bench import ik
+from symgrasp.ik import CompiledIK
+from symgrasp.robot.catalogue import CATALOGUE
+
+ROBOTS = {robot.name: robot for robot in CATALOGUE}
+
+
+@pytest.mark.parametrize(
+    ("name", "family"), [("panda", "spherical"), ("xarm7", "spherical, rounded"), ("ur5", "three parallel")]
+)
+def test_every_configuration_of_a_closed_form_is_found(name, family):
+    robot = ROBOTS[name]
+    row = ik.measure(robot, robot.arms[0], 200)
+    assert (row.found, row.poses, row.family, row.problem) == (200, 200, family, "")
+    assert row.microseconds > 0
+    assert "100.000 %" in row.line()
+
+
+def test_what_is_not_found_is_not_counted(monkeypatch):
+    """A solver that loses half of the branches."""
+    robot = ROBOTS["panda"]
+    solve_sample = CompiledIK.solve_sample
+
+    def forgetful(self, T, sample):
+        found = solve_sample(self, T, sample)
+        return type(found)(*(part[found.branch >= 4] for part in found))
+
+    monkeypatch.setattr(CompiledIK, "solve_sample", forgetful)
+    row = ik.measure(robot, robot.arms[0], 100)
+    assert 20 < row.found < 95
+
+
+def test_the_solver_at_other_samples():
+    arm = ik.bare_arm(ROBOTS["pr2"], ROBOTS["pr2"].arms[0])
+    solver = CompiledIK(arm, 4)
+    T = arm.tool_pose(ik.random_configurations(arm, 1, 0)[0])
+    again = solver.at(solver.phi[2:3])
+    for one, other in zip(again.solve(T)[:1], solver.solve_sample(T, 2)[:1], strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert len(solver.phi) == 4
+
+
+def test_problems_are_rows():
+    robot = ROBOTS["panda"]
+    absent = replace(robot, urdf="package://no_such_package/robot.urdf")
+    assert "pip install pybullet" in ik.measure(absent, robot.arms[0], 1).line()
+    so101 = ROBOTS["so101"]
+    assert "not 5" in ik.measure(so101, so101.arms[0], 1).line()
