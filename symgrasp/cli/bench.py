@@ -1,4 +1,4 @@
-"""``symgrasp bench``: measure maps and planners, or the robots of the catalogue."""
+"""``symgrasp bench``: measure maps and planners, or the inverse kinematics of robots."""
 
 from __future__ import annotations
 
@@ -18,11 +18,8 @@ def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
     text = "Measure maps and planners against what one would do otherwise, or the robots that packages ship."
     command = add_command(commands, "bench", run, text)
-    choices = ("ik", "robots")
-    text = (
-        "ik: the inverse kinematics of every robot; robots: a map of every robot, checked by another search"
-    )
-    command.add_argument("what", metavar="{ik,robots}", nargs="?", choices=choices, help=text)
+    text = "measure the inverse kinematics of the robots that packages ship instead"
+    command.add_argument("what", metavar="ik", nargs="?", choices=("ik",), help=text)
     text = "random configurations that `bench ik` looks for (default: %(default)s)"
     command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
     add_out(command, "write the figures as JSON")
@@ -31,13 +28,13 @@ def add_parser(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print every figure as it is measured, and write them if asked to; return the exit status."""
     check_out(args.out)
-    content = {None: _figures, "ik": _ik, "robots": _robots}[args.what](args)
+    content = _ik(args) if args.what == "ik" else _figures()
     if args.out:
         write_out(args.out, (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode())
     return 0
 
 
-def _figures(args: argparse.Namespace) -> dict[str, Any]:
+def _figures() -> dict[str, Any]:
     """Measure maps and planners."""
     from symgrasp import bench
 
@@ -58,15 +55,3 @@ def _ik(args: argparse.Namespace) -> dict[str, Any]:
         say(row.line())
         rows.append(row)
     return with_machine("arms", rows)
-
-
-def _robots(args: argparse.Namespace) -> dict[str, Any]:
-    """Measure a map of every robot."""
-    from symgrasp.bench import robots
-    from symgrasp.bench.figures import with_machine
-
-    rows = []
-    for row in robots.run():
-        say(row.line())
-        rows.append(row)
-    return with_machine("robots", rows)
