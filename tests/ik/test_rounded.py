@@ -91,7 +91,9 @@ def test_every_solution_reaches_the_pose(name, digits, seed):
     for T in arm.tool_pose(rng.uniform(arm.lower, arm.upper, (20, arm.dof))):
         solutions = ik.solve(T)
         position, rotation = pose_error(arm.tool_pose(solutions.q), T)
-        assert max(position.max(initial=0.0), rotation.max(initial=0.0)) < 2e-9
+        # Axes that meet within 1e-8 m count as exact, and are off by about that.
+        most = 2e-9 if ik.chain.joint[9] else 1e-7
+        assert max(position.max(initial=0.0), rotation.max(initial=0.0)) < most
         within = (solutions.q >= arm.lower) & (solutions.q <= arm.upper)
         np.testing.assert_array_equal(within.all(axis=1), solutions.inside)
         if ik.locked is not None:
