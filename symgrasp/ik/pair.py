@@ -92,11 +92,11 @@ VALUES, COEFFICIENTS, ROOTS, QUARTIC, INNER = 0, SAMPLES, SAMPLES + 17, SAMPLES 
 LEAST_COEFFICIENT2 = 1e-24
 """Square of the ratio to the largest below which the leading coefficient of N is rounding."""
 
-NEARLY_REAL = 0.02
+NEARLY_REAL = 0.1
 """Imaginary part (rad) up to which a root is tried as a real one: of two solutions that all but coincide,
 rounding makes a conjugate pair."""
 
-NEARLY_ZERO = 0.02
+NEARLY_ZERO = 0.1
 """Residual up to which a root is tried."""
 
 SAME = 1e-7
