@@ -22,12 +22,13 @@ class Reason(IntEnum):
     UNREACHABLE = 2
     NOT_FOUND = 3
     JOINT_LIMITS = 4
-    SELF_COLLISION = 5
-    OBJECT_COLLISION = 6
-    SCENE_COLLISION = 7
-    ROBOT_COLLISION = 8
-    APPROACH_BLOCKED = 9
-    FEASIBLE = 10
+    OUT_OF_BALANCE = 5
+    SELF_COLLISION = 6
+    OBJECT_COLLISION = 7
+    SCENE_COLLISION = 8
+    ROBOT_COLLISION = 9
+    APPROACH_BLOCKED = 10
+    FEASIBLE = 11
 
     @property
     def label(self) -> str:
@@ -51,6 +52,7 @@ _LABELS = {
     Reason.UNREACHABLE: "out of reach",
     Reason.NOT_FOUND: "not found",
     Reason.JOINT_LIMITS: "joint limits",
+    Reason.OUT_OF_BALANCE: "out of balance",
     Reason.SELF_COLLISION: "hits itself",
     Reason.OBJECT_COLLISION: "hits the object",
     Reason.SCENE_COLLISION: "hits an obstacle",
@@ -65,6 +67,7 @@ _COLORS = {
     Reason.UNREACHABLE: "#d4d4d4",
     Reason.NOT_FOUND: "#c3a596",
     Reason.JOINT_LIMITS: "#b9a7d6",
+    Reason.OUT_OF_BALANCE: "#e7298a",
     Reason.SELF_COLLISION: "#6a3d9a",
     Reason.OBJECT_COLLISION: "#2171b5",
     Reason.SCENE_COLLISION: "#cb3b2c",

@@ -29,7 +29,8 @@ __all__ = [
 ]
 
 MapKey = tuple[str, str, bytes]
-"""All that a map depends on: hash of the scene without tasks, name of the arm, bytes of the object's pose."""
+"""All that a map depends on: hash of the scene without tasks (and who shares the load), name of the arm,
+bytes of the object's pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,10 @@ class MapRequest:
     @cached
     def key(self) -> MapKey:
         """The key of the map, without the task's name and the scene's other tasks."""
-        return self.scene.map_sha256, self.arm, self.T_world_object.tobytes()
+        content = self.scene.map_sha256
+        if self.scene.object_mass:  # how the load is shared depends on who holds the object
+            content += " " + " ".join(self.scene.task(self.task).arms)
+        return content, self.arm, self.T_world_object.tobytes()
 
     def __eq__(self, other: object) -> bool:
         """Return whether the other is a request for the same map and task name."""

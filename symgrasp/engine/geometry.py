@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symgrasp.engine.balance import balance_of
 from symgrasp.engine.kinematics import MovingPieces
 from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
+from symgrasp.engine.search_types import Balance
 from symgrasp.engine.tree import Tree, build
 from symgrasp.object.profile import COLLISION_FACETS
 from symgrasp.poses import Array, inverse
@@ -36,6 +38,7 @@ class ArmGeometry(NamedTuple):
         pairs: the two links of each pair of the robot's own pieces, in the order of `mark_near`.
         moving_links: names of the links that the arm moves.
         tool_links: those of them that are fixed to the tool, fingers included.
+        balance: what decides whether the robot stands.
     """
 
     names: list[BodyName]
@@ -46,6 +49,7 @@ class ArmGeometry(NamedTuple):
     pairs: list[frozenset[str]]
     moving_links: frozenset[str]
     tool_links: frozenset[str]
+    balance: Balance
 
 
 class _Placed(NamedTuple):
@@ -138,6 +142,7 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
         ],
         moving_links=frozenset(links[:moving_count]),
         tool_links=frozenset(links[:tool_count]),
+        balance=balance_of(arm, joints, openings),
     )
 
 

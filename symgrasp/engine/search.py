@@ -16,6 +16,7 @@ import numpy as np
 from numba import prange
 
 from symgrasp.compiling import njit
+from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm, check_row
 from symgrasp.engine.kinematics import MovingPieces, new_scratch, place_arm, place_hand
 from symgrasp.engine.pieces import PackedPieces
@@ -26,8 +27,10 @@ from symgrasp.engine.search_types import (
     HIT,
     LIMITS,
     RETREAT_UNDECIDED,
+    UNBALANCED,
     UNDECIDED_KEPT,
     UNREACHABLE,
+    Balance,
     BranchScratch,
     RowChecks,
     SearchInput,
@@ -44,8 +47,10 @@ __all__ = [
     "FEASIBLE",
     "HIT",
     "LIMITS",
+    "UNBALANCED",
     "UNDECIDED_KEPT",
     "UNREACHABLE",
+    "Balance",
     "SearchInput",
     "SearchResult",
     "search",
@@ -59,6 +64,7 @@ def search(
     tree: Tree,
     pose: Array,
     inputs: SearchInput,
+    balance: Balance,
     joints: int,
 ) -> SearchResult:
     """Search cells on all cores.
@@ -70,6 +76,7 @@ def search(
         tree: the boxes of the static pieces.
         pose: (P, 12) poses of all pieces; those of moving ones do not matter.
         inputs: the cells and what applies to all of them.
+        balance: what decides whether the robot stands.
         joints: number n of joints.
     """
     m = len(inputs.T_base_tool)
@@ -85,12 +92,12 @@ def search(
         undecided_solution=np.empty((m, UNDECIDED_KEPT, 2), dtype=np.int16),
     )
     # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
-    _search(chain, moving, pieces, tree, pose, inputs, result)
+    _search(chain, moving, pieces, tree, pose, inputs, balance, result)
     return result
 
 
 @njit(cache=True, error_model="numpy", parallel=True, nogil=True)
-def _search(chain, moving, pieces, tree, pose, inputs, result):
+def _search(chain, moving, pieces, tree, pose, inputs, balance, result):
     m, n = len(inputs.T_base_tool), chain.limits.shape[1]
     runs, steps = len(inputs.row), 1 + len(inputs.retreat)
     rows = RowChecks(
@@ -113,7 +120,7 @@ def _search(chain, moving, pieces, tree, pose, inputs, result):
         )
         # Interleaved, so that every chunk has its share of easy and of hard cells.
         for cell in range(chunk, m, inputs.chunks):
-            _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, rows, cell, result)
+            _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance, rows, cell, result)
 
 
 @njit(**STRICT)
@@ -129,7 +136,7 @@ def _check_rows(moving, pieces, scratch, inputs, run, length, T, rows):
 
 
 @njit(**STRICT)
-def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, rows, cell, result):
+def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance, rows, cell, result):
     """Search one cell and write its result."""
     T = inputs.T_base_tool[cell]
     run = cell * len(inputs.row) // len(inputs.T_base_tool)
@@ -142,6 +149,12 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, rows, c
         for b in range(len(inside)):
             if not inside[b]:
                 continue
+            if len(balance.edges):
+                place_arm(moving, pieces, scratch, q[b])
+                if not stands(balance, scratch.frames, inputs.T_world_base, T, inputs.row[run]):
+                    if math.isnan(hand):
+                        result.status[cell] = UNBALANCED
+                    continue
             if math.isnan(hand):
                 result.status[cell] = HIT
                 hand = tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, 0, T)
@@ -181,7 +194,11 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, rows, c
     if best > -math.inf:
         result.status[cell] = FEASIBLE
         result.clearance[cell] = max(0.0, best - FREE_BAND)
-    elif math.isnan(hand) and elbow_reaches and _reaches(chain, T, q, exists, inside, branches.memory):
+    elif (
+        result.status[cell] == UNREACHABLE
+        and elbow_reaches
+        and _reaches(chain, T, q, exists, inside, branches.memory)
+    ):
         result.status[cell] = LIMITS
 
 

@@ -15,8 +15,10 @@ __all__ = [
     "HIT",
     "LIMITS",
     "RETREAT_UNDECIDED",
+    "UNBALANCED",
     "UNDECIDED_KEPT",
     "UNREACHABLE",
+    "Balance",
     "BranchScratch",
     "RowChecks",
     "SearchInput",
@@ -27,9 +29,28 @@ UNDECIDED_KEPT = 32
 """Largest number of undecided candidates of a cell that are listed; where there are more, all candidates
 have to be decided."""
 
-UNREACHABLE, LIMITS, HIT, BLOCKED, RETREAT_UNDECIDED, FEASIBLE = 0, 1, 2, 3, 4, 5
-"""Status of a cell: no branch reaches it, none inside the limits, all collide, all are blocked on the
-retreat, or one is feasible. RETREAT_UNDECIDED is that of a single candidate which PyBullet must decide."""
+UNREACHABLE, LIMITS, UNBALANCED, HIT, BLOCKED, RETREAT_UNDECIDED, FEASIBLE = 0, 1, 2, 3, 4, 5, 6
+"""Status of a cell: no branch reaches it, none inside the limits, with all of them the robot falls, all
+collide, all are blocked on the retreat, or one is feasible. RETREAT_UNDECIDED is that of a single candidate
+which PyBullet must decide."""
+
+
+class Balance(NamedTuple):
+    """What decides whether a robot stands. Weights are rows: mass (kg), then mass times point (3).
+
+    Attributes:
+        edges: (k, 3) of its support, see `symgrasp.scene.balance.support_edges`; none if it cannot fall.
+        fixed: (4,) weight of the links that the arm does not move, in the world.
+        joints: (n, 4) weights of those between base and tool that each joint moves last, in its frame.
+        hand: (rows, 4) weight of those that are fixed to the tool, in its frame, at the opening of each row.
+        load: (rows, 4) weight of what it holds in each row, in the world.
+    """
+
+    edges: Array
+    fixed: Array
+    joints: Array
+    hand: Array
+    load: Array
 
 
 class SearchInput(NamedTuple):

@@ -52,7 +52,7 @@ def create_map_reference(
     world.margin = settings.margin
     world.set_arms(())  # a map that was cancelled in this world may have left an arm elsewhere
     world.set_object(task.T_world_object)
-    checker = CandidateChecker(world, arm, ik, settings.approach)
+    checker = CandidateChecker(world, arm, ik, settings.approach, holders=task.arms)
     for row, h in enumerate(manifold.h):
         misfit = fit(arm.hand, manifold.profile, float(h))
         if misfit is not None:

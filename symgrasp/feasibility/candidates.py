@@ -6,16 +6,17 @@ limits, free of collision, and free along the straight retreat where the scene a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from symgrasp.ik import Solver
 from symgrasp.ik.retreat import RETREAT_TURN, retreat_distances, retreated
-from symgrasp.poses import Array
+from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
+from symgrasp.scene.balance import load_of_hand, support_margin
 from symgrasp.world import BulletWorld, Collision, NearBodies
 
 __all__ = ["Candidate", "CandidateChecker", "CheckResult"]
@@ -67,6 +68,8 @@ class CandidateChecker:
         approach: length (m) of the straight retreat against the approach that must be free too.
         near: returns the bodies that may collide at joint values (n,) that reach a tool pose (4, 4) in
             the frame of the robot's base; only those are checked. All bodies are checked if None.
+        holders: names of all arms that hold the object, of which each bears a part; the arm alone if it is
+            not among them.
     """
 
     def __init__(
@@ -76,8 +79,10 @@ class CandidateChecker:
         ik: Solver,
         approach: float,
         near: Callable[[Array, Array], NearBodies] | None = None,
+        holders: Sequence[str] = (),
     ) -> None:
         self.world, self.arm, self.ik, self._near = world, arm, ik, near
+        self._holders = holders
         self._retreat = retreat_distances(approach).tolist()
 
     def candidates(self, T_base_tool: Array, opening: float) -> Iterator[Candidate]:
@@ -96,7 +101,7 @@ class CandidateChecker:
             yield Candidate(q, float(self.ik.phi[sample]), sample, branch, reason, collision)
 
     def check(self, T_base_tool: Array, q: Array, sample: int, opening: float) -> CheckResult:
-        """Check a candidate inside the joint limits for collisions, at the grasp and along the retreat.
+        """Check a candidate inside the limits: balance at the grasp, collisions there and along the retreat.
 
         Args:
             T_base_tool: tool pose (4, 4) in the frame of the robot's base.
@@ -104,6 +109,8 @@ class CandidateChecker:
             sample: their redundancy sample, which the retreat keeps.
             opening: opening (m) of the hand.
         """
+        if self.support_margin(T_base_tool, q, opening) < 0:
+            return CheckResult(Reason.OUT_OF_BALANCE, None, 0.0, q)
         collision = self._collision(T_base_tool, q, opening)
         if collision:
             return CheckResult(collision.reason, collision, 0.0, q)
@@ -117,6 +124,15 @@ class CandidateChecker:
             if collision:
                 return CheckResult(Reason.APPROACH_BLOCKED, collision, distance, q)
         return CheckResult(Reason.FEASIBLE, None, self._retreat[-1] if self._retreat else 0.0, q)
+
+    def support_margin(self, T_base_tool: Array, q: Array, opening: float) -> float:
+        """Return how far (m) the robot's centre of mass is inside its support; inf where it cannot fall."""
+        scene, robot, T = self.world.scene, self.arm.robot, self.world.object_pose
+        if robot.support is None:
+            return np.inf
+        height = float((inverse(T) @ robot.T_world_base @ T_base_tool)[2, 3])
+        load = load_of_hand(scene, self.arm, self._holders, T, height)
+        return support_margin(robot, self.arm.robot_values(q, opening), [load])
 
     def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
         self.world.set_arm(self.arm, q, opening)

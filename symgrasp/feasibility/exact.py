@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from symgrasp.engine import search
+from symgrasp.engine.balance import loaded
 from symgrasp.engine.boxes import box_of
 from symgrasp.engine.broad_phase import mark_near
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
@@ -33,6 +34,7 @@ from symgrasp.poses import Array, axis_frame, inverse
 from symgrasp.progress import Progress
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
+from symgrasp.scene.balance import load_of_hand
 from symgrasp.scene.parts import Task
 from symgrasp.world import BodyName, BulletWorld, Collision, NearBodies
 
@@ -81,6 +83,7 @@ class ExactEngine:
         # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.pairs_within(arm, self._reach)
+        self._balance, self._holders = self._geometry.balance, (arm.name,)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
     @staticmethod
@@ -109,6 +112,11 @@ class ExactEngine:
         if not np.array_equal(grid.h, self.manifold.h):
             raise ValueError("the exact engine was built for a grid with other heights")
         self._place_object(task.T_world_object)
+        self._holders = task.arms
+        loads = [
+            load_of_hand(self.world.scene, self.arm, task.arms, task.T_world_object, float(h)) for h in grid.h
+        ]
+        self._balance = loaded(self._geometry.balance, loads)
         draft = MapDraft(self.arm, grid, self._opening, self.ik)
         for row, misfit in enumerate(self._misfit):
             if misfit is not None:
@@ -212,6 +220,7 @@ class ExactEngine:
                 self._geometry.tree,
                 self._scratch.pose,
                 inputs,
+                self._balance,
                 self.arm.dof,
             )
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.manifold.angles)).reshape(3, -1)
@@ -240,7 +249,9 @@ class ExactEngine:
     ) -> None:
         """Let PyBullet check the candidates of an open cell, against the bodies near enough to collide."""
         near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
-        checker = CandidateChecker(self.world, self.arm, self.ik, self._settings.approach, near)
+        checker = CandidateChecker(
+            self.world, self.arm, self.ik, self._settings.approach, near, self._holders
+        )
         before: Collision | None = None
         for q, sample, branch in listed:
             reason, collision, *_ = checker.check(T_base_tool, q, sample, float(self._opening[cell[1]]))

@@ -76,6 +76,8 @@ class CandidateResult:
         retreat: how far (m) from the grasp the retreat ended, the whole length if FEASIBLE.
         failure: why the arm could not follow the retreat, None where it could.
         ended: (n,) joint values where it ended: those of the collisions.
+        imbalance: how far (m) the centre of mass is outside of the robot's support at least; for
+            OUT_OF_BALANCE, else 0.
         clearance: distance (m) at the grasp of all pairs that are checked at least, at most
             `CLEARANCE_LIMIT`; for FEASIBLE, else None.
     """
@@ -91,6 +93,7 @@ class CandidateResult:
     failure: RetreatFailure | None
     ended: Array
     clearance: float | None
+    imbalance: float = 0.0
 
     @property
     def why(self) -> str:
@@ -101,6 +104,8 @@ class CandidateResult:
         parts = [str(joint) for joint in self.violations]
         parts += [f"{c.a} and {c.b} {1e3 * c.depth:.1f} mm too close" for c in self.collisions]
         parts += [str(self.failure)] if self.failure else []
+        if self.imbalance:
+            parts.append(f"centre of mass {1e3 * self.imbalance:.1f} mm outside of the support")
         text = ", ".join(parts)
         return (
             f"after {1e3 * self.retreat:.0f} mm: {text}" if self.reason == Reason.APPROACH_BLOCKED else text
@@ -112,7 +117,7 @@ class CandidateResult:
             (c.depth for c in self.collisions if c.reason == self.collisions[0].reason), default=0.0
         )
         excess = max((joint.excess for joint in self.violations), default=0.0)
-        return (-self.reason, -self.retreat, deepest, excess, -(self.clearance or 0.0))
+        return (-self.reason, -self.retreat, deepest, excess, self.imbalance, -(self.clearance or 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +198,7 @@ def explain_cell(
             world.margin = world.scene.settings.margin
             world.set_arms(())
             world.set_object(task.T_world_object)
-            checker = CandidateChecker(world, arm, ik, world.scene.settings.approach)
+            checker = CandidateChecker(world, arm, ik, world.scene.settings.approach, holders=task.arms)
             candidates = sorted(_results(checker, T_base_tool, opening, progress), key=CandidateResult._rank)
         reason = candidates[0].reason if candidates else without_candidates(ik)
     if progress and not candidates:
@@ -238,8 +243,10 @@ def _checked(
     """Check a candidate inside the limits, and measure all its collisions or its clearance."""
     world, arm = checker.world, checker.arm
     check = checker.check(T_base_tool, q, sample, opening)
-    collisions, failure, clearance = (), None, None
-    if check.collision:
+    collisions, failure, clearance, imbalance = (), None, None, 0.0
+    if check.reason == Reason.OUT_OF_BALANCE:
+        imbalance = -checker.support_margin(T_base_tool, q, opening)
+    elif check.collision:
         world.set_arm(arm, check.q, opening)
         collisions = tuple(world.arm_collisions(arm))
     elif check.reason == Reason.APPROACH_BLOCKED:
@@ -259,6 +266,7 @@ def _checked(
         failure=failure,
         ended=check.q,
         clearance=clearance,
+        imbalance=imbalance,
     )
 
 

@@ -60,6 +60,7 @@ def record_search(
 
     status = found.status
     draft.reason[cells] = np.where(status == search.LIMITS, Reason.JOINT_LIMITS, draft.no_candidate)
+    draft.reason[those(status == search.UNBALANCED)] = Reason.OUT_OF_BALANCE
     feasible = status == search.FEASIBLE
     sample, branch = found.solution[feasible].T
     draft.record_feasible(those(feasible), found.q[feasible], sample, branch, found.clearance[feasible])

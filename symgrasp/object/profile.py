@@ -132,6 +132,14 @@ class Profile:
             raise ProfileError("profile", "height", worst, f"within [{self.h_min:g}, {self.h_max:g}] m")
         return np.asarray(np.interp(h, self._points[:, 0], self._points[:, 1]))
 
+    @property
+    def centre_of_mass(self) -> float:
+        """Height (m) of the centre of mass of a body of this outline and of even density."""
+        (bottom, a), (top, b) = self.points[:-1].T, self.points[1:].T
+        volume = (top - bottom) * (a * a + a * b + b * b)
+        moment = bottom * volume + (top - bottom) ** 2 * (a * a + 2 * a * b + 3 * b * b) / 4
+        return float(moment.sum() / volume.sum())
+
     def radius_span(self, low: float, high: float) -> tuple[float, float]:
         """Return the smallest and largest radius (m) between two heights, clipped to the object."""
         low, high = np.clip([low, high], self.h_min, self.h_max)

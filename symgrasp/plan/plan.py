@@ -95,6 +95,10 @@ class PlanTask(_Part):
     delta: Finite = Field(description="turn of the object about its own axis (rad)")
     object_pose_turned: Pose = Field(description="object_pose · Rz(delta)")
     holds: tuple[Hold, ...]
+    balance: dict[str, Finite] = Field(
+        default={},
+        description="robot that could fall → how far (m) its centre of mass is inside of its support",
+    )
 
 
 class Planner(_Part):

@@ -24,6 +24,7 @@ from symgrasp.poses import Array, from_position_quat, inverse, pose_error, rotat
 from symgrasp.progress import Progress, part_of
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
+from symgrasp.scene.balance import support_margins
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world
 
@@ -113,8 +114,9 @@ def verify(plan: Plan | str | Path, progress: Progress | None = None) -> Report:
             for done, (k, task, hold) in enumerate(holds, start=len(plan.tasks)):
                 who = f"tasks[{k}] ({task.name}): {hold.arm}"
                 tell = part_of(progress, done, parts)
+                held = [other.arm for other in task.holds]
                 shares = sum(other.robot == hold.robot for other in task.holds) > 1
-                _check_margins(hold, shares, task.object_pose_turned.array(), who, world, report, tell)
+                _check_margins(hold, shares, held, task.object_pose_turned.array(), who, world, report, tell)
     if progress:
         progress(1.0)
     return report
@@ -227,6 +229,14 @@ def _check_holds(task: PlanTask, where: str, scene: Scene, world: BulletWorld, r
     _check_torsos(configurations, where, report)
     world.set_object(T)
     world.set_arms(configurations)
+    margins = support_margins(scene, T, configurations)
+    names = sorted(task.balance), sorted(margins)
+    report.expect(names[0] == names[1], f"{where}: balance of {names[0]}, not {names[1]}")
+    for robot, margin in margins.items():
+        text = f"{where}: {robot}: the centre of mass is {1e3 * margin:.3f} mm inside of the support"
+        report.expect(margin >= 0, text)
+        stated = task.balance.get(robot, margin)
+        report.expect(stated <= margin + TOLERANCE, f"{text}, not {1e3 * stated:.3f} mm")
     arms = [arm for arm, *_ in configurations]
     for c in world.collisions(arms):
         report.expect(False, f"{where}: {c.a} and {c.b} are {1e3 * c.depth:.2f} mm too close")
@@ -293,6 +303,7 @@ def _tool_of(arm: Arm, T: Array, h: float, theta: float, flipped: bool, radius: 
 def _check_margins(
     hold: Hold,
     shares: bool,
+    holders: Sequence[str],
     T: Array,
     who: str,
     world: BulletWorld,
@@ -311,7 +322,7 @@ def _check_margins(
         if not report.expect(torso, f"{who}: the torso is at none of the values that maps try"):
             return
     ik = over_torso(arm, lambda alone: independent_solver(alone, scene.settings.redundancy), torso)
-    checker = CandidateChecker(world, arm, ik, scene.settings.approach)
+    checker = CandidateChecker(world, arm, ik, scene.settings.approach, holders=holders)
     for name in scene.robots:
         world.park(name)
     margins = (

@@ -13,6 +13,7 @@ from symgrasp.object.manifold import ROLLS, grasp_to_tool
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold, Plan, Planner, PlanTask, Pose, SceneRecord
 from symgrasp.poses import rotation_z
 from symgrasp.robot.configuration import ArmConfiguration
+from symgrasp.scene.balance import support_margins
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
@@ -74,6 +75,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
         delta=delta,
         object_pose_turned=Pose.of(turned),
         holds=tuple(entries),
+        balance=support_margins(world.scene, turned, [h.configuration for h in held]),
     )
 
 

@@ -16,6 +16,7 @@ from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.configuration import ArmConfiguration
 from symgrasp.robot.robot import Arm
+from symgrasp.scene.balance import support_margins
 from symgrasp.world import BulletWorld
 
 __all__ = ["ConfigurationFinder", "witnesses"]
@@ -95,11 +96,12 @@ class ConfigurationFinder:
         return None
 
     def are_free_together(self, configurations: Sequence[ArmConfiguration]) -> bool:
-        """Return whether nothing collides when every arm takes its configuration."""
+        """Return whether nothing collides and no robot falls when every arm takes its configuration."""
         self.body_checks += 1
         self.world.set_object(self.maps[0].T_world_object)
         self.world.set_arms(configurations)
-        return not self.world.collisions(self.arms)
+        margins = support_margins(self.world.scene, self.maps[0].T_world_object, configurations)
+        return min(margins.values(), default=0.0) >= 0 and not self.world.collisions(self.arms)
 
     def _feasible(self, k: int, cell: Cell, torso: int | None) -> list[ArmConfiguration]:
         """Return every feasible configuration of an arm at a cell, the other robots at home."""
@@ -118,4 +120,5 @@ class ConfigurationFinder:
         settings = self.world.scene.settings
         arm = self.arms[k]
         ik = solver_for(arm, settings.redundancy, None if torso is None else [torso])
-        return CandidateChecker(self.world, arm, ik, settings.approach)
+        holders = [own.name for own in self.arms]
+        return CandidateChecker(self.world, arm, ik, settings.approach, holders=holders)

@@ -16,6 +16,7 @@ from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
 from symgrasp.robot.joint import Joint, joint_motion
+from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
 
 __all__ = ["RobotModel"]
@@ -65,6 +66,7 @@ class RobotModel:
             link.name: tuple(link_shape(self.path, link.name, shape) for shape in link.collisions)
             for link in urdf.robot.links
         }
+        inertials = {link.name: link_mass(self.path, link) for link in urdf.robot.links}
         self.sha256 = self._content_sha256()
         self._hulls: dict[str, tuple[tuple[Array, ...], ...]] = {}
         self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
@@ -72,6 +74,8 @@ class RobotModel:
         self._unusable_limits: dict[str, tuple[float, float] | None] = {}  # as the URDF states them
         self.joints, self.link_names = self._build_tree(urdf, root)
         self._above = {joint.child: joint for joint in self.joints}
+        mass, centre = zip(*(inertials[link] for link in self.link_names), strict=True)
+        self._masses = np.array(mass), np.array(centre)
         by_name = {joint.name: joint for joint in self.joints}
         self.lower = np.array([by_name[name].lower for name in self.joint_names])
         self.upper = np.array([by_name[name].upper for name in self.joint_names])
@@ -226,6 +230,10 @@ class RobotModel:
                 pose = pose @ joint_motion(joint, joint.ratio * q[..., joint.source] + joint.offset)
             poses[..., joint.child, :, :] = pose
         return poses
+
+    def masses(self) -> tuple[Array, Array]:
+        """Return the masses (links,) (kg), and the centres of mass (links, 3) in the link frames."""
+        return self._masses
 
     def chain(self, link: str) -> list[Joint]:
         """Return the joints on the path from the root to a link, fixed ones included."""

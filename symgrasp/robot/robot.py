@@ -31,6 +31,8 @@ class Robot:
         T_world_base: pose (4, 4) of the root link.
         home: parked joint values (n,) of ``model.joint_names``.
         torso: the joints before the arms that maps sample; None where they stay at home.
+        support: corners (k, 2) in the world, counterclockwise, of the convex area that its centre of mass
+            must stay above; None where it cannot fall.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Robot:
     T_world_base: Array
     home: Array
     torso: Torso | None = None
+    support: Array | None = None
 
     def at(self, sample: int) -> Robot:
         """Return the robot whose torso rests at a sample."""

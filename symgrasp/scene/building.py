@@ -113,7 +113,7 @@ class SceneBuilder:
                 o = o.model_copy(update={kind: reference})
             obstacles.append(o)
         knots = [tuple(p) for p in profile.points.tolist()]
-        object_file = ObjectFile(name=self.file.object.name, profile=knots)
+        object_file = ObjectFile(name=self.file.object.name, profile=knots, mass=self.file.object.mass)
         update = {"robots": robots, "obstacles": tuple(obstacles), "object": object_file}
         return self.file.model_copy(update=update)
 

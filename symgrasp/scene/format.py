@@ -149,6 +149,8 @@ class RobotFile(_Strict):
 
     ``torso`` names joints between base and arms, such as a lift, with the number of values that maps try
     for each: the centres of so many equal parts of its range. All arms of the robot move with them.
+    ``support`` is what a legged robot stands on: corners [x, y] (m) in the robot's base frame, or the links
+    that are its feet. Its centre of mass, with what it holds, must stay above their convex hull.
     """
 
     name: Name
@@ -161,6 +163,11 @@ class RobotFile(_Strict):
     arms: Annotated[tuple[ArmFile, ...], Field(min_length=1, max_length=MOST_ARMS)] | None = None
     home: tuple[Number, ...] | dict[str, Number] | None = None
     torso: Annotated[dict[str, Samples], Field(min_length=1)] | None = None
+    support: (
+        Annotated[tuple[tuple[Number, Number], ...], Field(min_length=3, max_length=100)]
+        | Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
+        | None
+    ) = None
 
     @model_validator(mode="after")
     def _tool_or_arms(self) -> RobotFile:
@@ -184,7 +191,8 @@ class ObjectFile(_Strict):
 
     A profile is a list of knots [height, radius] in metres, bottom to top. A mesh is measured;
     ``scale`` is metres in one of its units, ``tolerance`` the largest deviation (m) from symmetry, and
-    ``flip`` stands the object on its other end.
+    ``flip`` stands the object on its other end. ``mass`` (kg), spread evenly, is a load for robots that could
+    fall; hands that hold the object together bear equal parts of it.
     """
 
     name: Name
@@ -194,6 +202,7 @@ class ObjectFile(_Strict):
     library: str | None = None
     mesh: str | None = None
     scale: Positive = 1.0
+    mass: NotNegative | None = None
     tolerance: Positive | None = None
     flip: StrictBool | None = None  # not False, which would be written into every scene and change its hash
 

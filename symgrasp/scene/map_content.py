@@ -19,6 +19,7 @@ def map_content(
     arms: Mapping[str, Arm],
     object_name: str,
     profile: Profile,
+    mass: float,
     obstacles: Sequence[Obstacle],
     settings: MapSettings,
 ) -> dict[str, Any]:
@@ -32,6 +33,7 @@ def map_content(
         arms: name → arm, over all robots.
         object_name: what the object is called.
         profile: its r(h).
+        mass: its mass (kg).
         obstacles: the fixed bodies.
         settings: how finely maps are computed, and the distances that must be kept.
 
@@ -41,7 +43,7 @@ def map_content(
     return {
         "robots": [_robot(robot) for robot in robots.values()],
         "arms": [_arm(arm) for arm in arms.values()],
-        "object": {"name": object_name, "profile": profile.points.tolist()},
+        "object": {"name": object_name, "profile": profile.points.tolist(), "mass": mass},
         "obstacles": [_obstacle(obstacle) for obstacle in obstacles],
         "map": settings.model_dump(),
     }
@@ -53,6 +55,7 @@ def _robot(robot: Robot) -> dict[str, Any]:
         "model": robot.model.sha256,
         "base": robot.T_world_base.tolist(),
         "home": robot.home.tolist(),
+        "support": None if robot.support is None else robot.support.tolist(),
         "torso": robot.torso and {"joints": robot.torso.joint_names, "values": robot.torso.values.tolist()},
     }
 

@@ -14,6 +14,7 @@ from symgrasp.robot.assembly import Mount
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
+from symgrasp.robot.support import area_of_corners, area_of_feet
 from symgrasp.robot.torso import Torso
 from symgrasp.scene.format import ArmFile, RobotFile
 
@@ -83,7 +84,9 @@ class RobotBuilder:
                 files = (*files[:k], a.model_copy(update={"joints": ends}), *files[k + 1 :])
                 notes.append(f"{a.name}: joints: [{', '.join(ends)}]; {', '.join(resting)} rest at home")
         home = self._home(f"{field}.home", entry, model, [name for names in joints for name in names], hands)
-        robot = Robot(entry.name, model, entry.base.matrix(), home, torso)
+        base = entry.base.matrix()
+        support = self._support(field, entry, model, home, base)
+        robot = Robot(entry.name, model, base, home, torso, support)
         arms = [
             Arm(a.name, robot, tool, hand, frozenset(chain) - frozenset(names))
             for a, tool, hand, chain, names in zip(files, tools, hands, chains, joints, strict=True)
@@ -142,6 +145,29 @@ class RobotBuilder:
                 expected = "a joint between base and arms: " + one_of(dict.fromkeys(before), name)
                 raise SceneError(self._source, f"{field}.torso", name, expected)
         return Torso.of(model, entry.torso)
+
+    def _support(
+        self, field: str, entry: RobotFile, model: RobotModel, home: Array, T_world_base: Array
+    ) -> Array | None:
+        """Return the corners (k, 2) of what a robot stands on, None where it cannot fall."""
+        if entry.support is None:
+            return None
+        field = f"{field}.support"
+        feet = [part for part in entry.support if isinstance(part, str)]
+        for link in feet:
+            if link not in model.link_names:
+                raise SceneError(self._source, field, link, one_of(model.link_names, link))
+        if not model.masses()[0].any():
+            raise SceneError(self._source, field, list(entry.support), "a URDF with the masses of its links")
+        if feet:
+            area = area_of_feet(feet, model, home, T_world_base)
+        else:
+            corners = [part for part in entry.support if not isinstance(part, str)]
+            area = area_of_corners(corners, T_world_base)
+        if area is None:
+            expected = "corners [x, y] around an area, or links with soles"
+            raise SceneError(self._source, field, list(entry.support), expected)
+        return area
 
     def _joints(
         self, field: str, arm: ArmFile, tool: str, model: RobotModel, shared: frozenset[str], hand: Hand

@@ -141,9 +141,9 @@ class Scene:
         Robots, object, obstacles, map settings, and the files of URDFs and collision meshes as they
         were when the scene was loaded. The scene's name, description and tasks have no part in it.
         """
-        thing = self.file.object.name
+        thing, mass = self.file.object.name, self.object_mass
         return _sha256(
-            map_content(self.robots, self.arms, thing, self.profile, self.obstacles, self.settings)
+            map_content(self.robots, self.arms, thing, self.profile, mass, self.obstacles, self.settings)
         )
 
     @property
@@ -155,6 +155,11 @@ class Scene:
     def settings(self) -> MapSettings:
         """The resolution of the maps, and the retreat and margin that they demand."""
         return self.file.map
+
+    @property
+    def object_mass(self) -> float:
+        """Mass of the object (kg); zero where the file gives none."""
+        return self.file.object.mass or 0.0
 
     @cached_property
     def manifold(self) -> Manifold:

@@ -96,6 +96,11 @@ class BulletWorld:
                 body, pose[:3, 3].tolist(), xyzw(pose), physicsClientId=self._client
             )
 
+    @property
+    def object_pose(self) -> Array:
+        """Pose (4, 4) of the object, with no turn about its axis."""
+        return self._object_pose
+
     def set_arm(self, arm: Arm, q: ArrayLike, opening: float) -> None:
         """Set an arm to q (n,), its hand to an opening (m), and its robot's other joints to home."""
         self._set(arm.robot.name, arm.robot_values(q, opening))

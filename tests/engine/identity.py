@@ -23,9 +23,9 @@ DEPTH_TOLERANCE = 5e-4
 
 
 def assert_same(exact: FeasibilityMap, reference: FeasibilityMap) -> None:
-    """The feasible cells are identical, and so are the reasons up to JOINT_LIMITS."""
+    """The feasible cells are identical, and so are the reasons up to OUT_OF_BALANCE."""
     assert np.array_equal(exact.feasible, reference.feasible)
-    early = (reference.reason <= Reason.JOINT_LIMITS) | (exact.reason <= Reason.JOINT_LIMITS)
+    early = (reference.reason <= Reason.OUT_OF_BALANCE) | (exact.reason <= Reason.OUT_OF_BALANCE)
     assert np.array_equal(exact.reason[early], reference.reason[early])
 
 
@@ -42,7 +42,8 @@ def assert_true(
         cells: the cells to check; all of them if None.
     """
     ik = over_torso(arm, lambda alone: independent_solver(alone, scene.settings.redundancy))
-    checker = CandidateChecker(world, arm, ik, scene.settings.approach)
+    (holders,) = [task.arms for task in scene.tasks.values() if task.name == m.task]
+    checker = CandidateChecker(world, arm, ik, scene.settings.approach, holders=holders)
     tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
     world.margin = scene.settings.margin
     world.set_arms(())

@@ -66,8 +66,13 @@ def random_scene(seed: int, arm: str = "") -> dict[str, Any]:
     return content
 
 
-def random_torso_scene(seed: int) -> dict[str, Any]:
-    """Return a scene like those of `random_scene` with a robot of two arms on a lift and a waist."""
+def random_torso_scene(seed: int, *, falls: bool = False) -> dict[str, Any]:
+    """Return a scene like those of `random_scene` with a robot of two arms on a lift and a waist.
+
+    Args:
+        seed: of everything in it.
+        falls: whether it stands on small feet, and carries a load.
+    """
     content = random_scene(seed, next(iter(ARMS)))
     rng = np.random.default_rng(seed)
     home = [1.03, -1.14, -1.37, -1.58, -0.5, 2.1]
@@ -91,6 +96,14 @@ def random_torso_scene(seed: int) -> dict[str, Any]:
     task["arms"] = ["left", "right"]
     content["tasks"] = [task]
     content["map"]["redundancy"] = 1
+    if falls:
+        if rng.choice([0, 1]):
+            x, y = rng.uniform([0.0, 0.05], [0.1, 0.15])
+            content["robots"][0]["support"] = [[x, y], [-x, y], [-x, -y], [x, -y], [0, 0]]
+        else:
+            content["robots"][0]["support"] = [f"{side}_foot" for side in ("left", "right")]
+        content["object"]["mass"] = float(rng.uniform(0, 15))
+        task["arms"] = [["left"], ["right", "left"]][rng.integers(2)]
     return content
 
 

@@ -94,7 +94,15 @@ def test_arms_on_a_torso_have_the_same_maps():
     assert feasible > 50
 
 
-def check(content):
+def test_robots_that_may_fall_have_the_same_maps():
+    """Candidates with which the robot would fall are told the same way."""
+    fallen = np.zeros(len(Reason), dtype=int)
+    feasible = sum(check(random_torso_scene(seed, falls=True), fallen) for seed in range(AT_ONCE // 2))
+    assert feasible > 50
+    assert fallen[Reason.OUT_OF_BALANCE] > 20
+
+
+def check(content, counts=None):
     scene = Scene.from_content(content)
     task, feasible = scene.task(), 0
     with BulletWorld(scene) as world:
@@ -106,4 +114,6 @@ def check(content):
             assert_same(exact, maker.map(arm, task, method="reference"))
             assert_true(world, scene, scene.arm(arm), exact)
             feasible += np.count_nonzero(exact.feasible)
+            if counts is not None:
+                counts += np.bincount(exact.reason.ravel(), minlength=len(counts))
         return feasible
