@@ -142,6 +142,6 @@ def _references(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], 
         ]
     holders += [(f"obstacles[{i}]", obstacle) for i, obstacle in enumerate(content["obstacles"])]
     for field, holder in holders:
-        for key in ("urdf", "mesh"):
+        for key in ("urdf", "srdf", "mesh"):
             if key in holder:
                 yield f"{field}.{key}", holder, key

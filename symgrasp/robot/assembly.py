@@ -16,7 +16,7 @@ from symgrasp.files import read_file
 from symgrasp.poses import Array, from_position_quat, rpy
 from symgrasp.references import resolve, sought
 
-__all__ = ["Frame", "Mount", "assemble"]
+__all__ = ["LARGEST_URDF", "Frame", "Mount", "assemble", "parse_xml"]
 
 LARGEST_URDF = 5_000_000
 """Largest URDF file (bytes) that is read."""
@@ -102,7 +102,7 @@ def assemble(path: Path, mounts: Sequence[Mount] = ()) -> bytes:
 def _read(path: Path) -> ET.Element:
     """Parse a URDF file, check that its names are unique, and make its mesh references absolute."""
     try:
-        robot = _parse(read_file(path, LARGEST_URDF))
+        robot = parse_xml(read_file(path, LARGEST_URDF))
     except OSError as error:
         raise UrdfError(path, "urdf", str(path), "a readable URDF file") from error
     except (ET.ParseError, ValueError, LookupError) as error:
@@ -131,7 +131,7 @@ def _read(path: Path) -> ET.Element:
     return robot
 
 
-def _parse(content: bytes) -> ET.Element:
+def parse_xml(content: bytes) -> ET.Element:
     """Parse XML; raise ValueError as soon as it has too many elements or nests them too deeply."""
     root, depth = None, 0
     events = ET.iterparse(io.BytesIO(content), ("start", "end"))

@@ -18,6 +18,7 @@ from symgrasp.robot.assembly import Mount, assemble
 from symgrasp.robot.joint import Joint, joint_motion
 from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
+from symgrasp.robot.srdf import read_srdf
 
 __all__ = ["RobotModel"]
 
@@ -35,6 +36,7 @@ class RobotModel:
     Args:
         path: the URDF file.
         mounts: hands and tool frames to add to what the file holds.
+        srdf: the file with the robot's semantic description; None where it has none.
 
     Raises:
         UrdfError: a file is missing, not a URDF, uses an unknown joint type, or refers to a
@@ -43,7 +45,9 @@ class RobotModel:
     Attributes:
         path: the URDF file.
         urdf: text of the URDF with the mounts added, every mesh as an absolute path.
-        sha256: SHA-256 of that URDF and of its collision meshes, as they were when it was loaded.
+        sha256: SHA-256 of that URDF, of its collision meshes and of the links that may touch, as they were
+            when it was loaded.
+        srdf: the semantic description; None where there is none.
         name: the robot's name in the URDF.
         link_names: all links; the first is the root.
         joints: all joints, parents before children.
@@ -52,8 +56,9 @@ class RobotModel:
         upper: their upper limits (n,), inf where there is none.
     """
 
-    def __init__(self, path: Path, mounts: Sequence[Mount] = ()) -> None:
+    def __init__(self, path: Path, mounts: Sequence[Mount] = (), srdf: Path | None = None) -> None:
         self.path = Path(path)
+        self.srdf = None if srdf is None else read_srdf(srdf)
         self.urdf = assemble(self.path, mounts)
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite are refused below
@@ -86,7 +91,14 @@ class RobotModel:
         for shapes in self._shapes.values():
             for shape in shapes:
                 digest.update(shape.sha256.encode())
+        if allowed := sorted(sorted(pair) for pair in self.allowed_pairs()):
+            digest.update(repr(allowed).encode())
         return digest.hexdigest()
+
+    def allowed_pairs(self) -> frozenset[frozenset[str]]:
+        """Return the pairs of the robot's links that its SRDF lets touch."""
+        disabled = self.srdf.disabled if self.srdf else frozenset[frozenset[str]]()
+        return frozenset(pair for pair in disabled if pair <= self._shapes.keys())
 
     def _build_tree(self, urdf: yourdfpy.URDF, root: str) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
         """Return joints and link names in the order of a breadth-first walk from the root.

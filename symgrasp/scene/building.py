@@ -119,6 +119,8 @@ class SceneBuilder:
 
     def _absolute_robot(self, field: str, robot: RobotFile) -> RobotFile:
         update: dict[str, Any] = {"urdf": self._reference(f"{field}.urdf", robot.urdf, "URDF")}
+        if robot.srdf is not None:
+            update["srdf"] = self._reference(f"{field}.srdf", robot.srdf, "SRDF")
         if robot.hand is not None:
             update["hand"] = self._absolute_hand(f"{field}.hand", robot.hand)
         if robot.arms is not None:

@@ -155,6 +155,8 @@ class RobotFile(_Strict):
 
     name: Name
     urdf: str
+    srdf: str | None = None
+    """links that may touch, and states to park in; the file beside the URDF unless given"""
     base: PoseFile = PoseFile()
     tool: str | None = None
     joints: tuple[str, str] | None = None

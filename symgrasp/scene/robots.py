@@ -14,6 +14,7 @@ from symgrasp.robot.assembly import Mount
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
+from symgrasp.robot.srdf import find_srdf
 from symgrasp.robot.support import area_of_corners, area_of_feet
 from symgrasp.robot.torso import Torso
 from symgrasp.scene.format import ArmFile, RobotFile
@@ -47,7 +48,7 @@ class RobotBuilder:
 
     def __init__(self, source: str, folder: Path) -> None:
         self._source, self._folder = source, folder
-        self._models: dict[tuple[Path, tuple[Mount, ...]], RobotModel] = {}
+        self._models: dict[tuple[Path, tuple[Mount, ...], Path | None], RobotModel] = {}
 
     def build(self, i: int, entry: RobotFile) -> BuiltRobot:
         """Return the robot with index i in the file, and its arms.
@@ -70,12 +71,18 @@ class RobotBuilder:
             tools.append(self._tool(f, a, hand))
             if a.tool is None and hand.tool is not None and not hand.tool.is_link:
                 mounts.append(Mount(hand.tool, None, tools[-1]))
-        model = self.model(self._path(entry.urdf), tuple(mounts))
+        urdf = self._path(entry.urdf)
+        srdf = self._path(entry.srdf) if entry.srdf else find_srdf(urdf)
+        model = self.model(urdf, tuple(mounts), srdf)
         chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
         torso = self._torso(field, entry, model, tools)
         shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
         shared |= frozenset(torso.joint_names if torso else ())
         joints, notes = [], []
+        if srdf and not entry.srdf:
+            entry = entry.model_copy(update={"srdf": _beside(entry.urdf, urdf, srdf)})
+            allowed = len(model.allowed_pairs())
+            notes.append(f"{entry.name}: srdf: {srdf.name}, which lets {allowed} pairs of links touch")
         for k, (f, a, hand) in enumerate(zip(fields, files, hands, strict=True)):
             joints.append(self._joints(f, a, tools[k], model, shared, hand))
             resting = [n for n in chains[k] if n not in (*joints[k], *shared, *hand.joints)]
@@ -94,11 +101,12 @@ class RobotBuilder:
         guessed = {"joints": files[0].joints} if entry.arms is None else {"arms": files}
         return BuiltRobot(entry.model_copy(update=guessed), robot, arms, notes)
 
-    def model(self, path: Path, mounts: tuple[Mount, ...] = ()) -> RobotModel:
+    def model(self, path: Path, mounts: tuple[Mount, ...] = (), srdf: Path | None = None) -> RobotModel:
         """Return the model of a URDF with mounts, shared by robots and obstacles that are alike."""
-        if (path, mounts) not in self._models:
-            self._models[path, mounts] = RobotModel(path, mounts)
-        return self._models[path, mounts]
+        key = path, mounts, srdf
+        if key not in self._models:
+            self._models[key] = RobotModel(*key)
+        return self._models[key]
 
     def _path(self, reference: str) -> Path:
         """Return the file of a reference that has been checked."""
@@ -242,3 +250,11 @@ class RobotBuilder:
             values[k] = value
         values.setflags(write=False)
         return values
+
+
+def _beside(reference: str, urdf: Path, srdf: Path) -> str:
+    """Return a reference to the SRDF that was found for a URDF, given the reference to that one."""
+    folder = reference.rpartition("/")[0]
+    if srdf.parent != urdf.parent:
+        folder = folder.rpartition("/")[0] + "/srdf"
+    return f"{folder}/{srdf.name}"

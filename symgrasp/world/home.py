@@ -2,8 +2,9 @@
 
 A pair of bodies that collides while a robot is at home collides in every cell of the map of an arm that does
 not move them against each other. A scene gives values of some joints, or of none. Where a robot collides,
-the others are moved as far as need be: hands that no arm uses are opened, then joints that collide go to the
-middle of their ranges, then to random values, with a fixed seed.
+the others are set as a state of the SRDF has them; else they are moved as far as need be: hands that no arm
+uses are opened, then joints that collide go to the middle of their ranges, then to random values, with a
+fixed seed.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ __all__ = ["check_homes", "with_free_homes"]
 
 MOST_MOVES = 1000
 """Most random moves that are tried for a robot."""
+
+LIMIT_SLACK = 1e-3
+"""By how much (rad or m) a value of an SRDF may be outside of a joint's limits, which are rounded too."""
 
 DECIMALS = 4
 """Of the values (rad or m) of a home that is found, which a scene states."""
@@ -132,6 +136,7 @@ class _Search:
         if not self._pairs(home):
             return None
         for values, origin in (
+            *self._states(home),
             (self._opened(home), "with hands opened"),
             (self._middle(home), "joints that collided at the middle of their ranges"),
         ):
@@ -139,6 +144,18 @@ class _Search:
                 return _Home(values, origin)
         values = self._sampled(self._opened(home))
         return None if values is None else _Home(values, "joints that collided moved at random")
+
+    def _states(self, home: Array) -> list[tuple[Array, str]]:
+        """Return the home with the open joints as in each state of the SRDF that is within their limits."""
+        model, found = self._robot.model, []
+        for name, state in model.srdf.states.items() if model.srdf else ():
+            values = home.copy()
+            for k in self._open:
+                values[k] = np.round(state.get(model.joint_names[k], home[k]), DECIMALS)
+            inside = np.all((values >= model.lower - LIMIT_SLACK) & (values <= model.upper + LIMIT_SLACK))
+            if inside:
+                found.append((np.clip(values, model.lower, model.upper), f"state {name!r} of the SRDF"))
+        return found
 
     def _opened(self, values: Array) -> Array:
         """Return values with fingers that collide at the better end of their range, where that helps."""

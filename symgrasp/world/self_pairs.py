@@ -27,11 +27,12 @@ BOX_SLACK = 2e-3
 def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
     """Return the pairs of links that collide in some configurations, but not in all.
 
-    Left out are adjacent links, pairs that overlap in all of `SELF_SAMPLES` random configurations (a
-    flange and the hand on it), and pairs that stay further apart than `NEVER_GAP` in all of them.
+    Left out are adjacent links, pairs that the SRDF lets touch, pairs that overlap in all of
+    `SELF_SAMPLES` random configurations (a flange and the hand on it), and pairs that stay further apart
+    than `NEVER_GAP` in all of them.
     """
     links = tuple(link for link in model.colliding_links() if model.hulls(link))
-    adjacent = model.neighbours()
+    adjacent = model.neighbours() | model.allowed_pairs()
     pairs = [
         (a, b)
         for a, b in combinations(range(len(links)), 2)
