@@ -43,6 +43,13 @@ SHAPES = ("box", "cylinder", "sphere", "mesh")
 """Geometries that a link may have."""
 
 
+XACRO = ("wiki.ros.org/xacro}", "ros.org/wiki/xacro}")
+"""In the tags of elements that the program xacro expands."""
+
+OTHER_FORMATS = {"mujoco": "an MJCF file of MuJoCo", "sdf": "an SDF file of Gazebo"}
+"""Tag of the first element → what such a file is."""
+
+
 @dataclass(frozen=True)
 class Frame:
     """A coordinate frame fixed to a link.
@@ -107,6 +114,13 @@ def _read(path: Path) -> ET.Element:
         raise UrdfError(path, "urdf", str(path), "a readable URDF file") from error
     except (ET.ParseError, ValueError, LookupError) as error:
         raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
+    if any(name in element.tag for element in robot.iter() for name in XACRO):
+        expected = (
+            f"a plain URDF; expand the file first: xacro {path.name} > {path.name.partition('.')[0]}.urdf"
+        )
+        raise UrdfError(path, "urdf", "a xacro file", expected)
+    if robot.tag in OTHER_FORMATS:
+        raise UrdfError(path, "urdf", OTHER_FORMATS[robot.tag], "a URDF; convert the file first")
     if robot.tag != "robot" or robot.find("link") is None:
         found = f"<{robot.tag}> without links" if robot.tag == "robot" else f"<{robot.tag}>"
         raise UrdfError(path, "urdf", found, "<robot> with links, as in a URDF")

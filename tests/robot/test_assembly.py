@@ -136,3 +136,21 @@ def test_robots_of_a_data_package_find_their_meshes(robot):
     meshes = [shape.path for link in model.colliding_links() for shape in model.shapes(link)]
     assert all(mesh is None or mesh.is_file() for mesh in meshes)
     assert any(meshes)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("arm.urdf.xacro", '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"/>', "without links"),
+        ("arm.urdf.xacro", '<robot name="a" xmlns:xacro="http://wiki.ros.org/xacro"><link name="b"/>'
+         '<xacro:include filename="x"/></robot>',
+         "'a xacro file': expected a plain URDF; expand the file first: xacro arm.urdf.xacro > arm.urdf"),
+        ("arm.xml", "<mujoco/>", "'an MJCF file of MuJoCo': expected a URDF"),
+        ("arm.sdf", "<sdf/>", "'an SDF file of Gazebo': expected a URDF"),
+    ],
+)  # fmt: skip
+def test_a_file_of_another_kind_is_called_what_it_is(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UrdfError) as error:
+        assemble(tmp_path / name)
+    assert message in str(error.value)

@@ -254,13 +254,13 @@ BAD = [
     (lambda c: c.update(obstacles=20_000 * [{}]), SceneError, "obstacles[0].name", "required"),
     (lambda c: c.update(tasks=(MOST_TASKS + 1) * c["tasks"][:1]), SceneError,
      "tasks", "at most 500 of them"),
-    (lambda c: c["robots"][0].update(urdf="chain.urdf"), UrdfError, "links", "at most 1,000 of them"),
+    (lambda c: c["robots"][0].update(urdf="chain.urdf"), UrdfError, "links", "at most 5,000 of them"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("change", "kind", "field", "expected"), BAD)
 def test_bad_scenes_get_one_line(change, kind, field, expected, content, tmp_path):
-    (tmp_path / "chain.urdf").write_text(chain_urdf(2000))
+    (tmp_path / "chain.urdf").write_text(chain_urdf(5002))
     if callable(change):
         change(content)
     path = write_scene(tmp_path, content if callable(change) else change)
