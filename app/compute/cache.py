@@ -14,7 +14,7 @@ from symgrasp.scene.shipped import shipped_scenes
 from symgrasp.world import prepared
 
 from ..files.links import Link
-from ..scene3d.visual_meshes import check_visuals
+from ..scene3d.visual_meshes import read_visuals
 from ..state.object_choice import OWN, ObjectChoice, from_library
 from ..state.requests import MapKey, MapRequest, MapResult
 
@@ -66,7 +66,7 @@ class SharedCache:
         if name not in self.names:  # else a browser could open any file of the server
             raise SceneError("page", "scene", name, one_of(self.names, name))
         scene = prepared(Scene.load(name))
-        check_visuals(scene)
+        read_visuals(scene)
         with self._lock:
             return self._scenes.setdefault(name, scene)
 

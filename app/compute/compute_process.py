@@ -7,11 +7,14 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from symgrasp.errors import Cancelled, NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.progress import Progress
+from symgrasp.robot.catalogue import CatalogueRobot
+from symgrasp.scene.format import RobotFile
 from symgrasp.scene.scene import Scene
 
 from ..state.object_choice import ObjectChoice
@@ -25,6 +28,7 @@ from ..state.requests import (
     MapResult,
     Maps,
 )
+from ..state.scene_assets import BuiltScene
 from ..state.uploaded_scene import UploadedScene
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
 from .limits import MEMORY_LIMIT
@@ -104,9 +108,25 @@ class ComputeProcess:
         """Compute the result of every candidate of a cell."""
         return self._call("explain", progress, request)
 
-    def read_scene(self, name: str, content: bytes, progress: Progress) -> UploadedScene:
+    def read_scene(self, name: str, content: bytes, folder: Path | None, progress: Progress) -> UploadedScene:
         """Read an uploaded scene; see `UploadService.read_scene`."""
-        return self._call("read_scene", progress, name, content, reads=name)
+        return self._call("read_scene", progress, name, content, folder, reads=name)
+
+    def read_robot(
+        self, scene: Scene, robot: str, name: str, content: bytes, folder: Path, progress: Progress
+    ) -> tuple[RobotFile, BuiltScene]:
+        """Put an uploaded robot in the place of another; see `UploadService.read_robot`."""
+        return self._call("read_robot", progress, scene, robot, name, content, folder, reads=name)
+
+    def put_robot(
+        self, scene: Scene, robot: str, other: CatalogueRobot | RobotFile, progress: Progress
+    ) -> BuiltScene:
+        """Put a robot in the place of another; see `UploadService.put_robot`."""
+        return self._call("put_robot", progress, scene, robot, other, reads=other.name)
+
+    def rearm(self, scene: Scene, arm: str, link: str, hand: str | None, progress: Progress) -> BuiltScene:
+        """Return a scene with a hand on a link of an arm; see `UploadService.rearm`."""
+        return self._call("rearm", progress, scene, arm, link, hand, reads=hand or link)
 
     def measure(
         self, name: str, content: bytes, scale: float, tolerance: float | None, progress: Progress
@@ -114,7 +134,7 @@ class ComputeProcess:
         """Measure an uploaded mesh; see `UploadService.measure`."""
         return self._call("measure", progress, name, content, scale, tolerance, reads=name)
 
-    def mount(self, scene: Scene, arm: str, hand: str, progress: Progress) -> Scene:
+    def mount(self, scene: Scene, arm: str, hand: str, progress: Progress) -> BuiltScene:
         """Return a scene with another hand on an arm; see `UploadService.mount`."""
         return self._call("mount", progress, scene, arm, hand, reads=hand)
 

@@ -31,7 +31,7 @@ from symgrasp.scene.scene import Scene
 
 from ..files.scene_files import refuse_foreign_files
 from ..files.shown_paths import shown_paths
-from ..scene3d.visual_meshes import check_visuals
+from ..scene3d.visual_meshes import read_visuals
 from ..state.object_pose import ObjectPose, with_poses
 from ..state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
 from ..state.requests import MapRequest, Maps
@@ -209,7 +209,7 @@ class PlanService:
         scene, plan = checked.scene, checked.plan
         if scene is None:
             return OpenedPlan(report)
-        check_visuals(scene)
+        read_visuals(scene)
         return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene))
 
     def _start_planner(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:

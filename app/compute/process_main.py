@@ -76,6 +76,7 @@ class _Server:
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
             "plan": plans.plan, "more": plans.more, "open": plans.open,
             "read_scene": uploads.read_scene, "measure": uploads.measure, "mount": uploads.mount,
+            "read_robot": uploads.read_robot, "put_robot": uploads.put_robot, "rearm": uploads.rearm,
         }  # fmt: skip
 
     def run(self) -> None:

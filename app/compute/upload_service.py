@@ -1,4 +1,4 @@
-"""Reads the files that a browser uploads, and mounts hands; runs in that session's process.
+"""Reads what a browser uploads, and puts robots and hands into scenes; runs in that session's process.
 
 The server itself parses nothing that comes from a browser: a file that breaks a parser, hangs it or takes
 all memory ends this process only.
@@ -10,19 +10,24 @@ from dataclasses import replace
 from pathlib import Path
 
 from symgrasp.progress import Progress
+from symgrasp.robot.catalogue import CatalogueRobot
+from symgrasp.scene.format import RobotFile
+from symgrasp.scene.replacing import base_in_reach, renamed, with_base, with_robot
 from symgrasp.scene.scene import Scene
 from symgrasp.world import prepared
 
-from ..files.scene_files import read_scene
-from ..scene3d.visual_meshes import check_visuals
+from ..files.robot_files import catalogue_entry, read_robot_entry, rearmed
+from ..files.scene_files import read_scene, read_scene_archive
+from ..scene3d.visual_meshes import read_visuals
 from ..state.object_choice import ObjectChoice, from_mesh
+from ..state.scene_assets import BuiltScene, SceneAssets
 from ..state.uploaded_scene import UploadedScene
 
 __all__ = ["UploadService"]
 
 
 class UploadService:
-    """Reads scenes and meshes, and mounts hands.
+    """Reads scenes, robots and meshes, and puts robots and hands into scenes.
 
     Args:
         folders: where the files of an uploaded scene may lie.
@@ -31,20 +36,28 @@ class UploadService:
     def __init__(self, folders: tuple[Path, ...]) -> None:
         self._folders = folders
 
-    def read_scene(self, name: str, content: bytes, progress: Progress) -> UploadedScene:
+    def read_scene(self, name: str, content: bytes, folder: Path | None, progress: Progress) -> UploadedScene:
         """Build the scene in a file, and check its tasks and everything that the 3D view shows.
 
+        Args:
+            name: of the file.
+            content: of the file.
+            folder: an empty one to unpack an archive into; None where the file is no archive.
+            progress: called with the finished share; may raise `Cancelled`.
+
         Raises:
+            InputError: see `app.files.archives.unpack`.
             SceneError: see `app.files.scene_files.read_scene`; or the object collides in a task.
             UrdfError, ProfileError, MeshError: a file that it refers to is unusable.
         """
         progress(0.0)
-        uploaded = read_scene(name, content, self._folders)
+        if folder:
+            uploaded = read_scene_archive(name, content, folder, self._folders)
+        else:
+            uploaded = read_scene(name, content, self._folders)
         progress(0.3)
-        uploaded = replace(uploaded, scene=prepared(uploaded.scene))
-        progress(0.6)
-        check_visuals(uploaded.scene)
-        return uploaded
+        built = _checked(uploaded.scene, progress)
+        return replace(uploaded, scene=built.scene, assets=SceneAssets(built.visuals))
 
     def measure(
         self, name: str, content: bytes, scale: float, tolerance: float | None, progress: Progress
@@ -53,14 +66,88 @@ class UploadService:
         progress(0.0)
         return from_mesh(name, content, scale, tolerance)
 
-    def mount(self, scene: Scene, arm: str, hand: str, progress: Progress) -> Scene:
-        """Return a scene with another hand on an arm, of which the 3D view can show everything.
+    def mount(self, scene: Scene, arm: str, hand: str, progress: Progress) -> BuiltScene:
+        """Return a scene with another hand on the mount of an arm.
 
         Raises:
             SymgraspError: see `Scene.with_hand`.
             MeshError: a mesh of the hand cannot be read.
         """
         progress(0.0)
-        scene = prepared(scene.with_hand(arm, hand))
-        check_visuals(scene)
-        return scene
+        return _checked(scene.with_hand(arm, hand), progress)
+
+    def rearm(self, scene: Scene, arm: str, link: str, hand: str | None, progress: Progress) -> BuiltScene:
+        """Return a scene with a hand on a link of an arm; see `app.files.robot_files.rearmed`.
+
+        Raises:
+            SceneError, UrdfError, MeshError: no such hand is there, or it does not fit.
+        """
+        progress(0.0)
+        robot = scene.arm(arm).robot.name
+        return _checked(with_robot(scene, robot, rearmed(scene, arm, link, hand)), progress)
+
+    def put_robot(
+        self, scene: Scene, robot: str, other: CatalogueRobot | RobotFile, progress: Progress
+    ) -> BuiltScene:
+        """Return a scene with another robot in the place of one.
+
+        Args:
+            scene: the scene.
+            robot: name of the robot to replace.
+            other: a robot of the catalogue, or a robot as a scene file has it. Unless that says where it
+                stands, it is placed so that its arm is to the object as the other arm is.
+            progress: called with the finished share; may raise `Cancelled`.
+
+        Raises:
+            SceneError, UrdfError, MeshError: the robot is unusable, or its home is not free there.
+        """
+        progress(0.0)
+        entry = catalogue_entry(other) if isinstance(other, CatalogueRobot) else other
+        return self._put(scene, robot, entry, progress)
+
+    def read_robot(
+        self, scene: Scene, robot: str, name: str, content: bytes, folder: Path, progress: Progress
+    ) -> tuple[RobotFile, BuiltScene]:
+        """Read the robot in an archive, and put it in the place of one of a scene.
+
+        Args:
+            scene: the scene.
+            robot: name of the robot to replace.
+            name: of the archive.
+            content: of the archive.
+            folder: an empty one to unpack it into.
+            progress: called with the finished share; may raise `Cancelled`.
+
+        Returns:
+            The robot as a scene file has it, and the scene.
+
+        Raises:
+            InputError: see `app.files.robot_files.read_robot_entry`.
+            SceneError, UrdfError, MeshError: the robot is unusable, or its home is not free there.
+        """
+        progress(0.0)
+        entry = read_robot_entry(name, content, folder)
+        progress(0.3)
+        return entry, self._put(scene, robot, entry, progress)
+
+    def _put(self, scene: Scene, robot: str, entry: RobotFile, progress: Progress) -> BuiltScene:
+        changed = with_robot(scene, robot, renamed(scene, robot, entry))
+        if "base" not in entry.model_fields_set:
+            name = list(changed.robots)[list(scene.robots).index(robot)]
+            old, new = (
+                next(arm for arm in s.arms.values() if arm.robot.name == r)
+                for s, r in ((scene, robot), (changed, name))
+            )
+            point = changed.task().T_world_object[:3, 3]
+            changed = with_base(changed, name, base_in_reach(old, new, point))
+        return _checked(changed, progress)
+
+
+def _checked(scene: Scene, progress: Progress) -> BuiltScene:
+    """Return a scene of which maps can be computed, with all that is read from its files to show it."""
+    scene = prepared(scene)
+    progress(0.6)
+    for robot in scene.robots.values():
+        for link in robot.model.colliding_links():
+            robot.model.hulls(link)  # kept in the model: the server draws them, but reads no uploaded file
+    return BuiltScene(scene, read_visuals(scene))

@@ -125,6 +125,12 @@ class Link(BaseModel):
             if upload:
                 expected = "something the server has; save the scene instead"
                 raise InputError("link", key, "an upload", expected)
+        own = [robot.T_world_base for robot in served.robots.values()]
+        now = [robot.T_world_base for robot in state.scene.robots.values()]
+        if state.robot_options or state.changed_arms or not np.allclose(own, now, rtol=0, atol=SAME):
+            chosen = sorted({*state.robot_options.values()}) or "moved, or with another tool"
+            expected = "the robots of the scene on the server, as they are there; save the scene instead"
+            raise InputError("link", "robot", chosen, expected)
         arms, at = {}, {}
         for name, task in tasks.items():
             own = known.get(name)

@@ -8,22 +8,33 @@ such a file.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 from pydantic import ValidationError
 
-from symgrasp.errors import SceneError
-from symgrasp.files import LARGEST_YAML, SCENES_DIR, parse_yaml
+from symgrasp.errors import InputError, SceneError
+from symgrasp.files import LARGEST_YAML, SCENES_DIR, parse_yaml, read_file
 from symgrasp.references import package_dirs, portable, resolve
 from symgrasp.scene.format import SceneFile, describe_error
 from symgrasp.scene.scene import Scene
 
 from ..state.uploaded_scene import UploadedScene
+from .archives import pack, unpack
+from .robot_files import check_inside
 
-__all__ = ["SCENE_LIMIT", "read_scene", "refuse_foreign_files", "scene_yaml"]
+__all__ = [
+    "MAX_NAME",
+    "SCENE_LIMIT",
+    "read_scene",
+    "read_scene_archive",
+    "refuse_foreign_files",
+    "scene_archive",
+    "scene_yaml",
+]
 
 SCENE_LIMIT = LARGEST_YAML
 """Largest scene file (bytes) that is read."""
@@ -34,17 +45,25 @@ MAX_NAME = 100
 SHIPPED = f"package://{SCENES_DIR.name}/"
 
 
-def scene_yaml(scene: Scene) -> str:
+def scene_yaml(scene: Scene, beside: Mapping[Path, str] | None = None) -> str:
     """Return a scene as a YAML document that the page and the command line read back as the same scene.
 
     Files that come with this software are written as ``package://``; others keep their absolute
     paths, and the first lines say so.
+
+    Args:
+        scene: the scene.
+        beside: folders that the document is given along with → their names beside it.
     """
+    beside = beside or {}
     content = scene.file.model_dump(mode="json", exclude_none=True)
     elsewhere = []
     for _, holder, key in _references(content):
         path = Path(holder[key])
-        if path.is_absolute() and path.is_relative_to(SCENES_DIR):
+        found = next((folder for folder in beside if path.is_relative_to(folder)), None)
+        if found is not None:
+            holder[key] = f"{beside[found]}/{path.relative_to(found).as_posix()}"
+        elif path.is_absolute() and path.is_relative_to(SCENES_DIR):
             holder[key] = SHIPPED + path.relative_to(SCENES_DIR).as_posix()
         elif not holder[key].startswith("package://"):
             elsewhere.append(holder[key])
@@ -58,13 +77,19 @@ def scene_yaml(scene: Scene) -> str:
     return "\n".join([*lines, text])
 
 
-def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> UploadedScene:
+def read_scene(
+    name: str,
+    content: bytes,
+    folders: Iterable[Path],
+    check: Callable[[dict[str, Any]], None] = lambda _: None,
+) -> UploadedScene:
     """Build the scene in an uploaded file.
 
     Args:
         name: of the file.
         content: what it holds.
         folders: of the server's own scenes; relative paths are looked up there, in this order.
+        check: called with the content of the scene, its references absolute, before any of them is read.
 
     Raises:
         SceneError: the file is too large or no scene, or refers to a file that it may not.
@@ -87,7 +112,64 @@ def read_scene(name: str, content: bytes, folders: Iterable[Path]) -> UploadedSc
     roots = [folder.resolve() for folder in folders]
     for field, holder, key in _references(plain):
         holder[key] = _allowed(source, field, holder[key], roots)
+    check(plain)
     return UploadedScene(f"{source} (upload)", Scene.from_content(plain, source))
+
+
+def read_scene_archive(name: str, content: bytes, folder: Path, folders: Iterable[Path]) -> UploadedScene:
+    """Build the scene in an uploaded archive, which `scene_archive` may have made.
+
+    Its robots may have their URDFs and meshes in the archive.
+
+    Args:
+        name: of the archive.
+        content: of the archive.
+        folder: an empty one to unpack it into.
+        folders: of the server's own scenes.
+
+    Raises:
+        InputError: see `app.files.archives.unpack`; or there is not exactly one scene in its first folder.
+        SceneError, UrdfError, ProfileError, MeshError: see `read_scene`.
+    """
+    files = unpack(name, content, folder)
+    scenes = [path for path in files if path.suffix.lower() in (".yaml", ".yml")]
+    least = min((len(path.parts) for path in scenes), default=0)
+    scenes = [path for path in scenes if len(path.parts) == least]
+    if len(scenes) != 1:
+        found = [path.relative_to(folder).as_posix() for path in scenes]
+        raise InputError(name, "files", found or "no .yaml file", "one scene, with the robots it refers to")
+    inside = folder.resolve()
+
+    def check(content: dict[str, Any]) -> None:
+        for field, holder, key in _references(content):
+            path = Path(holder[key])
+            if not path.is_absolute() or not path.is_relative_to(inside):
+                continue
+            if field.startswith("obstacles"):
+                expected = "a file of an installed package, or one of the server's scenes"
+                raise SceneError(name, field, path.name, expected)
+            if key == "urdf":
+                check_inside(path, folder)
+
+    content = read_file(scenes[0], SCENE_LIMIT + 1)
+    uploaded = read_scene(scenes[0].name, content, (scenes[0].parent.resolve(), *folders), check)
+    return replace(uploaded, option=f"{name[:MAX_NAME]} (upload)")
+
+
+def scene_archive(scene: Scene, name: str, folders: Sequence[Path]) -> bytes:
+    """Return a ZIP file with a scene and the uploaded robots that it refers to.
+
+    Args:
+        scene: the scene.
+        name: of the scene file in it.
+        folders: where the files of uploaded robots are.
+    """
+    inner = {folder.resolve(): f"files{k}" for k, folder in enumerate(folders, 1)}
+    files = [(name, scene_yaml(scene, inner).encode())]
+    for folder, called in inner.items():
+        paths = sorted(path for path in folder.rglob("*") if path.is_file())
+        files += [(f"{called}/{path.relative_to(folder).as_posix()}", path.read_bytes()) for path in paths]
+    return pack(files)
 
 
 def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable[Path]) -> None:

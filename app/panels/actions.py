@@ -74,8 +74,17 @@ class Actions(Protocol):
             tolerance: largest deviation from symmetry (m), None for the default.
         """
 
-    def choose_hand(self, hand: str) -> None:
-        """Mount another hand on the chosen arm."""
+    def choose_robot(self, option: str) -> None:
+        """Replace the robot of the chosen arm by an option of the menu."""
+
+    def upload_robot(self, name: str, content: bytes) -> None:
+        """Put the robot in an uploaded archive with this content in the place of that of the chosen arm."""
+
+    def choose_tool(self, link: str) -> None:
+        """Put the hand of the chosen arm on another link."""
+
+    def choose_hand(self, option: str) -> None:
+        """Hold with another hand on the chosen arm, an option of the menu."""
 
     def stop_or_retry(self) -> None:
         """Cancel the computation under way, or restart the one that was cancelled or failed."""

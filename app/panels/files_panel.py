@@ -6,6 +6,7 @@ from html import escape
 
 import viser
 
+from ..files.archives import ARCHIVE_LIMIT
 from ..files.scene_files import SCENE_LIMIT
 from ..state import changes
 from ..state.state import State
@@ -23,11 +24,13 @@ class FilesPanel(Panel):
         with gui.add_folder("Scene file"):
             self.button(
                 "Save the scene (YAML)", viser.Icon.DOWNLOAD, actions.save_scene, color="gray",
-                hint="With the object, hands and poses as they are now",
+                hint="With robots, object, hands and poses as they are now; as a ZIP file, with their files, "
+                "where robots were uploaded",
             )  # fmt: skip
             self.upload = self.upload_button(
-                "Open a scene (YAML)", SCENE_LIMIT, actions.upload_scene, mime_type=".yaml,.yml",
-                hint=f"At most {SCENE_LIMIT / 1e6:g} MB",
+                "Open a scene (YAML)", ARCHIVE_LIMIT, actions.upload_scene, mime_type=".yaml,.yml,.zip",
+                hint=f"At most {SCENE_LIMIT / 1e6:g} MB; or a ZIP file of a scene with its robots, at most "
+                f"{ARCHIVE_LIMIT / 1e6:g} MB",
             )  # fmt: skip
         with gui.add_folder("Share"):
             self.button(

@@ -18,6 +18,7 @@ from .map_panel import MapPanel
 from .object_panel import ObjectPanel
 from .panel import Panel
 from .plan_panel import PlanFilePanel, PlanPanel
+from .robot_panel import RobotPanel
 from .scene_panel import ScenePanel
 from .sequence_panel import SequencePanel, TasksPanel
 from .status_panel import NotesPanel, StatusPanel
@@ -89,6 +90,7 @@ class Layout:
         main = [
             StatusPanel(gui, actions),
             ScenePanel(gui, actions, scenes),
+            RobotPanel(gui, actions),
             ObjectPanel(gui, actions),
             Keyboard(gui, actions, scenes),
         ]

@@ -1,10 +1,8 @@
-"""The scene, task, arm and hand that are shown."""
+"""The scene, task and arm that are shown."""
 
 from __future__ import annotations
 
 import viser
-
-from symgrasp.robot.hand import HANDS
 
 from ..html.readout import scene_notes_html
 from ..state import changes
@@ -14,12 +12,9 @@ from .panel import Panel
 
 __all__ = ["ScenePanel"]
 
-MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
-"""Hands that can be mounted where a scene mounts one."""
-
 
 class ScenePanel(Panel):
-    """Chooses scene, task, arm and hand.
+    """Chooses scene, task and arm.
 
     Args:
         gui: where to add the widgets.
@@ -33,11 +28,9 @@ class ScenePanel(Panel):
             self._scenes, self.scene = scenes, self.dropdown("Scene", scenes)
             self.task = self.dropdown("Task")
             self.arm = self.dropdown("Arm")
-            self.hand = self.dropdown("Hand", MOUNTABLE, visible=False)
             self.flat_map = gui.add_checkbox("Flat map", True)
             self.notes = self.html()
         self.on_select(self.scene, actions.open_scene)
-        self.on_select(self.hand, actions.choose_hand)
         self.on(self.task, lambda s, v: changes.choose_task(s, v))
         self.on(self.arm, lambda s, v: changes.choose_arm(s, v))
         self.on(self.flat_map, lambda s, v: changes.switched(s, flat_map=v))
@@ -57,8 +50,4 @@ class ScenePanel(Panel):
         """Set what is chosen."""
         self.scene.value = state.scene_name
         self.task.value, self.arm.value = state.task, state.arm
-        hand = state.scene.replaceable_hands.get(state.arm)
-        self.hand.visible = hand is not None
-        if hand is not None:
-            self.hand.value = hand
         self.flat_map.value = state.display.flat_map

@@ -14,6 +14,7 @@ from symgrasp.robot.link_shapes import shape_mesh
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 
+from ..state.scene_assets import Visuals
 from .nodes import add_links, set_pose
 from .viewpoint import Viewpoint
 
@@ -30,7 +31,7 @@ FLOOR_GAP = 0.002
 """Distance (m) of the floor below the lowest base, so that neither hides the other."""
 
 
-def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int) -> None:
+def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int, visuals: Visuals) -> None:
     """Add an obstacle.
 
     Args:
@@ -38,6 +39,7 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
         name: path of its node.
         o: the obstacle.
         index: its index in the scene, which chooses its colour.
+        visuals: see `app.scene3d.nodes.add_links`.
     """
     scene = client.scene
     options: dict[str, Any] = {
@@ -59,7 +61,7 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int)
             model = o.model
             set_pose(scene.add_frame(f"{name}/links", show_axes=False), o.T_world_obstacle)
             poses = model.forward(model.default_values())
-            seen = links = add_links(client, f"{name}/links", model)
+            seen = links = add_links(client, f"{name}/links", model, visuals)
             for link, node in links.items():
                 set_pose(node, poses[model.link_index(link)])
         bare = [shape_mesh(shape, f"obstacle {o.name}") for link, shape in o.shapes() if link not in seen]

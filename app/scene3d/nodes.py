@@ -7,6 +7,7 @@ import viser
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.robot.model import RobotModel
 
+from ..state.scene_assets import Visuals
 from .visual_meshes import link_visuals
 
 __all__ = ["add_links", "set_pose"]
@@ -18,18 +19,21 @@ def set_pose(node: viser.SceneNodeHandle, pose: Array) -> None:
     node.position = pose[:3, 3]
 
 
-def add_links(client: viser.ClientHandle, root: str, model: RobotModel) -> dict[str, viser.GlbHandle]:
+def add_links(
+    client: viser.ClientHandle, root: str, model: RobotModel, given: Visuals
+) -> dict[str, viser.GlbHandle]:
     """Add the visible links of a robot.
 
     Args:
         client: the browser.
         root: path of the node to add them under.
         model: the robot's model.
+        given: what is known of how robots look; what is missing is read.
 
     Returns:
         Link name → its node.
     """
-    visuals = link_visuals(model.urdf)
+    visuals = given[model.urdf] if model.urdf in given else link_visuals(model.urdf)
     return {
         link: client.scene.add_glb(f"{root}/{k}", glb, cast_shadow=False, receive_shadow=False)
         for k, (link, glb) in enumerate(visuals.items())

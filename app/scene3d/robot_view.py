@@ -8,6 +8,7 @@ import viser
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Robot
 
+from ..state.scene_assets import Visuals
 from .nodes import add_links, set_pose
 
 __all__ = ["RobotView"]
@@ -20,12 +21,14 @@ class RobotView:
         client: the browser.
         root: path of its node.
         robot: the robot.
+        visuals: see `app.scene3d.nodes.add_links`.
     """
 
-    def __init__(self, client: viser.ClientHandle, root: str, robot: Robot) -> None:
+    def __init__(self, client: viser.ClientHandle, root: str, robot: Robot, visuals: Visuals) -> None:
         self.model = robot.model
-        set_pose(client.scene.add_frame(root, show_axes=False), robot.T_world_base)
-        nodes = add_links(client, root, robot.model)
+        self.base = client.scene.add_frame(root, show_axes=False)
+        set_pose(self.base, robot.T_world_base)
+        nodes = add_links(client, root, robot.model, visuals)
         self.nodes = {self.model.link_index(link): node for link, node in nodes.items()}
         self._shown: Array | None = None
 

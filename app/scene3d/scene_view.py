@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from symgrasp.poses import Array
+from symgrasp.poses import Array, from_position_quat
 from symgrasp.scene.scene import Scene
 
 from ..render.drawn_poses import drawn_joint_values
@@ -16,6 +16,7 @@ from ..state.state import State
 from .backdrop import add_floor, add_lights, add_obstacle
 from .flat_map import FlatMap
 from .ghost_view import GhostView
+from .nodes import set_pose
 from .object_view import ObjectView
 from .robot_view import RobotView
 from .viewpoint import FIELD_OF_VIEW, choose_viewpoint
@@ -31,7 +32,8 @@ class SceneView:
         width: width (px) of the view at first; browsers report it only after the panels are laid out.
         on_surface: called with the cell (row, column) that was clicked on the object.
         on_flat_map: called with the cell that was clicked on the flat map.
-        on_drag: called with the pose (4, 4) that the gizmo was dragged to.
+        on_drag: called with the pose (4, 4) that the object's gizmo was dragged to.
+        on_base_drag: called with the pose (4, 4) that the robot's gizmo was dragged to.
 
     Attributes:
         camera: the camera to show the next scene from; None for a viewpoint that suits the scene.
@@ -45,12 +47,14 @@ class SceneView:
         on_surface: Callable[[int, int], None],
         on_flat_map: Callable[[int, int], None],
         on_drag: Callable[[Array], None],
+        on_base_drag: Callable[[Array], None],
     ) -> None:
         self.client = client
-        self.on_surface, self.on_flat_map, self.on_drag = on_surface, on_flat_map, on_drag
+        self.on_surface, self.on_flat_map = on_surface, on_flat_map
+        self.on_drag, self.on_base_drag = on_drag, on_base_drag
         self._first_width: int | None = width
         self._scene: Scene | None = None
-        self._builds = 0
+        self._builds = self._ghosts = 0
         self._dark = False
         self.camera: Camera | None = None
         self._root = self._object_root = ""
@@ -63,10 +67,13 @@ class SceneView:
             state: the state.
             move_gizmo: move the gizmo as well; not while a person is dragging it.
         """
-        if self._scene is None or state.scene.robots is not self._scene.robots:
+        if self._scene is None or not _same_bodies(state.scene, self._scene):
             self._build(state)
         elif (state.scene.profile, state.scene.settings) != (self._scene.profile, self._scene.settings):
             self._build_object(state)
+        assert self._scene
+        if state.scene.robots is not self._scene.robots:
+            self._move_robots(state)
         if state.display.dark != self._dark:
             self._dark = state.display.dark
             add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.display.dark)
@@ -77,6 +84,9 @@ class SceneView:
             if state.missing_request is None or not state.busy:
                 self.ghost.show(state)
             self.object.show(state, move_gizmo=move_gizmo)
+            self.base_gizmo.visible = state.display.base_handles
+            if move_gizmo:
+                set_pose(self.base_gizmo, state.robot.T_world_base)
             if self.flat_map:
                 self.flat_map.show(state)
 
@@ -102,13 +112,31 @@ class SceneView:
         add_lights(client, root, view)
         self._dark = state.display.dark
         add_floor(client, f"{root}/floor", scene, dark=state.display.dark)
+        visuals = state.assets.visuals
         for k, obstacle in enumerate(scene.obstacles):
-            add_obstacle(client, f"{root}/obstacle{k}", obstacle, k)
+            add_obstacle(client, f"{root}/obstacle{k}", obstacle, k, visuals)
         self._build_object(state)
         self.robots = {
-            name: RobotView(client, f"{root}/robot{k}", robot)
+            name: RobotView(client, f"{root}/robot{k}", robot, visuals)
             for k, (name, robot) in enumerate(scene.robots.items())
         }
+        self.base_gizmo = client.scene.add_transform_controls(
+            f"{root}/base_gizmo", scale=0.3, line_width=3.0, depth_test=False, visible=False
+        )
+
+        @self.base_gizmo.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:  # at once, while the pose is this event's
+            self.on_base_drag(from_position_quat(event.target.position, event.target.wxyz))
+
+    def _move_robots(self, state: State) -> None:
+        """Put the robots where they stand now."""
+        for name, robot in state.scene.robots.items():
+            set_pose(self.robots[name].base, robot.T_world_base)
+        add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.display.dark)
+        self._ghosts += 1
+        self.client.scene.remove_by_name(self.ghost.root)
+        self.ghost = GhostView(self.client, f"{self._object_root}/ghost{self._ghosts}", state.scene)
+        self._scene = state.scene
 
     def _build_object(self, state: State) -> None:
         """Replace the nodes of the object, its map and the ghost."""
@@ -131,3 +159,14 @@ class SceneView:
         camera = self.client.camera
         width, self._first_width = self._first_width or camera.image_width, None
         return width / max(camera.image_height, 1)
+
+
+def _same_bodies(a: Scene, b: Scene) -> bool:
+    """Return whether two scenes have the same robots and obstacles, wherever the robots stand."""
+    models = [[(name, robot.model) for name, robot in scene.robots.items()] for scene in (a, b)]
+    homes = zip(a.robots.values(), b.robots.values(), strict=False)
+    return (
+        models[0] == models[1]
+        and a.obstacles is b.obstacles
+        and all(one.home is other.home for one, other in homes)
+    )

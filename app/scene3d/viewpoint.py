@@ -23,6 +23,12 @@ ELEVATION = np.deg2rad(24)
 MIN_WIDTH = 1.3
 """Least width (m) of the view at the point the camera looks at."""
 
+WIDEST = 1.1
+"""Ratio of width to height above which a wider view shows no more from bottom to top."""
+
+AROUND_LINKS = 1.07
+"""How much more of the view than the origins of links the links themselves take."""
+
 STEEP = 1e-3
 """A camera nearer (m) than this to the vertical through the point it looks at has no azimuth."""
 
@@ -60,7 +66,7 @@ class Viewpoint:
 
     def camera(self, aspect: float) -> Array:
         """Return the position (3,) of the camera for a view with this ratio of width to height."""
-        distance = self.width / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.35, 1.1))
+        distance = self.width / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.35, WIDEST))
         rise = np.array([0.0, 0.0, np.sin(ELEVATION)])
         return self.look_at + distance * (np.cos(ELEVATION) * self.direction + rise)
 
@@ -91,11 +97,17 @@ def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
         ahead = (bases[-1] - bases[0]) * [1.0, 1.0, 0.0]
     start = np.arctan2(ahead[1], ahead[0]) if np.linalg.norm(ahead) > 1e-6 else 0.0
 
+    links = _link_origins(scene)
+
     def view(azimuth: float) -> Viewpoint:
         direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         right = np.cross([0.0, 0.0, 1.0], direction)
         reach = np.abs((np.concatenate([bases, points, centres]) - look_at) @ right).max() + margin
-        return Viewpoint(look_at, direction, float(max(MIN_WIDTH, 2 * reach)))
+        wide = np.abs((links - look_at) @ right).max()
+        high = np.abs((links - look_at)[:, 2]).max() * WIDEST
+        return Viewpoint(
+            look_at, direction, float(max(MIN_WIDTH, 2 * reach, 2 * AROUND_LINKS * max(wide, high)))
+        )
 
     def cost(view: Viewpoint) -> float:
         eye = view.camera(aspect=1.0)
@@ -103,6 +115,12 @@ def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
         return hidden + 2 * abs(float(T_world_object[:3, 2] @ view.direction))
 
     return min((view(start + a) for a in AZIMUTHS), key=cost)
+
+
+def _link_origins(scene: Scene) -> Array:
+    """Return the origins (n, 3) of all links of all robots at home, in the world."""
+    poses = [robot.T_world_base @ robot.model.forward(robot.home) for robot in scene.robots.values()]
+    return np.concatenate([pose[:, :3, 3] for pose in poses])
 
 
 def stand_around(scene: Scene, T_world_object: Array) -> bool:

@@ -18,7 +18,9 @@ from trimesh.visual.material import PBRMaterial
 from symgrasp.meshes import read_parts
 from symgrasp.scene.scene import Scene
 
-__all__ = ["check_visuals", "link_visuals"]
+from ..state.scene_assets import Visuals
+
+__all__ = ["link_visuals", "read_visuals"]
 
 Color = tuple[int, ...]
 
@@ -62,20 +64,19 @@ def link_visuals(urdf: bytes) -> dict[str, bytes]:
     return glbs
 
 
-def check_visuals(scene: Scene) -> None:
-    """Read every mesh of a scene that the 3D view shows.
+def read_visuals(scene: Scene) -> Visuals:
+    """Read every mesh of a scene that the 3D view shows, and return those of its URDFs.
 
     Raises:
         MeshError: a mesh cannot be read.
     """
-    for robot in scene.robots.values():
-        link_visuals(robot.model.urdf)
+    models = [robot.model for robot in scene.robots.values()]
+    models += [o.model for o in scene.obstacles if o.model is not None]
     for o in scene.obstacles:
-        if o.model is not None:
-            link_visuals(o.model.urdf)
         for _, shape in o.shapes():
             if shape.kind == "mesh":
                 shape.mesh(f"obstacle {o.name}")
+    return {model.urdf: link_visuals(model.urdf) for model in models}
 
 
 def _add_visual(

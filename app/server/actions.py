@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import viser
 
@@ -14,12 +15,16 @@ from symgrasp.scene.scene import Scene
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
 from ..files.links import Link
-from ..files.scene_files import scene_yaml
+from ..files.scene_files import MAX_NAME, scene_archive, scene_yaml
 from ..render.map_picture import map_picture, picture_name
-from ..state import changes, job_changes
+from ..state import changes, job_changes, robot_changes
 from ..state.object_choice import OWN, ObjectChoice, check_size, from_library
 from ..state.page_link import Camera
+from ..state.robot_arms import IN_URDF, hand_option, tool_link
+from ..state.robot_choice import OWN_ROBOT, UploadedRobot, catalogue_robot
+from ..state.scene_assets import BuiltScene, UploadFolder
 from ..state.state import State
+from ..state.uploaded_scene import UploadedScene
 from .browser_messages import UploadButton
 from .plan_actions import PlanActions
 from .session_api import SessionApi
@@ -63,21 +68,26 @@ class Actions:
         """Open a scene by its name in the menu, which may be that of the uploaded one."""
         state = self._session.state
         uploaded = state.uploaded_scene if state else None
-        chosen = uploaded.scene if uploaded and uploaded.option == name else None
+        if uploaded and uploaded.option == name:
+            self.change(lambda state: changes.open_upload(state, uploaded))
+            return
         self._session.submit(
             f"Loading {name}",
-            lambda _: chosen or self._cache.scene(name),
+            lambda _: self._cache.scene(name),
             lambda state, scene: changes.open_scene(state, scene, name),
         )
 
     def upload_scene(self, name: str, content: bytes) -> None:
         """Read an uploaded scene and show it."""
 
-        self._session.submit(
-            f"Opening {name}",
-            lambda progress: self._process.read_scene(name, content, progress),
-            changes.open_upload,
-        )
+        def run(progress: Progress) -> UploadedScene:
+            if not name.lower().endswith(".zip"):
+                return self._process.read_scene(name, content, None, progress)
+            folder = UploadFolder()
+            uploaded = self._process.read_scene(name, content, folder.path, progress)
+            return replace(uploaded, assets=replace(uploaded.assets, folders=(folder,)))
+
+        self._session.submit(f"Opening {name}", run, changes.open_upload)
 
     def choose_object(self, option: str) -> None:
         """Replace the scene's object by an option of the menu."""
@@ -101,16 +111,76 @@ class Actions:
             ),
         )
 
-    def choose_hand(self, hand: str) -> None:
-        """Mount another hand on the chosen arm."""
+    def choose_robot(self, option: str) -> None:
+        """Replace the robot of the chosen arm by an option of the menu."""
         state = self._session.state
         if state is None:
             return
+        name, uploaded = state.robot.name, state.uploaded_robot
 
-        def run(progress: Progress) -> SceneWithObject:
-            return self._process.mount(state.scene, state.arm, hand, progress), state.object_choice
+        def run(progress: Progress) -> BuiltScene:
+            if uploaded and option == uploaded.option:
+                return self._process.put_robot(state.scene, name, uploaded.entry, progress)
+            if option == OWN_ROBOT:
+                entry = self._as_opened(state).file.robots[list(state.scene.robots).index(name)]
+                return self._process.put_robot(state.scene, name, entry, progress)
+            return self._process.put_robot(state.scene, name, catalogue_robot(option), progress)
 
-        self._change_object(f"Mounting {hand}", run)
+        again = uploaded if uploaded and option == uploaded.option else None
+        self._session.submit(
+            f"Loading {option}",
+            run,
+            lambda state, built: robot_changes.put_robot(state, built, name, option, again),
+        )
+
+    def upload_robot(self, name: str, content: bytes) -> None:
+        """Put the robot in an uploaded archive in the place of that of the chosen arm."""
+        state = self._session.state
+        if state is None:
+            return
+        robot = state.robot.name
+
+        def run(progress: Progress) -> tuple[BuiltScene, UploadedRobot]:
+            folder = UploadFolder()
+            option = f"{name[:MAX_NAME]} (upload)"
+            entry, built = self._process.read_robot(state.scene, robot, name, content, folder.path, progress)
+            return built, UploadedRobot(option, entry, folder)
+
+        def show(state: State, result: tuple[BuiltScene, UploadedRobot]) -> State:
+            built, uploaded = result
+            return robot_changes.put_robot(state, built, robot, uploaded.option, uploaded)
+
+        self._session.submit(f"Opening {name}", run, show)
+
+    def choose_tool(self, link: str) -> None:
+        """Put the hand of the chosen arm on another link."""
+        if state := self._session.state:
+            self._rearm(state, link, hand_option(state.scene, state.arm))
+
+    def choose_hand(self, option: str) -> None:
+        """Hold with another hand on the chosen arm."""
+        state = self._session.state
+        if state is None:
+            return
+        scene, arm = state.scene, state.arm
+        if option == IN_URDF or arm not in scene.replaceable_hands:
+            self._rearm(state, tool_link(scene, arm), option)
+            return
+        self._session.submit(
+            f"Mounting {option}",
+            lambda progress: self._process.mount(scene, arm, option, progress),
+            robot_changes.hand_changed,
+        )
+
+    def _rearm(self, state: State, link: str, option: str) -> None:
+        """Hold with a hand on a link of the chosen arm."""
+        scene, arm = state.scene, state.arm
+        hand = None if option == IN_URDF else option
+        self._session.submit(
+            f"Mounting {option} on {link}" if hand else f"Measuring the hand on {link}",
+            lambda progress: self._process.rearm(scene, arm, link, hand, progress),
+            lambda state, built: robot_changes.rearmed(state, built, arm),
+        )
 
     def _change_object(self, label: str, run: Callable[[Progress], SceneWithObject]) -> None:
         self._session.submit(label, run, lambda state, result: changes.choose_object(state, *result))
@@ -162,11 +232,15 @@ class Actions:
         )
 
     def save_scene(self) -> None:
-        """Send the scene with all changes to the browser as a YAML file."""
+        """Send the scene as it is now as a YAML file; in an archive where robots were uploaded."""
 
         def save(state: State) -> None:
             scene = state.moved_scene()
-            self._session.send(_file_name(scene.name, ".yaml"), scene_yaml(scene).encode())
+            if folders := [folder.path for folder in state.assets.folders]:
+                inner = _file_name(scene.name, ".yaml")
+                self._session.send(_file_name(scene.name, ".zip"), scene_archive(scene, inner, folders))
+            else:
+                self._session.send(_file_name(scene.name, ".yaml"), scene_yaml(scene).encode())
 
         self._session.attempt(save)
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from symgrasp.errors import InputError
 from symgrasp.progress import Progress
 
 from ..compute.cache import SharedCache
@@ -86,6 +87,11 @@ class PlanActions:
 
         def send(state: State) -> None:
             if state.plan:
+                if state.assets.folders and format_name == "JSON":
+                    expected = (
+                        "robots that the server has; save the scene, unpack it and plan with `symgrasp plan`"
+                    )
+                    raise InputError("plan file", "robots", "an upload", expected)
                 plan = state.plan.plan
                 ending, write = FORMATS[format_name]
                 name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")

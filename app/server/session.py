@@ -24,7 +24,7 @@ from ..files.links import Link
 from ..files.shown_paths import shown_paths
 from ..panels.layout import Layout
 from ..scene3d.scene_view import SceneView
-from ..state import changes, job_changes
+from ..state import changes, job_changes, robot_changes
 from ..state.page_link import Camera
 from ..state.plan_changes import change_plan_results
 from ..state.plan_results import PlanResults
@@ -103,6 +103,7 @@ class Session:
             on_surface=lambda i, j: self.change(lambda s: changes.choose_surface_cell(s, i, j)),
             on_flat_map=lambda i, j: self.change(lambda s: changes.choose_cell(s, i, j)),
             on_drag=lambda pose: self.change(lambda s: changes.drag(s, pose), "gizmo"),
+            on_base_drag=lambda pose: self.change(lambda s: robot_changes.robot_dragged(s, pose), "gizmo"),
         )
 
         @client.camera.on_update
@@ -241,7 +242,7 @@ class Session:
         def run(progress: Progress) -> tuple[State, Camera | None]:
             link = Link.parse(self.visit.query)
             scene, choice = self.cache.linked(
-                link, lambda scene, arm, hand: self.process.mount(scene, arm, hand, progress)
+                link, lambda scene, arm, hand: self.process.mount(scene, arm, hand, progress).scene
             )
             name = link.scene or self.cache.first
             return link.apply(replace(State.of(scene, name), object_choice=choice)), link.camera

@@ -35,7 +35,9 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
             atomic=server.atomic,
             camera=SimpleNamespace(image_width=1280, image_height=800),
         )
-        view = SceneView(cast("viser.ClientHandle", client), 0, _ignore, _ignore, lambda _: None)
+        view = SceneView(
+            cast("viser.ClientHandle", client), 0, _ignore, _ignore, lambda _: None, lambda _: None
+        )
         view.camera = camera
         view.show(state, move_gizmo=True)
         assert view.flat_map

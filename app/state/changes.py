@@ -61,15 +61,17 @@ def open_scene(state: State, scene: Scene, name: str) -> State:
         State.of(scene, name),
         uploaded_object=state.uploaded_object,
         uploaded_scene=state.uploaded_scene,
+        uploaded_robot=state.uploaded_robot,
         map_view=state.map_view.for_another_scene(),
-        display=replace(state.display, drag_handles=False, symmetry_error=False),
+        display=replace(state.display, drag_handles=False, base_handles=False, symmetry_error=False),
         history=state.history,
     )
 
 
 def open_upload(state: State, uploaded: UploadedScene) -> State:
     """Show an uploaded scene and keep it in the menu."""
-    return open_scene(replace(state, uploaded_scene=uploaded), uploaded.scene, uploaded.option)
+    opened = open_scene(replace(state, uploaded_scene=uploaded), uploaded.scene, uploaded.option)
+    return replace(opened, assets=uploaded.assets)
 
 
 def choose_object(state: State, scene: Scene, choice: ObjectChoice | None) -> State:

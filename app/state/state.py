@@ -17,6 +17,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import PlanTask
 from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.poses import Array, rotation_z
+from symgrasp.robot.robot import Robot
 from symgrasp.scene.scene import Scene
 
 from .cached import cached
@@ -28,6 +29,8 @@ from .object_pose import ObjectPose, with_poses
 from .page_link import PageLink
 from .plan_results import PlanKind, PlanResult, PlanResults
 from .requests import Busy, ExplainRequest, MapRequest, MapResult, Request
+from .robot_choice import OWN_ROBOT, UploadedRobot
+from .scene_assets import NO_ASSETS, SceneAssets
 from .uploaded_scene import UploadedScene
 
 __all__ = ["Pick", "State"]
@@ -59,6 +62,10 @@ class State:
         object_choice: the object that replaces the scene's own; None for its own.
         uploaded_object: the object that was uploaded last.
         uploaded_scene: the scene that was uploaded last.
+        assets: what belongs to the scene.
+        robot_options: robot → its option in the menu, of those that replace robots of the scene's file.
+        uploaded_robot: the robot that was uploaded last.
+        changed_arms: the arms whose tool link or hand was chosen in a way that no link can carry.
         poses: task → base pose of the object, of the tasks that were moved.
         pose_when_chosen: the entry of `poses` for the chosen task when it was chosen, if there was one.
         delta: turn (rad) of the object about its axis.
@@ -82,6 +89,10 @@ class State:
     object_choice: ObjectChoice | None = None
     uploaded_object: ObjectChoice | None = None
     uploaded_scene: UploadedScene | None = None
+    assets: SceneAssets = NO_ASSETS
+    robot_options: Mapping[str, str] = field(default_factory=dict)
+    uploaded_robot: UploadedRobot | None = None
+    changed_arms: frozenset[str] = frozenset()
     poses: Mapping[str, ObjectPose] = field(default_factory=dict)
     pose_when_chosen: ObjectPose | None = None
     delta: float = 0.0
@@ -109,6 +120,7 @@ class State:
         return (
             self.scene, self.scene_name, self.task, self.arm, self.base, self.delta, self.pick, self.step,
             self.display, self.object_choice, self.uploaded_object, self.uploaded_scene,
+            self.robot_options, self.uploaded_robot,
             *self.map_view.input_values,
             *self.plan_results.input_values,
         )  # fmt: skip
@@ -127,6 +139,16 @@ class State:
     def object_option(self) -> str:
         """The object's option in the menu."""
         return self.object_choice.option if self.object_choice else OWN
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the chosen arm."""
+        return self.scene.arm(self.arm).robot
+
+    @property
+    def robot_option(self) -> str:
+        """The option in the menu of the robot of the chosen arm."""
+        return self.robot_options.get(self.robot.name, OWN_ROBOT)
 
     @property
     def shown_upload(self) -> Scene | None:

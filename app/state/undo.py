@@ -11,6 +11,7 @@ from dataclasses import replace
 from symgrasp.feasibility.map import FeasibilityMap
 
 from .history import History
+from .scene_assets import NO_ASSETS
 from .state import State
 
 __all__ = ["PLANS_KEPT", "UPLOADS_KEPT", "redo", "remember", "undo"]
@@ -19,7 +20,8 @@ PLANS_KEPT = 6
 """How many results of planners the history keeps, as a map may take 4 MB; older steps lose theirs."""
 
 UPLOADS_KEPT = 10
-"""How many uploads the history keeps, as one takes a megabyte or more; steps before them cannot be undone."""
+"""How many uploads and robots the history keeps, as one takes a megabyte or more; steps before them cannot be
+undone."""
 
 
 def remember(before: State, after: State, origin: str, time: float) -> State:
@@ -72,10 +74,11 @@ def _without_results(state: State) -> State:
 
 
 def _with_few_uploads(past: tuple[State, ...]) -> tuple[State, ...]:
-    """Return the latest steps, as far back as they have no more than `UPLOADS_KEPT` uploads."""
+    """Return the latest steps, as far back as they have no more than `UPLOADS_KEPT` uploads and robots."""
     kept: set[object] = set()
     for k, state in reversed(tuple(enumerate(past))):
-        kept |= {state.uploaded_object, state.uploaded_scene} - {None}
+        kept |= {state.uploaded_object, state.uploaded_scene, state.uploaded_robot, state.assets}
+        kept -= {None, NO_ASSETS}
         if len(kept) > UPLOADS_KEPT:
             return past[k + 1 :]
     return past

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from symgrasp.scene.scene import Scene
 
+from .scene_assets import NO_ASSETS, SceneAssets
+
 __all__ = ["UploadedScene"]
 
 
@@ -16,7 +18,9 @@ class UploadedScene:
     Attributes:
         option: its name in the menu of the page.
         scene: the scene.
+        assets: what belongs to it.
     """
 
     option: str
     scene: Scene
+    assets: SceneAssets = NO_ASSETS

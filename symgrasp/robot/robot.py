@@ -130,6 +130,10 @@ class Arm:
         H = np.array([frame[:3, :3] @ joint.axis for frame, joint in zip(frames, joints, strict=True)])
         return H, np.diff(points, axis=0), links[self._tool_index][:3, :3]
 
+    def on(self, robot: Robot) -> Arm:
+        """Return the arm as it is on the same robot at another place."""
+        return Arm(self.name, robot, self.tool, self.hand, self._shared)
+
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
         return self.__dict__.copy()

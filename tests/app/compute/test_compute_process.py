@@ -202,7 +202,7 @@ def test_a_parser_that_misbehaves_is_reported_and_the_next_file_is_read(
 def test_a_mounted_hand_is_that_of_the_scene_here(process):
     scene = load_small("log_iiwa_and_panda")
     mounted = process.mount(scene, "iiwa", "pr2", quiet)
-    assert mounted.map_sha256 == scene.with_hand("iiwa", "pr2").map_sha256
+    assert mounted.scene.map_sha256 == scene.with_hand("iiwa", "pr2").map_sha256
     with pytest.raises(SceneError, match="did you mean 'wsg50'"):
         process.mount(scene, "iiwa", "wsg5", quiet)
 

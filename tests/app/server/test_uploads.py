@@ -13,7 +13,7 @@ import yaml
 from app.compute import map_service, process_pool
 from app.compute.cache import SharedCache
 from app.files import scene_files
-from app.scene3d.visual_meshes import check_visuals
+from app.scene3d.visual_meshes import read_visuals
 from app.server import lobby
 from app.server.actions import Actions
 from app.server.session import Session
@@ -78,7 +78,7 @@ def forbidden(*_: object, **__: object) -> None:
 def no_parsers(monkeypatch) -> None:
     """Every parser of files breaks in this process; those that a session starts have their own."""
     planned("pick_pour_place", "sequential")  # it is kept
-    check_visuals(Scene.load("pick_pour_place"))  # meshes that ship may be read for the 3D view
+    read_visuals(Scene.load("pick_pour_place"))  # meshes that ship may be read for the 3D view
     monkeypatch.setattr(Scene, "from_content", forbidden)
     monkeypatch.setattr(scene_files, "read_scene", forbidden)
     monkeypatch.setattr(RobotModel, "__init__", forbidden)

@@ -1,0 +1,139 @@
+"""Robots in place of those of a scene: from the catalogue, and from archives that people upload."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from app.compute.upload_service import UploadService
+from app.files.archives import pack, unpack
+from app.files.scene_files import scene_archive
+from symgrasp.errors import InputError, SymgraspError
+from symgrasp.files import SCENES_DIR
+from symgrasp.robot.catalogue import CATALOGUE
+from symgrasp.scene.scene import Scene
+from tests.app.robot_archives import PANDA, panda_archive
+
+IIWA = next(robot for robot in CATALOGUE if robot.name == "iiwa")
+
+
+def quiet(share: float) -> None:
+    pass
+
+
+@pytest.fixture(scope="module")
+def bottle() -> Scene:
+    return Scene.load("bottle_on_table")
+
+
+@pytest.fixture
+def service() -> UploadService:
+    return UploadService((SCENES_DIR,))
+
+
+def test_a_robot_of_the_catalogue_takes_the_place_of_another(service, bottle):
+    built = service.put_robot(bottle, "panda", IIWA, quiet)
+    scene = built.scene
+    assert (list(scene.robots), scene.task().arms) == (["iiwa"], tuple(scene.arms))
+    assert np.array_equal(scene.profile.points, bottle.profile.points)
+    assert scene.file.obstacles == bottle.file.obstacles
+    assert np.array_equal(scene.task().T_world_object, bottle.task().T_world_object)
+    assert set(built.visuals) == {scene.robots["iiwa"].model.urdf}
+    # its first joint is in the same direction from the object as that of the other was
+    old, new = (s.robots[n].T_world_base[:3, 3] + a.P[0] for s, n, a in (
+        (bottle, "panda", bottle.arm()), (scene, "iiwa", scene.arm()),
+    ))  # fmt: skip
+    point = bottle.task().T_world_object[:3, 3]
+    assert np.allclose(np.cross(old - point, new - point), 0)
+    assert (old - point) @ (new - point) > 0
+
+
+def test_the_own_robot_comes_back_as_it_was(service, bottle):
+    changed = service.put_robot(bottle, "panda", IIWA, quiet).scene
+    again = service.put_robot(changed, "iiwa", bottle.file.robots[0], quiet).scene
+    assert again.task().arms == ("panda",)
+    entry = again.file.robots[0]
+    assert entry.model_copy(update={"base": bottle.file.robots[0].base}) == bottle.file.robots[0]
+
+
+def test_names_that_are_taken_get_a_number(service):
+    scene = Scene.load("handover_between_robots")
+    first, second = scene.robots
+    changed = service.put_robot(scene, second, replace(IIWA, name=first), quiet)
+    assert list(changed.scene.robots) == [first, f"{first}_2"]
+
+
+def test_an_uploaded_robot_is_the_robot(service, bottle, tmp_path):
+    entry, built = service.read_robot(bottle, "panda", "my panda.zip", panda_archive(), tmp_path, quiet)
+    arm, own = built.scene.arm(), bottle.arm()
+    assert arm.joint_names == own.joint_names
+    q = np.linspace(-0.5, 0.5, 7)
+    assert np.allclose(arm.tool_pose(q)[:3, 3], own.tool_pose(q)[:3, 3], atol=5e-3)  # measured
+    assert (arm.hand.min_opening, arm.hand.max_opening) == (own.hand.min_opening, own.hand.max_opening)
+    assert Path(entry.urdf).is_relative_to(tmp_path.resolve())
+    assert all(robot.model.urdf in built.visuals for robot in built.scene.robots.values())
+
+
+def test_a_saved_archive_opens_again_here_and_on_the_command_line(service, bottle, tmp_path):
+    folder = tmp_path / "upload"
+    folder.mkdir()
+    scene = service.read_robot(bottle, "panda", "p.zip", panda_archive(), folder, quiet)[1].scene
+    content = scene_archive(scene, "mine.yaml", [folder])
+    there = tmp_path / "there"
+    unpack("mine.zip", content, there)
+    text = (there / "mine.yaml").read_text(encoding="utf-8")
+    assert str(tmp_path) not in text
+    folder.rename(tmp_path / "gone")
+    loaded = Scene.load(there / "mine.yaml")
+    assert loaded.arm().joint_names == scene.arm().joint_names
+    again = tmp_path / "again"
+    again.mkdir()
+    opened = service.read_scene("mine.zip", content, again, quiet)
+    assert (opened.option, list(opened.scene.arms)) == ("mine.zip (upload)", list(scene.arms))
+    assert np.allclose(opened.scene.robots["panda"].T_world_base, scene.robots["panda"].T_world_base)
+
+
+@pytest.mark.parametrize(
+    "reference", ["/etc/passwd", "../../../../../etc/passwd", "file:///etc/passwd", "/etc/no"]
+)
+def test_a_robot_refers_to_no_file_of_the_server(reference, service, bottle, tmp_path):
+    urdf = (PANDA / "panda.urdf").read_text(encoding="utf-8")
+    urdf = re.sub(r'filename="[^"]*"', f'filename="{reference}"', urdf)
+    with pytest.raises(InputError, match="a file of the archive, or of an installed package"):
+        service.read_robot(bottle, "panda", "p.zip", pack([("a.urdf", urdf.encode())]), tmp_path, quiet)
+
+
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({"readme.txt": b""}, "one .urdf file"),
+        ({"a.urdf": b"", "b.urdf": b""}, "one .urdf file"),
+        ({"a.urdf": b"<robot"}, "a valid URDF document"),
+        ({"a.urdf": b'<robot name="x"><link name="a"/></robot>'}, "an arm of five or more joints"),
+    ],
+)
+def test_what_is_no_robot_is_refused_in_one_line(files, expected, service, bottle, tmp_path):
+    with pytest.raises(SymgraspError, match=expected) as caught:
+        service.read_robot(bottle, "panda", "p.zip", pack(files.items()), tmp_path, quiet)
+    assert "\n" not in str(caught.value)
+
+
+def test_obstacles_of_an_archive_are_refused(service, bottle, tmp_path):
+    """The server would have to read them to draw them."""
+    content = bottle.content | {"obstacles": [{"name": "x", "mesh": "x.obj"}]}
+    files = {"scene.yaml": yaml.safe_dump(content).encode(), "x.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}
+    with pytest.raises(SymgraspError, match="one of the server's scenes"):
+        service.read_scene("s.zip", pack(files.items()), tmp_path, quiet)
+
+
+def test_another_hand_on_a_link(service, bottle):
+    changed = service.rearm(bottle, "panda", "panda_link8", "wsg50", quiet).scene
+    assert changed.arm().hand.urdf is not None
+    assert changed.replaceable_hands == {"panda": "wsg50"}
+    back = service.rearm(changed, "panda", "panda_grasptarget", None, quiet).scene
+    assert back.arm().hand.max_opening == pytest.approx(0.08, abs=1e-3)
