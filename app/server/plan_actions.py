@@ -88,9 +88,7 @@ class PlanActions:
         def send(state: State) -> None:
             if state.plan:
                 if state.assets.folders and format_name == "JSON":
-                    expected = (
-                        "robots that the server has; save the scene, unpack it and plan with `symgrasp plan`"
-                    )
+                    expected = "robots of the server; save the scene, unpack it and run `symgrasp plan`"
                     raise InputError("plan file", "robots", "an upload", expected)
                 plan = state.plan.plan
                 ending, write = FORMATS[format_name]
