@@ -32,7 +32,8 @@ def server() -> Iterator[viser.ViserServer]:
 def view_of(server: viser.ViserServer, camera: tuple[float, ...] | None) -> SceneView:
     looker = SimpleNamespace(image_width=1280, image_height=800)
     client = SimpleNamespace(scene=server.scene, atomic=server.atomic, camera=looker)
-    view = SceneView(client, 0, lambda *_: None, lambda *_: None, lambda _: None)  # pyright: ignore[reportArgumentType]
+    ignored = [lambda *_: None] * 4
+    view = SceneView(client, 0, *ignored)  # pyright: ignore[reportArgumentType]
     view.camera = camera
     view.show(opened("soda_can"), move_gizmo=True)
     return view
