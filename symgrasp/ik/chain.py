@@ -17,7 +17,7 @@ __all__ = [
     "MEETING", "MIDDLE", "P0", "PARALLEL_PHI", "PARALLEL_SLACK", "PHI", "R0", "SHOULDER", "SLACK",
     "THREE_PARALLEL", "TRIPLE", "TURN", "WRIST", "WRIST_SEEN", "Chain", "ChainGeometry",
     "ParallelGeometry", "SphericalGeometry",
-    "chain_geometries", "is_rounded",
+    "chain_geometries", "has_exact_pair", "is_rounded",
 ]  # fmt: skip
 
 MEETING_DISTANCE = 1e-8
@@ -223,6 +223,11 @@ def chain_geometries(arm: Arm, locked: int | None, phi: Array) -> Sequence[Chain
         if len(known) == len(rows):
             return known
     return None
+
+
+def has_exact_pair(arm: Arm, locked: int | None, phi: float) -> bool:
+    """Whether two axes at one end of an arm meet without being moved, with a joint locked at φ."""
+    return any(_meeting_pair(_joints(arm, locked, phi, end), False) is not None for end in (False, True))
 
 
 def is_rounded(geometries: Sequence[ChainGeometry]) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from eaik.IK_HP import HPRobot
 
 from symgrasp.errors import UrdfError
-from symgrasp.ik.chain import chain_geometries, is_rounded
+from symgrasp.ik.chain import chain_geometries, has_exact_pair, is_rounded
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.robot.robot import Arm
 
@@ -20,11 +20,11 @@ GENERIC_ANGLE = 0.3
 """Value (rad) at which locks are tried: the answer is the same at almost any value, but at zero axes may
 happen to be parallel."""
 
-CLOSED_FORM, ROUNDED_CLOSED_FORM, FIXED_PAIR, TURNED_PAIR, EAIK_ALONE, UNKNOWN = range(6)
+CLOSED_FORM, ROUNDED_CLOSED_FORM, FIXED_PAIR, TURNED_PAIR, ROUNDED_PAIR, EAIK_ALONE, UNKNOWN = range(7)
 """What a lock leaves, best first: a closed form that is compiled; the same once axes are moved a little; two
-axes that meet at one end of the arm;
-the same on both sides of the locked joint, so that the point where they meet depends on φ, and may be far
-away; an arm that EAIK alone knows; an arm that nothing here solves."""
+axes that meet at one end of the arm; the same on both sides of the locked joint, so that the point where
+they meet depends on φ, and may be far away; two that meet once they are moved a little; an arm
+that EAIK alone knows; an arm that nothing here solves."""
 
 
 def joint_to_lock(arm: Arm) -> int | None:
@@ -53,5 +53,7 @@ def _kind(arm: Arm, joint: int | None) -> int:
         return EAIK_ALONE if HPRobot(arm.H, arm.P, locks).hasKnownDecomposition() else UNKNOWN
     if geometry[0].family != MEETING_PAIR:
         return ROUNDED_CLOSED_FORM if is_rounded(geometry) else CLOSED_FORM
+    if not has_exact_pair(arm, joint, GENERIC_ANGLE):
+        return ROUNDED_PAIR
     between = (1,) if geometry[0].backwards else (arm.dof - 2,)
     return TURNED_PAIR if joint in between else FIXED_PAIR

@@ -47,7 +47,7 @@ def arms() -> dict[str, Arm]:
         "five_crossings": synthetic(
             [-z, y, -z, y, -z, y, -z],
             [[0, 0, 0.16], [0, -0.005, 0.13], [0, -0.006, 0.21], [0, -0.006, 0.21], [0, -0.006, 0.21],
-             [0, -0.0002, 0.11], [0, -0.0002, 0.11], [0, 0, 0.06]],
+             [0, -0.003, 0.11], [0, -0.003, 0.11], [0, 0, 0.06]],
         ),
         # Axes 1 and 3, and 5 and 7, are in a plane whatever the joint between them does; no others meet.
         "turned_pair": synthetic(
