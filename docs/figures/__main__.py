@@ -17,6 +17,7 @@ FIGURES: dict[str, Callable[[], None]] = {
     figure.__name__: figure
     for figure in (
         architecture,
+        holding.log_two_humanoids,
         holding.log_four_robots,
         unwrapping.soda_can,
         holding.wine_bottle,

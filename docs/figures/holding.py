@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -29,16 +30,26 @@ from symgrasp.plan.plan import Hold, Plan
 from symgrasp.planners.planning import plan_bimanual, plan_sequential
 from symgrasp.scene.scene import Scene
 
-__all__ = ["log_four_robots", "pick_pour_place", "tutorial", "wine_bottle"]
+__all__ = ["log_four_robots", "log_two_humanoids", "pick_pour_place", "tutorial", "wine_bottle"]
 
 GLAZE = np.array([60, 120, 160]) / 255
 WOOD = np.array([214, 178, 131]) / 255
 HANDS = PRINTS[1:-1]
 
 
+def log_two_humanoids() -> None:
+    """Figure 1: two humanoids hold a long log, and the prints of their hands share no cell."""
+    _log("log_two_humanoids", Camera((0, 0, 0.88), -48, 16, 4.6), (62, 62, 108, 62))
+
+
 def log_four_robots() -> None:
-    """Figure 1: robots hold a long log, and the prints of their hands share no cell."""
-    scene = Scene.load("log_four_robots")
+    """Figure 1 with four arms."""
+    _log("log_four_robots", Camera((0.02, 0, 0.27), -64, 25, 3.3), (62, 62, 62, 62))
+
+
+def _log(name: str, camera: Camera, away: Sequence[int]) -> None:
+    """Draw robots that hold a log, with labels so far away from their hands, and the prints on the log."""
+    scene = Scene.load(name)
     (task,) = plan_bimanual(scene).tasks
     pose, grid = task.object_pose_turned.array(), scene.manifold
     fine = Manifold(grid.profile, 4 * grid.heights, 4 * grid.angles)
@@ -48,12 +59,11 @@ def log_four_robots() -> None:
     log = object_body(scene.profile, pose, cells_paint(grid, colors))
 
     figure = new(10, 6.6)
-    camera = Camera((0.02, 0, 0.27), -64, 25, 3.3)
     bodies = [*robots(scene, task), *obstacles(scene, without=("floor",)), log, floor(0)]
     axes, picture = photo(figure, (0, 1.75, 10, 4.85), bodies, camera)
-    for hold in task.holds:
+    for hold, distance in zip(task.holds, away, strict=True):
         point = (pose @ [*grid.contact(hold.grasp.h, hold.grasp.theta), 1.0])[:3]
-        offset = (0, 62 if hold.grasp.theta > 0 else -62)
+        offset = (0, distance if hold.grasp.theta > 0 else -distance)
         label(axes, picture, point, hold.arm, offset)
 
     unwrapped = board(figure, (0.75, 0.55, 8.9, 1.05))
@@ -67,7 +77,7 @@ def log_four_robots() -> None:
         box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
         below = -105 if hold.grasp.theta > 0 else 105
         unwrapped.text(100 * hold.grasp.h, below, hold.arm, **text, bbox=box)
-    save(figure, "log_four_robots.png")
+    save(figure, f"{name}.png")
 
 
 def wine_bottle() -> None:
