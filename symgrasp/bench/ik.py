@@ -10,7 +10,7 @@ from time import process_time
 import numpy as np
 
 from symgrasp.errors import InputError, SymgraspError
-from symgrasp.ik import ArmIK, CompiledIK, solver_for
+from symgrasp.ik import ArmIK, solver_for
 from symgrasp.poses import Array, inverse
 from symgrasp.references import resolve
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
@@ -18,7 +18,7 @@ from symgrasp.robot.hand import Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 
-__all__ = ["IkRow", "bare_arm", "family", "measure", "recall", "run"]
+__all__ = ["IkRow", "bare_arm", "measure", "recall", "run"]
 
 SAMPLES = 16
 """Redundancy samples of a pose that is timed."""
@@ -32,9 +32,6 @@ SSIK_POSES = 20
 SAME = 1e-3
 """Joint values closer than this (rad), whole turns aside, are the same solution: near singular poses they are
 known less well than the pose."""
-
-FAMILIES = ("spherical", "three parallel", "search")
-"""What the families of `symgrasp.ik.chain.Chain` are called."""
 
 BARE = Hand("none", (), (), {}, 0.0, 0.1, 0.0, 0.01)
 """No hand: of an arm's inverse kinematics it is not a part."""
@@ -71,7 +68,7 @@ class IkRow:
         share = 100 * self.found / self.poses
         theirs = "ssik: not asked" if self.ssik is None else f"ssik: {self.ssik[0]} of {self.ssik[1]} found"
         return (
-            f"{self.name:18} {self.family:22} locked: {self.locked or 'none':24} "
+            f"{self.name:18} {self.family:46} locked: {self.locked or 'none':24} "
             f"recall {share:7.3f} % of {self.poses}, {self.microseconds:6.2f} µs, {theirs}"
         )
 
@@ -101,7 +98,7 @@ def measure(robot: CatalogueRobot, which: CatalogueArm, poses: int) -> IkRow:
     seconds = process_time() - start
     return IkRow(
         name=name,
-        family=family(ik),
+        family=ik.family,
         locked=None if ik.locked is None else arm.joint_names[ik.locked],
         poses=poses,
         found=recall(ik, q),
@@ -127,13 +124,6 @@ def bare_arm(robot: CatalogueRobot, which: CatalogueArm) -> Arm:
     return Arm(
         which.name, Robot(robot.name, model, np.eye(4), model.default_values()), which.tool, BARE, others
     )
-
-
-def family(ik: ArmIK) -> str:
-    """Return what the inverse kinematics of an arm is called."""
-    if not isinstance(ik, CompiledIK):
-        return "EAIK"
-    return FAMILIES[int(ik.chain.joint[8])] + (", rounded" if ik.chain.joint[9] else "")
 
 
 def random_configurations(arm: Arm, count: int, seed: int) -> Array:

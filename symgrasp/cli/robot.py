@@ -118,8 +118,7 @@ def _say_missing(model: RobotModel) -> None:
 def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     """Print how the configurations of an arm are found; return whether they can be."""
     from symgrasp.feasibility.starter import scene_content
-    from symgrasp.ik import CompiledIK, solver_for
-    from symgrasp.ik.arm_ik import ArmIK
+    from symgrasp.ik import ArmIK, solver_for
     from symgrasp.scene.scene import Scene
 
     one = {**entry, "arms": [a for a in entry["arms"] if a["name"] == arm.name]}
@@ -129,10 +128,9 @@ def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     except SymgraspError as error:
         say(f"    no solver: {error}")
         return False
-    how = "closed form" if solver.complete else "search, which may miss some"
-    compiled = ", compiled" if isinstance(solver, CompiledIK) else ""
-    locked = solver.locked if isinstance(solver, ArmIK) else None
-    say(f"    solver: {how}{compiled}" + ("" if locked is None else f", {arm.joints[locked]} locked"))
+    assert isinstance(solver, ArmIK)  # a scene to start from has no torso that moves
+    locked = "" if solver.locked is None else f"; {arm.joints[solver.locked]} locked"
+    say(f"    solver: {solver.family}" + locked + ("" if solver.complete else "; it may miss some"))
     return True
 
 

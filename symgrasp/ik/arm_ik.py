@@ -84,6 +84,11 @@ class ArmIK(ABC):
 
     @property
     @abstractmethod
+    def family(self) -> str:
+        """What the inverse kinematics of the arm is called."""
+
+    @property
+    @abstractmethod
     def complete(self) -> bool:
         """Whether every configuration at the redundancy samples is found, up to rounding.
 

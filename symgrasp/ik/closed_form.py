@@ -35,6 +35,11 @@ class ClosedFormIK(ArmIK):
     """
 
     @property
+    def family(self) -> str:
+        """What the inverse kinematics of the arm is called."""
+        return "closed form of EAIK"
+
+    @property
     def complete(self) -> bool:
         """True: what EAIK solves has a closed form."""
         return True

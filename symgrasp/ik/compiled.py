@@ -15,6 +15,9 @@ from symgrasp.robot.robot import Arm
 
 __all__ = ["CompiledIK"]
 
+FAMILIES = ("closed form, spherical triple", "closed form, three parallel axes", "search, two axes that meet")
+"""What the families of `Chain` are called."""
+
 LEEWAY = 0.3
 """How far (rad) outside its limits a joint of a rounded arm may be in the closed form: near singular poses
 Newton's method moves joints that far."""
@@ -41,9 +44,14 @@ class CompiledIK(ArmIK):
         self.chain = self._pack_chain()
 
     @property
+    def family(self) -> str:
+        """What the inverse kinematics of the arm is called."""
+        return FAMILIES[int(self.chain.joint[8])] + (", rounded axes" if self.chain.joint[9] else "")
+
+    @property
     def complete(self) -> bool:
-        """Whether every configuration at the redundancy samples is found: where a closed form is compiled."""
-        return bool(self.chain.joint[8] != MEETING_PAIR)
+        """Whether every configuration at the samples is found: by a closed form of the true axes."""
+        return bool(self.chain.joint[8] != MEETING_PAIR and not self.chain.joint[9])
 
     @staticmethod
     def fits(ik: ArmIK) -> bool:

@@ -15,7 +15,12 @@ ROBOTS = {robot.name: robot for robot in CATALOGUE}
 
 
 @pytest.mark.parametrize(
-    ("name", "family"), [("panda", "spherical"), ("xarm7", "spherical, rounded"), ("ur5", "three parallel")]
+    ("name", "family"),
+    [
+        ("panda", "closed form, spherical triple"),
+        ("xarm7", "closed form, spherical triple, rounded axes"),
+        ("ur5", "closed form, three parallel axes"),
+    ],
 )
 def test_every_configuration_of_a_closed_form_is_found(name, family):
     robot = ROBOTS[name]
