@@ -129,7 +129,7 @@ def test_objects_and_hands_are_measured(tmp_path):
     assert "franka" in can.holds
     assert str(can).splitlines() == can.lines()
     hand = sg.measure_hand("package://pybullet_data/pr2_gripper.urdf")
-    assert hand.max_opening == pytest.approx(0.0886, abs=1e-3)
+    assert hand.max_opening == pytest.approx(0.0988, abs=1e-3)
     with pytest.raises(sg.SymgraspError, match="existing URDF file"):
         sg.measure_hand(tmp_path / "none.urdf")
 

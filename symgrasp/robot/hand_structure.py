@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from symgrasp.errors import UrdfError, one_of
@@ -37,7 +37,6 @@ def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
     Raises:
         UrdfError: there is no such palm, or several.
     """
-    chains = {link: model.chain(link) for link in model.link_names}
     hands, group = _hands(model)
     if tool is not None:
         mover = group[model.link_names[model.link_index(tool)]]
@@ -51,11 +50,12 @@ def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
             raise UrdfError(model.path, "hand", f"{len(inner)} hands", expected)
         mover = inner[0]
     together = [link for link in model.link_names if group[link] == mover]
-    parents = [chains[finger[0]][:-1] for finger in hands[mover]]
+    parents = [model.chain(finger[0])[:-1] for finger in hands[mover]]
     shared = [j for j in parents[0] if all(j in chain for chain in parents)]
     base = model.link_names[shared[-1].child] if shared else model.root
     # On a robot the last link of the arm moves with the palm, but is not part of the hand.
-    palm = together if mover is None else [link for link in together if chains[link][: len(shared)] == shared]
+    own = [link for link in together if model.chain(link)[: len(shared)] == shared]
+    palm = together if mover is None else own
     return HandStructure(base, palm, hands[mover], mover is None)
 
 
@@ -75,17 +75,33 @@ def _hands(model: RobotModel) -> tuple[dict[str | None, list[list[str]]], dict[s
     Links that only fixed joints connect move as one rigid group. A group is named by the last joint that
     moves it, None where no joint does.
     """
-    chains = {link: model.chain(link) for link in model.link_names}
-    moving = {link: [j for j in chain if j.source >= 0] for link, chain in chains.items()}
-    fingers_of: dict[str | None, list[list[str]]] = {}
+    names = model.link_names
+    mover: list[str | None] = [None] * len(names)
+    children: list[list[int]] = [[] for _ in names]
+    for joint in model.joints:  # parents before children
+        mover[joint.child] = joint.name if joint.source >= 0 else mover[joint.parent]
+        children[joint.parent].append(joint.child)
+    shaped = [model.has_shape(name) for name in names]
+    for joint in reversed(model.joints):
+        shaped[joint.parent] |= shaped[joint.child]
+    first_of: dict[str | None, list[int]] = {}
     for joint in model.joints:
-        if joint.source >= 0:
-            finger = [link for link in model.link_names if joint in chains[link]]
-            above = moving[model.link_names[joint.parent]]
-            if links_with_shapes(model, finger):
-                fingers_of.setdefault(above[-1].name if above else None, []).append(finger)
-    hands = {mover: fingers for mover, fingers in fingers_of.items() if len(fingers) > 1}
-    return hands, {link: joints[-1].name if joints else None for link, joints in moving.items()}
+        if joint.source >= 0 and shaped[joint.child]:
+            first_of.setdefault(mover[joint.parent], []).append(joint.child)
+    hands = {
+        group: [[names[k] for k in _subtree(children, first)] for first in firsts]
+        for group, firsts in first_of.items()
+        if len(firsts) > 1
+    }
+    return hands, dict(zip(names, mover, strict=True))
+
+
+def _subtree(children: Sequence[Sequence[int]], first: int) -> list[int]:
+    """Return a link of a tree and all that hang on it, in order."""
+    found = [first]
+    for link in found:
+        found += children[link]
+    return sorted(found)
 
 
 def _innermost(hands: dict[str | None, list[list[str]]], group: dict[str, str | None]) -> list[str | None]:

@@ -148,7 +148,7 @@ def test_a_hand_that_is_not_on_the_robot(panda, change, message):
             "floating",
         ),
         ("<robot name='r'/>", "without links"),
-        ("<mujoco model='r'/>", "<mujoco>"),
+        ("<mujoco model='r'/>", "an MJCF file of MuJoCo"),
         (
             "<robot name='r'><link name='a'><collision><geometry><plane/></geometry></collision></link>"
             "</robot>",
