@@ -1,4 +1,4 @@
-"""``symgrasp bench``: measure maps and planners, or the inverse kinematics of robots."""
+"""``symgrasp bench``: measure maps and planners, or the inverse kinematics and maps of robots."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ from symgrasp.cli.shared import Commands, add_command, add_out, check_out, say, 
 __all__ = ["add_parser", "run"]
 
 POSES = 20_000
-"""Random configurations of an arm that ``bench ik`` looks for, unless told otherwise."""
+"""Random configurations of an arm that ``bench ik`` and ``bench robots`` look for, unless told otherwise."""
 
 
 def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
     text = "Measure maps and planners against what one would do otherwise, or the robots that packages ship."
     command = add_command(commands, "bench", run, text)
-    text = "measure the inverse kinematics of the robots that packages ship instead"
-    command.add_argument("what", metavar="ik", nargs="?", choices=("ik",), help=text)
-    text = "random configurations that `bench ik` looks for (default: %(default)s)"
+    text = (
+        "measure the robots that packages ship instead: their inverse kinematics, or also a map of each, "
+        "which an independent search then tries to refute"
+    )
+    command.add_argument("what", metavar="ik|robots", nargs="?", choices=("ik", "robots"), help=text)
+    text = "random configurations that `bench ik` and `bench robots` look for (default: %(default)s)"
     command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
     add_out(command, "write the figures as JSON")
 
@@ -28,7 +31,7 @@ def add_parser(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print every figure as it is measured, and write them if asked to; return the exit status."""
     check_out(args.out)
-    content = _ik(args) if args.what == "ik" else _figures()
+    content = _robots(args) if args.what else _figures()
     if args.out:
         write_out(args.out, (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode())
     return 0
@@ -45,13 +48,14 @@ def _figures() -> dict[str, Any]:
     return bench.report(figures)
 
 
-def _ik(args: argparse.Namespace) -> dict[str, Any]:
-    """Measure the inverse kinematics of robots."""
-    from symgrasp.bench import ik
+def _robots(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure the inverse kinematics of robots, or their maps."""
+    from symgrasp.bench import ik, robots
     from symgrasp.bench.figures import with_machine
 
+    name, measured = ("arms", ik.run) if args.what == "ik" else ("robots", robots.run)
     rows = []
-    for row in ik.run(args.poses):
+    for row in measured(args.poses):
         say(row.line())
         rows.append(row)
-    return with_machine("arms", rows)
+    return with_machine(name, rows)

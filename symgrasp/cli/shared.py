@@ -142,7 +142,7 @@ def check_out(out: Path | None) -> None:
 
 def say(text: str) -> None:
     """Print a line; what names in it could do to a terminal is escaped."""
-    print(printable(text))
+    print(printable(text), flush=True)
 
 
 def warn(text: str) -> None:
