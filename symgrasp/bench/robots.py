@@ -150,7 +150,9 @@ def measure(robot: CatalogueRobot, poses: int) -> RobotRow:
         content["map"] = dict(GRID)
         return _measured(name, content, poses)
     except SymgraspError as error:
-        problem = f"expected {error.expected}" if isinstance(error, InputError) else str(error)
+        problem = str(error)
+        if isinstance(error, InputError):  # without the source, a file of this machine
+            problem = f"{error.field}: {error.value}, expected {error.expected}"
         return _without_map(robot, name, problem, poses)
 
 

@@ -17,7 +17,7 @@ from symgrasp.robot.robot import Arm
 from symgrasp.robot.survey import FoundArm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import open_world, with_free_homes
+from symgrasp.world import check_homes, open_world, with_free_homes
 
 __all__ = ["robot_content", "scene_content", "starter_scene"]
 
@@ -77,11 +77,12 @@ def starter_scene(name: str, urdf: str, arms: Sequence[FoundArm]) -> dict[str, A
         arms: its arms, that which is to reach the can first.
 
     Raises:
-        SceneError: the arm reaches no can.
+        SceneError: the arm reaches no can, or the robot hits itself whatever the arm does.
         SymgraspError: a scene with that robot cannot be loaded.
     """
     content = scene_content(robot_content(name, urdf, arms), arms[0].name)
     scene = with_free_homes(Scene.from_content(content))
+    check_homes(scene)
     home = scene.file.robots[0].home
     if home is not None:
         content["robots"][0]["home"] = dict(home) if isinstance(home, dict) else list(home)

@@ -94,8 +94,9 @@ def test_wrong_maps_and_solvers_are_found_out(ur5, monkeypatch):
 def test_problems_are_rows():
     absent = replace(ROBOTS["panda"], urdf="package://no_such_package/robot.urdf")
     row = robots.measure(absent, 1)
-    assert row.problem == "expected pip install pybullet"
-    assert "no solver, no map: expected pip install pybullet" in row.line()
+    assert row.problem == f"urdf: {absent.urdf}, expected pip install pybullet"
+    assert "no solver, no map: urdf" in row.line()
+    assert row.line().endswith("expected pip install pybullet")
     so101 = robots.measure(ROBOTS["so101"], 1)
     assert "6 or 7 revolute joints, not 5" in so101.problem
     assert not so101.family
@@ -107,7 +108,7 @@ def test_what_is_known_of_a_robot_without_a_scene(monkeypatch):
 
     monkeypatch.setattr(robots, "starter_scene", nowhere)
     row = robots.measure(ROBOTS["ur5"], 20)
-    assert (row.problem, row.found) == ("expected a place where it reaches an upright can", 20)
+    assert (row.problem, row.found) == ("arm arm: 8, expected a place where it reaches an upright can", 20)
     assert "recall 100.000 %, no map" in row.line()
 
 
