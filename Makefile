@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench
+.PHONY: app test figures schemas bench robots
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -37,3 +37,7 @@ schemas: $(VENV)/dev.stamp  ## write the JSON Schemas of the file formats again
 bench: $(VENV)/dev.stamp  ## measure, and write the README's table of times (minutes)
 	$(BIN)/symgrasp bench --out docs/bench.json
 	$(BIN)/python -m docs.speed
+
+robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write the table of docs/robots.md (minutes)
+	$(BIN)/symgrasp bench robots --out docs/robots.json
+	$(BIN)/python -m docs.robots

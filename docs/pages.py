@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from symgrasp.cli.main import main
+from symgrasp.files import write_atomically
 
-__all__ = ["PAGES", "Block", "Step", "blocks", "commands", "refresh", "run", "shown"]
+__all__ = ["PAGES", "Block", "Step", "blocks", "commands", "put_between", "refresh", "run", "shown"]
 
 ROOT = Path(__file__).parent.parent
 
@@ -86,6 +87,15 @@ def refresh(page: Path, folder: Path) -> None:
             text = text[:start] + shown(step.printed, step.expected) + text[done:]
             done = start
     page.write_text(text, encoding="utf-8")
+
+
+def put_between(page: Path, begin: str, end: str, lines: str) -> None:
+    """Put lines between two markers of a page, in place of what is there."""
+    text = page.read_text(encoding="utf-8")
+    before = text.index(begin) + len(begin)
+    after = text.index(end, before)
+    with write_atomically(page) as file:
+        file.write(f"{text[:before]}\n{lines}{text[after:]}".encode())
 
 
 def run(page: Path, folder: Path) -> Iterator[Step]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from symgrasp.files import write_atomically
+from docs.pages import put_between
 
 __all__ = ["BEGIN", "BENCH", "END", "ROWS", "keyed", "table", "write"]
 
@@ -87,10 +87,8 @@ def write(content: Mapping[str, Any], page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     if BEGIN not in text:
         place = text.index(NEXT)
-        text = f"{text[:place]}## How fast\n\n{BEGIN}\n{END}\n\n{text[place:]}"
-    before, after = text.index(BEGIN) + len(BEGIN), text.index(END)
-    with write_atomically(page) as file:
-        file.write(f"{text[:before]}\n{table(content)}{text[after:]}".encode())
+        page.write_text(f"{text[:place]}## How fast\n\n{BEGIN}\n{END}\n\n{text[place:]}", encoding="utf-8")
+    put_between(page, BEGIN, END, table(content))
 
 
 def _short(value: float) -> str:
