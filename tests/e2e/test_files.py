@@ -181,7 +181,7 @@ def test_a_scene_that_asks_for_the_servers_files_is_refused(open_page, content, 
     files(page)
     open_scene(page, path)
     expect(page.alerts).to_contain_text("mine.yaml: obstacles[3].mesh:")
-    expect(page.alerts).to_contain_text("expected a file that a Python package ships")
+    expect(page.alerts).to_contain_text("expected a file of an installed package")
     expect(page.page.get_by_label("Scene", exact=True)).to_have_value("bottle_on_table")
     large = tmp_path / "large.yaml"
     large.write_bytes(bytes(1_000_001))

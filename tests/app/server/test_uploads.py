@@ -135,14 +135,14 @@ def test_a_mesh_that_ends_its_parser_leaves_the_session_as_it_was(visitor, actio
 
 
 def test_no_message_shows_where_the_server_has_its_files(content, tmp_path, sessions):
-    (tmp_path / "chain.urdf").write_text(chain_urdf(2000))
+    (tmp_path / "chain.urdf").write_text(chain_urdf(5001))
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump(content))
     with start_server(str(tmp_path / "mine.yaml")) as server, server.visit() as visitor:
         visitor.wait_for(ready)
         (session,) = sessions
         content["robots"][0]["urdf"] = "chain.urdf"
         session.actions.upload_scene("other.yaml", yaml.safe_dump(content).encode())
-        html = visitor.wait_for("at most 1,000 of them")
+        html = visitor.wait_for("at most 5,000 of them")
         assert "chain.urdf: links" in html
         assert str(tmp_path) not in html
         content["robots"][0]["urdf"] = "no.urdf"

@@ -334,7 +334,7 @@ def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans)
     assert state.scene is before.scene
     assert state.plan is before.plan
     assert state.plan_results.opened is found.report
-    with pytest.raises(SceneError, match=r"obstacles\[1\].mesh.*expected a file that a Python package ships"):
+    with pytest.raises(SceneError, match=r"obstacles\[1\].mesh.*expected a file of an installed package"):
         plans.open(text.replace("package://static_scenes/bowl.obj", "/etc/passwd").encode(), "a.json", quiet)
     with pytest.raises(SceneError, match="or an absolute path"):
         plans.open(text.replace("package://static_scenes/bowl.obj", "bowl.obj").encode(), "a.json", quiet)
