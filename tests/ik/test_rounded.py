@@ -77,7 +77,6 @@ def test_recall(name, digits, seed):
     rng = np.random.default_rng(seed)
     arm = rounded(ARMS[name], digits, rng)
     ik = CompiledIK(arm, 1)
-    assert not ik.complete
     for q in rng.uniform(arm.lower, arm.upper, (40, arm.dof)):
         assert found(ik, q) or least_singular_value(arm, q, ik.locked) < 100 * 10.0**-digits
 
@@ -169,15 +168,15 @@ def test_xarm7_against_ssik():
     arm = Arm("xarm7", Robot("xarm7", model, np.eye(4), model.default_values()), "link_eef", bare)
     ik = CompiledIK(arm, 1)
     other = ssik.Manipulator.from_urdf(path, base="link_base", ee="link_eef")
+    assert not ik.complete  # near a singular pose it may miss one
     rng = np.random.default_rng(3)
     lower, upper = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
-    checked = 0
-    for q in rng.uniform(lower, upper, (300, arm.dof)):
+    for q in rng.uniform(lower, upper, (30, arm.dof)):
         assert found(ik, q)
-    for q in rng.uniform(lower, upper, (3, arm.dof)):  # ssik takes seconds for each
+    for q in rng.uniform(lower, upper, (3, arm.dof)):
         T = arm.tool_pose(q)
-        for theirs in other.solve(T):
-            solutions = solve_at(ik, T, float(np.asarray(theirs.q)[ik.locked]))
-            assert distance(solutions.q, np.asarray(theirs.q)).min(initial=np.inf) < 1e-4
-            checked += 1
-    assert checked > 20
+        theirs = np.array([solution.q for solution in other.solve(T)])
+        assert len(theirs) > 20
+        at = ik.at(theirs[:, ik.locked])
+        for k, q_theirs in enumerate(theirs):
+            assert distance(at.solve_sample(T, k).q, q_theirs).min(initial=np.inf) < 1e-4
