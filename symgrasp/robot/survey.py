@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,11 +65,13 @@ def in_catalogue(model: RobotModel) -> CatalogueRobot | None:
 def find_arms(model: RobotModel) -> list[FoundArm]:
     """Return the arms of a robot: those of the catalogue, else those with hands, else all long chains.
 
-    An arm without a hand that can be measured gets a gripper, the WSG 50, mounted on its last link.
+    An arm without a hand that can be measured gets a gripper, the WSG 50, mounted on its last link. The only
+    arm of a robot is called what the robot is, where that is a plain word.
     """
     known = in_catalogue(model)
     if known is not None:
-        return [_known_arm(model, arm) for arm in known.arms]
+        found = [_known_arm(model, arm) for arm in known.arms]
+        return found if len(found) != 1 else [_renamed(found[0], known.name)]
     arms = [
         _arm(model, link)
         for link in palm_candidates(model)
@@ -77,7 +80,8 @@ def find_arms(model: RobotModel) -> list[FoundArm]:
     arms = [arm for arm in arms if arm.hand is not None] or [
         _arm(model, link, mounted=True) for link in _ends(model)
     ]
-    return arms if len(arms) != 1 else [_renamed(arms[0], "arm")]
+    name = model.name if re.fullmatch(r"\w{1,50}", model.name) else "arm"
+    return arms if len(arms) != 1 else [_renamed(arms[0], name)]
 
 
 def _renamed(arm: FoundArm, name: str) -> FoundArm:

@@ -167,7 +167,9 @@ def test_what_a_hostile_scene_says_is_shown_as_text(open_page, content, tmp_path
     content["robots"][0]["urdf"] = HOSTILE
     path.write_text(yaml.safe_dump(content))
     open_scene(page, path)
-    expect(page.alerts).to_contain_text(f"robots[0].urdf: '{HOSTILE}': expected a file that a Python package")
+    expect(page.alerts).to_contain_text(
+        f"robots[0].urdf: '{HOSTILE}': expected a file of an installed package"
+    )
     assert page.page.evaluate("window.hacked") is None
     assert page.complaints == []
 

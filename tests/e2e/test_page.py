@@ -348,7 +348,8 @@ def test_the_symmetry_error_is_told_and_painted(open_page, tmp_path):
 
 def test_another_hand_is_mounted_where_the_scene_mounts_one(open_page):
     page = open_page(scene="log_iiwa_and_panda")
-    expect(page.page.get_by_label("Hand", exact=True)).to_have_count(0)  # the Panda comes with its own
+    page.page.get_by_text("Robot", exact=True).first.click()
+    expect(page.page.get_by_label("Hand", exact=True)).to_have_value("as in the URDF")  # the Panda's own
     page.choose("Arm", "iiwa")
     page.expect_title("· iiwa")
     expect(page.page.get_by_label("Hand", exact=True)).to_have_value("wsg50")
