@@ -31,6 +31,9 @@ __all__ = [
 LONGEST = 280
 """Most characters of an input error's text."""
 
+_KEPT = 40
+"""Characters of a source, a field and a value that a long text of what was expected leaves."""
+
 _SHORT = Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 4, 120, 120
 _SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = 8
@@ -128,8 +131,13 @@ def shortened(text: str, most: int) -> str:
 
 
 def _line(*parts: str) -> str:
-    """Join parts to a line of at most `LONGEST` characters, for which the longest parts are shortened."""
-    parts = tuple(printable(" ".join(part.split())) for part in parts)
-    room = LONGEST - len(": ") * (len(parts) - 1)
-    most = next(n for n in range(room, 0, -1) if sum(min(len(part), n) for part in parts) <= room)
-    return ": ".join(shortened(part, most) for part in parts)
+    """Join parts to a line of at most `LONGEST` characters.
+
+    The longest parts are shortened, and the last one, which says what to do, only when the others are short.
+    """
+    *before, last = (printable(" ".join(part.split())) for part in parts)
+    room = LONGEST - len(": ") * len(before)
+    last = shortened(last, room - sum(min(len(part), _KEPT) for part in before))
+    room -= len(last)
+    most = next(n for n in range(room, 0, -1) if sum(min(len(part), n) for part in before) <= room)
+    return ": ".join([*(shortened(part, most) for part in before), last])
