@@ -15,8 +15,8 @@ ROOMS = [
     "symgrasp.robot",
     "symgrasp.ik", "symgrasp.scene", "symgrasp.world", "symgrasp.engine", "symgrasp.feasibility",
     "symgrasp.plan", "symgrasp.planners", "symgrasp.bench", "symgrasp.cli", "symgrasp.__main__",
-    "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute", "app.panels",
-    "app.server", "app.__main__",
+    "app.choices", "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute",
+    "app.panels", "app.server", "app.__main__",
 ]  # fmt: skip
 """Folders, and modules that stand beside them, from the ground up."""
 

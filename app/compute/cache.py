@@ -13,9 +13,9 @@ from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
 from symgrasp.world import prepared
 
+from ..choices.object_choice import OWN, ObjectChoice, from_library
 from ..files.links import Link
 from ..scene3d.visual_meshes import read_visuals
-from ..state.object_choice import OWN, ObjectChoice, from_library
 from ..state.requests import MapKey, MapRequest, MapResult
 
 __all__ = ["SharedCache"]

@@ -17,7 +17,9 @@ from symgrasp.robot.catalogue import CatalogueRobot
 from symgrasp.scene.format import RobotFile
 from symgrasp.scene.scene import Scene
 
-from ..state.object_choice import ObjectChoice
+from ..choices.object_choice import ObjectChoice
+from ..choices.scene_assets import BuiltScene
+from ..choices.uploaded_scene import UploadedScene
 from ..state.plan_results import PlanResult
 from ..state.requests import (
     CompareRequest,
@@ -28,8 +30,6 @@ from ..state.requests import (
     MapResult,
     Maps,
 )
-from ..state.scene_assets import BuiltScene
-from ..state.uploaded_scene import UploadedScene
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
 from .limits import MEMORY_LIMIT
 from .plan_service import OpenedPlan, PlanOutcome, PlanRequest

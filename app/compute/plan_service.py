@@ -29,13 +29,13 @@ from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
+from ..choices.uploaded_scene import UploadedScene
 from ..files.scene_files import refuse_foreign_files
 from ..files.shown_paths import shown_paths
 from ..scene3d.visual_meshes import read_visuals
 from ..state.object_pose import ObjectPose, with_poses
 from ..state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
 from ..state.requests import MapRequest, Maps
-from ..state.uploaded_scene import UploadedScene
 from .map_service import MapService
 
 __all__ = ["OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService", "plan_result"]

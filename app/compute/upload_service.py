@@ -16,12 +16,12 @@ from symgrasp.scene.replacing import base_in_reach, renamed, with_base, with_rob
 from symgrasp.scene.scene import Scene
 from symgrasp.world import prepared
 
+from ..choices.object_choice import ObjectChoice, from_mesh
+from ..choices.scene_assets import BuiltScene, SceneAssets
+from ..choices.uploaded_scene import UploadedScene
 from ..files.robot_files import catalogue_entry, read_robot_entry, rearmed
 from ..files.scene_files import read_scene, read_scene_archive
 from ..scene3d.visual_meshes import read_visuals
-from ..state.object_choice import ObjectChoice, from_mesh
-from ..state.scene_assets import BuiltScene, SceneAssets
-from ..state.uploaded_scene import UploadedScene
 
 __all__ = ["UploadService"]
 
@@ -62,7 +62,7 @@ class UploadService:
     def measure(
         self, name: str, content: bytes, scale: float, tolerance: float | None, progress: Progress
     ) -> ObjectChoice:
-        """Measure the object of revolution in a mesh file; see `app.state.object_choice.from_mesh`."""
+        """Measure the object of revolution in a mesh file; see `app.choices.object_choice.from_mesh`."""
         progress(0.0)
         return from_mesh(name, content, scale, tolerance)
 

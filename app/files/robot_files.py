@@ -18,7 +18,7 @@ from symgrasp.robot.survey import find_arms
 from symgrasp.scene.format import ArmFile, HandFile, MountFile, RobotFile
 from symgrasp.scene.scene import Scene
 
-from ..state.robot_arms import arm_file, tool_link
+from ..choices.robot_arms import arm_file, tool_link
 from .archives import unpack
 
 __all__ = ["catalogue_entry", "check_inside", "read_robot_entry", "rearmed"]

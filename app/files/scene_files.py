@@ -22,7 +22,7 @@ from symgrasp.references import package_dirs, portable, resolve
 from symgrasp.scene.format import SceneFile, describe_error
 from symgrasp.scene.scene import Scene
 
-from ..state.uploaded_scene import UploadedScene
+from ..choices.uploaded_scene import UploadedScene
 from .archives import pack, unpack
 from .robot_files import check_inside
 

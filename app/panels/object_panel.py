@@ -8,8 +8,8 @@ import viser
 from symgrasp.meshes import MESH_ENDINGS
 from symgrasp.scene.scene import Scene
 
+from ..choices.object_choice import UNITS, UPLOAD_LIMIT, object_options
 from ..state import changes
-from ..state.object_choice import UNITS, UPLOAD_LIMIT, object_options
 from ..state.state import State
 from .actions import Actions
 from .panel import Panel, slider_value

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from ..choices.robot_arms import IN_URDF, MOUNTABLE, hand_option, tool_link, tool_links
+from ..choices.robot_choice import robot_options
 from ..files.archives import ARCHIVE_LIMIT
 from ..state import changes, robot_changes
 from ..state.object_pose import ObjectPose
-from ..state.robot_arms import IN_URDF, MOUNTABLE, hand_option, tool_link, tool_links
-from ..state.robot_choice import robot_options
 from ..state.state import State
 from .actions import Actions
 from .panel import Panel

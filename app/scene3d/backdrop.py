@@ -14,7 +14,7 @@ from symgrasp.robot.link_shapes import shape_mesh
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 
-from ..state.scene_assets import Visuals
+from ..choices.scene_assets import Visuals
 from .nodes import add_links, set_pose
 from .viewpoint import Viewpoint
 

@@ -7,7 +7,7 @@ import viser
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.robot.model import RobotModel
 
-from ..state.scene_assets import Visuals
+from ..choices.scene_assets import Visuals
 from .visual_meshes import link_visuals
 
 __all__ = ["add_links", "set_pose"]

@@ -8,7 +8,7 @@ import viser
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Robot
 
-from ..state.scene_assets import Visuals
+from ..choices.scene_assets import Visuals
 from .nodes import add_links, set_pose
 
 __all__ = ["RobotView"]

@@ -18,7 +18,7 @@ from trimesh.visual.material import PBRMaterial
 from symgrasp.meshes import read_parts
 from symgrasp.scene.scene import Scene
 
-from ..state.scene_assets import Visuals
+from ..choices.scene_assets import Visuals
 
 __all__ = ["link_visuals", "read_visuals"]
 

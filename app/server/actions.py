@@ -12,19 +12,19 @@ from symgrasp.errors import InputError, SymgraspError
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 
+from ..choices.object_choice import OWN, ObjectChoice, check_size, from_library
+from ..choices.robot_arms import IN_URDF, hand_option, tool_link
+from ..choices.robot_choice import OWN_ROBOT, UploadedRobot, catalogue_robot
+from ..choices.scene_assets import BuiltScene, UploadFolder
+from ..choices.uploaded_scene import UploadedScene
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
 from ..files.links import Link
 from ..files.scene_files import MAX_NAME, scene_archive, scene_yaml
 from ..render.map_picture import map_picture, picture_name
 from ..state import changes, job_changes, robot_changes
-from ..state.object_choice import OWN, ObjectChoice, check_size, from_library
 from ..state.page_link import Camera
-from ..state.robot_arms import IN_URDF, hand_option, tool_link
-from ..state.robot_choice import OWN_ROBOT, UploadedRobot, catalogue_robot
-from ..state.scene_assets import BuiltScene, UploadFolder
 from ..state.state import State
-from ..state.uploaded_scene import UploadedScene
 from .browser_messages import UploadButton
 from .plan_actions import PlanActions
 from .session_api import SessionApi

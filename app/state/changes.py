@@ -12,14 +12,14 @@ from symgrasp.object.manifold import wrap
 from symgrasp.poses import Array
 from symgrasp.scene.scene import Scene
 
+from ..choices.object_choice import ObjectChoice
+from ..choices.uploaded_scene import UploadedScene
 from .map_view_state import RollChoice
-from .object_choice import ObjectChoice
 from .object_pose import ObjectPose
 from .page_link import Camera, PageLink
 from .plan_changes import show_step
 from .state import Pick, State
 from .task_list import TaskList
-from .uploaded_scene import UploadedScene
 
 __all__ = [
     "add_task",

@@ -8,10 +8,10 @@ from symgrasp.errors import InputError, one_of
 from symgrasp.poses import Array
 from symgrasp.scene.replacing import with_base
 
+from ..choices.robot_choice import OWN_ROBOT, UploadedRobot
+from ..choices.scene_assets import BuiltScene
 from .changes import without_plan
 from .object_pose import ObjectPose
-from .robot_choice import OWN_ROBOT, UploadedRobot
-from .scene_assets import BuiltScene
 from .state import State
 
 __all__ = [

@@ -20,18 +20,18 @@ from symgrasp.poses import Array, rotation_z
 from symgrasp.robot.robot import Robot
 from symgrasp.scene.scene import Scene
 
+from ..choices.object_choice import OWN, ObjectChoice
+from ..choices.robot_choice import OWN_ROBOT, UploadedRobot
+from ..choices.scene_assets import NO_ASSETS, SceneAssets
+from ..choices.uploaded_scene import UploadedScene
 from .cached import cached
 from .display import Display
 from .history import History
 from .map_view_state import MapViewState
-from .object_choice import OWN, ObjectChoice
 from .object_pose import ObjectPose, with_poses
 from .page_link import PageLink
 from .plan_results import PlanKind, PlanResult, PlanResults
 from .requests import Busy, ExplainRequest, MapRequest, MapResult, Request
-from .robot_choice import OWN_ROBOT, UploadedRobot
-from .scene_assets import NO_ASSETS, SceneAssets
-from .uploaded_scene import UploadedScene
 
 __all__ = ["Pick", "State"]
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from symgrasp.feasibility.map import FeasibilityMap
 
+from ..choices.scene_assets import NO_ASSETS
 from .history import History
-from .scene_assets import NO_ASSETS
 from .state import State
 
 __all__ = ["PLANS_KEPT", "UPLOADS_KEPT", "redo", "remember", "undo"]

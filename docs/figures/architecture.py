@@ -31,13 +31,14 @@ class Place(NamedTuple):
 PLACES = {
     "symgrasp.compiling": Place(0, 0), "symgrasp.poses": Place(2, 0), "symgrasp.files": Place(3, 0),
     "symgrasp.errors": Place(4, 0), "symgrasp.progress": Place(6, 0), "symgrasp.meshes": Place(4, 1),
-    "symgrasp.page": Place(5, 1), "symgrasp.references": Place(3, 2.7),
+    "symgrasp.page": Place(5, 1), "symgrasp.references": Place(3, 2.5),
     "symgrasp.object": Place(2, 2), "symgrasp.robot": Place(2, 3),
-    "symgrasp.ik": Place(1, 4), "symgrasp.scene": Place(2, 4), "symgrasp.reason": Place(3, 4),
+    "symgrasp.ik": Place(1, 4), "symgrasp.scene": Place(2, 4), "symgrasp.reason": Place(3, 4.5),
     "symgrasp.world": Place(2, 5), "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),
     "symgrasp.plan": Place(2, 8), "symgrasp.planners": Place(2, 9), "symgrasp.bench": Place(2, 10),
     "symgrasp.cli": Place(2, 11), "symgrasp.__main__": Place(1, 12),
-    "app.state": Place(5, 10), "app.files": Place(6, 11), "app.render": Place(5, 11),
+    "app.choices": Place(5.75, 9), "app.state": Place(5, 10), "app.files": Place(6, 11),
+    "app.render": Place(5, 11),
     "app.html": Place(5, 12), "app.scene3d": Place(4, 12), "app.panels": Place(5, 13),
     "app.compute": Place(4, 14), "app.server": Place(5, 15), "app.__main__": Place(4, 15),
 }  # fmt: skip
@@ -53,7 +54,7 @@ COLUMNS, FLOORS = 7.0, 16.3
 
 GROUNDS = {
     "symgrasp": ("#e8eef7", [(-0.5, -0.5, 7.0, 8.0), (-0.5, 7.5, 3.6, 5.1)]),
-    "app": ("#f6ecdd", [(3.4, 9.4, 3.1, 6.4)]),
+    "app": ("#f6ecdd", [(3.4, 8.4, 3.1, 7.4)]),
 }
 """Package → its colour, and the rectangles (left, bottom, width, height) that it fills."""
 

@@ -10,10 +10,10 @@ from typing import Any
 import numba
 import numpy as np
 
+from app.choices import object_choice
 from app.compute.limits import MEMORY_LIMIT
 from app.compute.process_main import REPORT_INTERVAL, serve
 from app.compute.upload_service import UploadService
-from app.state import object_choice
 from symgrasp.errors import MeshError
 from symgrasp.feasibility.create import MapMaker
 

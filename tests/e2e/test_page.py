@@ -12,6 +12,7 @@ import pybullet_data
 import pytest
 from playwright.sync_api import expect
 
+from app.choices.object_choice import from_mesh
 from app.html.candidates import candidate_text
 from app.html.map import sample_columns
 from app.render.palette import REASONS
@@ -19,7 +20,6 @@ from app.scene3d.flat_map import FLAT_SIZE, flat_map_position
 from app.scene3d.viewpoint import choose_viewpoint
 from app.state import changes
 from app.state.map_view_state import RollChoice
-from app.state.object_choice import from_mesh
 from app.state.state import State
 from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.map import FeasibilityMap

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.choices.object_choice import OWN
 from app.compute import cache as cache_module
 from app.compute.cache import SharedCache
 from app.state import changes
-from app.state.object_choice import OWN
 from app.state.requests import MapRequest, MapResult
 from app.state.state import State
 from symgrasp.errors import SymgraspError

@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.choices.object_choice import from_library
+from app.choices.uploaded_scene import UploadedScene
 from app.compute.cache import SharedCache
 from app.files.links import LONGEST, Link
 from app.panels.files_panel import link_html
 from app.state import changes, job_changes
 from app.state.map_view_state import RollChoice
-from app.state.object_choice import from_library
 from app.state.object_pose import ObjectPose
 from app.state.state import Pick, State
 from app.state.task_list import TaskList
 from app.state.undo import remember, undo
-from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.scene.scene import Scene

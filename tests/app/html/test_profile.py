@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from app.choices.object_choice import ObjectChoice, from_mesh
 from app.html.profile import (
     holds_html,
     profile_html,
@@ -20,7 +21,6 @@ from app.html.profile import (
 from app.render.deviation import NO_SURFACE, deviation_cells, deviation_colors
 from app.render.palette import DIVERGING
 from app.state import changes
-from app.state.object_choice import ObjectChoice, from_mesh
 from app.state.state import State
 from symgrasp.feasibility.fit import fit
 from symgrasp.object.library import load_object

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 import yaml
 
+from app.choices import object_choice
 from app.compute import map_service, process_pool
 from app.compute.cache import SharedCache
 from app.files import scene_files
@@ -17,7 +18,6 @@ from app.scene3d.visual_meshes import read_visuals
 from app.server import lobby
 from app.server.actions import Actions
 from app.server.session import Session
-from app.state import object_choice
 from symgrasp.object.measure import measurement
 from symgrasp.plan.plan import Plan
 from symgrasp.robot.model import RobotModel

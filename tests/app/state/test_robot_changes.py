@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.choices.robot_choice import OWN_ROBOT, installed_robots
+from app.choices.scene_assets import BuiltScene, UploadFolder
 from app.files.links import Link
 from app.files.robot_files import catalogue_entry
 from app.state import robot_changes
 from app.state.object_pose import ObjectPose
-from app.state.robot_choice import OWN_ROBOT, installed_robots
-from app.state.scene_assets import BuiltScene, UploadFolder
 from app.state.state import State
 from app.state.undo import redo, remember, undo
 from symgrasp.errors import InputError

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.choices.object_choice import OWN, from_library, from_mesh
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest, PlanService
 from app.html.readout import status_html
@@ -21,7 +22,6 @@ from app.panels.keyboard import next_arm
 from app.render.drawn_poses import drawn_joint_values
 from app.state import changes, job_changes, plan_changes
 from app.state.map_view_state import RollChoice
-from app.state.object_choice import OWN, from_library, from_mesh
 from app.state.object_pose import ObjectPose
 from app.state.plan_results import PlanKind, PlanResults
 from app.state.requests import MapRequest, MapResult

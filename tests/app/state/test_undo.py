@@ -17,14 +17,14 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
+from app.choices.object_choice import from_library
+from app.choices.uploaded_scene import UploadedScene
 from app.state import changes, job_changes, plan_changes
 from app.state.history import DRAG_PAUSE, STEPS_KEPT, History
 from app.state.map_view_state import RollChoice
-from app.state.object_choice import from_library
 from app.state.plan_results import PlanResults
 from app.state.state import State
 from app.state.undo import PLANS_KEPT, UPLOADS_KEPT, redo, remember, undo
-from app.state.uploaded_scene import UploadedScene
 from symgrasp.errors import InputError
 from symgrasp.feasibility.map import FeasibilityMap
 from tests.app.state.test_state import opened, planned, small_map, with_plan

@@ -1,0 +1,1 @@
+"""What people choose or bring in place of what a scene file has: robots, arms, objects, scenes."""
