@@ -9,8 +9,8 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from app.choices.object_choice import OWN, UNITS, from_library, from_mesh, object_options
 from app.choices import object_choice as module
+from app.choices.object_choice import OWN, UNITS, from_library, from_mesh, object_options
 from symgrasp.errors import SymgraspError
 from symgrasp.object.library import library_objects, load_object
 

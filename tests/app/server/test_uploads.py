@@ -23,8 +23,8 @@ from symgrasp.plan.plan import Plan
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
 from tests.app import failures
+from tests.app.choices.test_object_choice import stl
 from tests.app.server.test_session import Server, ready, start_server, title
-from tests.app.state.test_object_choice import stl
 from tests.app.state.test_plan_results import planned
 from tests.app.wire import Wire
 from tests.hostile import chain_urdf, doubling_yaml
