@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from symgrasp.feasibility.create import create_map, explain
     from symgrasp.feasibility.map import FeasibilityMap
     from symgrasp.feasibility.object_report import describe_object as measure_object
+    from symgrasp.hands.measure import measure_hand
     from symgrasp.object.manifold import Manifold
     from symgrasp.object.profile import Profile
     from symgrasp.plan.plan import Plan
     from symgrasp.plan.verify import verify
     from symgrasp.planners.planning import plan_bimanual, plan_handover, plan_sequential
     from symgrasp.reason import Reason
-    from symgrasp.robot.measure_hand import measure_hand
     from symgrasp.scene.scene import Scene
     from symgrasp.scene.shipped import list_scenes
     from symgrasp.world.loading import load_scene
@@ -63,7 +63,7 @@ _ORIGINS = {
     "explain": "symgrasp.feasibility.create:explain",
     "list_scenes": "symgrasp.scene.shipped:list_scenes",
     "load_scene": "symgrasp.world.loading:load_scene",
-    "measure_hand": "symgrasp.robot.measure_hand:measure_hand",
+    "measure_hand": "symgrasp.hands.measure:measure_hand",
     "measure_object": "symgrasp.feasibility.object_report:describe_object",
     "plan_bimanual": "symgrasp.planners.planning:plan_bimanual",
     "plan_handover": "symgrasp.planners.planning:plan_handover",

@@ -10,13 +10,13 @@ import yaml
 
 from symgrasp.errors import InputError, SceneError, UrdfError
 from symgrasp.feasibility.starter import robot_content
+from symgrasp.hands.measure import hand_yaml, measure_hand
 from symgrasp.references import package_dirs, resolve, sought
 from symgrasp.robot.catalogue import CatalogueRobot
-from symgrasp.robot.measure_hand import hand_yaml, measure_hand
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.survey import find_arms
 from symgrasp.scene.format import ArmFile, HandFile, MountFile, RobotFile
 from symgrasp.scene.scene import Scene
+from symgrasp.survey import find_arms
 
 from ..choices.robot_arms import arm_file, tool_link
 from .archives import unpack

@@ -23,9 +23,9 @@ from symgrasp.reason import Reason
 from symgrasp.references import resolve
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueRobot
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.survey import find_arms
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+from symgrasp.survey import find_arms
 from symgrasp.world import open_world
 
 __all__ = ["CHECKED", "GRID", "Check", "Refuted", "RobotRow", "check", "measure", "run"]

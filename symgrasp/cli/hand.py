@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     if path is None:
         raise InputError("command line", "URDF", args.urdf, sought(args.urdf, Path(), "URDF"))
 
-    from symgrasp.robot.measure_hand import hand_yaml, measure_hand
+    from symgrasp.hands.measure import hand_yaml, measure_hand
     from symgrasp.robot.model import RobotModel
 
     model = RobotModel(path)

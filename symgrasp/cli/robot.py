@@ -12,7 +12,7 @@ from symgrasp.errors import InputError, SymgraspError, one_of
 
 if TYPE_CHECKING:
     from symgrasp.robot.model import RobotModel
-    from symgrasp.robot.survey import FoundArm
+    from symgrasp.survey import FoundArm
 
 __all__ = ["add_parser", "run"]
 
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
     from symgrasp.feasibility.starter import robot_content
     from symgrasp.robot.model import RobotModel
-    from symgrasp.robot.survey import find_arms, in_catalogue
+    from symgrasp.survey import find_arms, in_catalogue
 
     model = RobotModel(path)
     known = in_catalogue(model)

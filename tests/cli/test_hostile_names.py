@@ -16,8 +16,8 @@ from symgrasp.cli.shared import LONGEST_LINE
 from symgrasp.compiling import COMPILING_MESSAGE
 from symgrasp.errors import printable
 from tests.conftest import write_scene
+from tests.hands.test_finger_linkages import rooted
 from tests.hostile_names import HOSTILE_NAMES
-from tests.robot.test_finger_linkages import rooted
 
 NAMES = pytest.mark.parametrize("name", HOSTILE_NAMES.values(), ids=HOSTILE_NAMES)
 

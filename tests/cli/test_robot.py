@@ -11,8 +11,8 @@ from symgrasp.feasibility.create import create_map
 from symgrasp.references import resolve
 from symgrasp.robot.catalogue import CATALOGUE
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.survey import find_arms
 from symgrasp.scene.scene import Scene
+from symgrasp.survey import find_arms
 
 CATALOGUED = {robot.name: robot for robot in CATALOGUE}
 

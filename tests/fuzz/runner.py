@@ -48,13 +48,6 @@ class Run(NamedTuple):
 
 def main() -> None:
     """Answer every line of stdin, until it ends."""
-    import symgrasp.cli.main
-    import symgrasp.feasibility.object_report
-    import symgrasp.feasibility.pictures
-    import symgrasp.plan.exports
-    import symgrasp.plan.verify
-    import symgrasp.planners.planning
-    import symgrasp.robot.measure_hand  # noqa: F401
 
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     for line in sys.stdin:

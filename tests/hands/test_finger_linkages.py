@@ -11,8 +11,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from symgrasp.errors import UrdfError
+from symgrasp.hands.measure import measure_hand
 from symgrasp.robot.hand import Hand
-from symgrasp.robot.measure_hand import measure_hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import load_urdf, pybullet
 

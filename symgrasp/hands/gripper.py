@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import UrdfError
+from symgrasp.hands.held import Outline, outline
+from symgrasp.hands.structure import HandStructure, links_with_shapes
 from symgrasp.poses import Array, inverse
-from symgrasp.robot.hand_structure import HandStructure, links_with_shapes
 from symgrasp.robot.handprint import hull_edges, slab_corners
-from symgrasp.robot.held import Outline, outline
 from symgrasp.robot.model import RobotModel
 
 __all__ = [

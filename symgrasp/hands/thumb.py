@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.errors import UrdfError
+from symgrasp.hands.gripper import FingerMotion, Gripper
+from symgrasp.hands.structure import HandStructure, links_with_shapes
 from symgrasp.poses import Array, inverse
-from symgrasp.robot.gripper import FingerMotion, Gripper
-from symgrasp.robot.hand_structure import HandStructure, links_with_shapes
 from symgrasp.robot.model import RobotModel
 
 __all__ = ["find_thumb"]

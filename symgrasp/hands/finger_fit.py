@@ -10,10 +10,10 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from symgrasp.errors import UrdfError
+from symgrasp.hands.gripper import Gripper, snap_to_axis
+from symgrasp.hands.held import Outline, held_radius, outline
 from symgrasp.poses import Array, from_rotation, inverse
-from symgrasp.robot.gripper import Gripper, snap_to_axis
 from symgrasp.robot.handprint import hull_edges, slab_corners
-from symgrasp.robot.held import Outline, held_radius, outline
 
 __all__ = ["SAMPLES", "TABLE_ERROR", "FingerFit", "best_fit", "openings_of"]
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from symgrasp.errors import SymgraspError
+from symgrasp.hands.measure import measure_hand
+from symgrasp.hands.structure import find_hand_structure, palm_candidates
 from symgrasp.references import resolve
 from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
 from symgrasp.robot.hand import HANDS, Hand
-from symgrasp.robot.hand_structure import find_hand_structure, palm_candidates
-from symgrasp.robot.measure_hand import measure_hand
 from symgrasp.robot.model import RobotModel
 
 __all__ = ["FoundArm", "find_arms", "in_catalogue"]

@@ -10,16 +10,16 @@ import numpy as np
 import yaml
 
 from symgrasp.errors import UrdfError, printable
+from symgrasp.hands.finger_fit import SAMPLES, TABLE_ERROR, best_fit, openings_of
+from symgrasp.hands.gripper import FingerMotion, find_gripper
+from symgrasp.hands.structure import find_hand_structure, links_with_shapes
+from symgrasp.hands.thumb import find_thumb
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, inverse, quat_wxyz, rpy
 from symgrasp.references import resolve, sought
 from symgrasp.robot.assembly import Frame
-from symgrasp.robot.finger_fit import SAMPLES, TABLE_ERROR, best_fit, openings_of
-from symgrasp.robot.gripper import FingerMotion, find_gripper
 from symgrasp.robot.hand import Hand, JointTable
-from symgrasp.robot.hand_structure import find_hand_structure, links_with_shapes
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.thumb import find_thumb
 
 __all__ = ["hand_yaml", "measure_hand"]
 

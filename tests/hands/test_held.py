@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symgrasp.errors import UrdfError
+from symgrasp.hands.held import held_radius, outline
+from symgrasp.hands.measure import measure_hand
 from symgrasp.references import resolve
 from symgrasp.robot.hand import Hand
-from symgrasp.robot.held import held_radius, outline
 from symgrasp.robot.joint import joint_motion
-from symgrasp.robot.measure_hand import measure_hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import load_urdf, pybullet
 

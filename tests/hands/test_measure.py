@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from symgrasp.cli.main import main
 from symgrasp.errors import UrdfError
+from symgrasp.hands.measure import hand_yaml, measure_hand
 from symgrasp.poses import from_rotation, rpy
 from symgrasp.references import resolve
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
-from symgrasp.robot.measure_hand import hand_yaml, measure_hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
 from tests.robot.hands import FLANGE, IIWA
