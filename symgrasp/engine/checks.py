@@ -67,8 +67,8 @@ def check_arm(moving, pieces, tree, scratch, margin, gap, best):
     """Check the pieces between base and tool against everything.
 
     Args:
-        best: clearance (m) of the best candidate so far, or -inf; a smaller clearance counts as a
-            collision, because it cannot improve on that.
+        best: clearance (m) that is wanted, or -inf; a smaller clearance counts as a collision, because it
+            does not improve enough on the best candidate so far.
     """
     hit = scratch.hit
     if hit[2] >= 0:

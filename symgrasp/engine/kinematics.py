@@ -127,15 +127,15 @@ def place_arm(moving, pieces, scratch, q):
             for i in range(12):
                 frames[0, i] = moving.joint_origin[0, i]
         else:
-            _compose(frames[j - 1], moving.joint_origin[j], frames[j])
-        _rotate(frames[j], moving.joint_axis[j], q[j])
+            compose(frames[j - 1], moving.joint_origin[j], frames[j])
+        rotate(frames[j], moving.joint_axis[j], q[j])
     for k in range(moving.hand.shape[1], len(moving.frame)):
-        _compose(frames[moving.frame[k]], moving.local[k], scratch.pose[k])
+        compose(frames[moving.frame[k]], moving.local[k], scratch.pose[k])
         box_of(pieces.size, scratch.pose, k, scratch.box[k])
 
 
 @njit(**FAST)
-def _compose(a, b, out):
+def compose(a, b, out):
     """Write the product of two poses given as rows (12,)."""
     for i in range(3):
         a0, a1, a2 = a[3 * i], a[3 * i + 1], a[3 * i + 2]
@@ -145,7 +145,7 @@ def _compose(a, b, out):
 
 
 @njit(**FAST)
-def _rotate(frame, axis, angle):
+def rotate(frame, axis, angle):
     """Rotate a frame (12,) by an angle (rad) about a unit axis given in the frame itself."""
     s, c = math.sin(angle), math.cos(angle)
     x, y, z = axis[0], axis[1], axis[2]

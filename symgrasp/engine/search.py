@@ -1,9 +1,11 @@
 """The compiled search of the cells of a map for the best free candidate, and for what blocks the others.
 
 The pieces fixed to the tool (the hand, the last link) are placed by the tool pose alone. If they
-collide, the cell has no free candidate; if not, their clearance bounds that of every candidate, so the
-first candidate that reaches it is best. Against each other and against the object, which is round, their
-distances do not depend on the angle θ: one check serves a whole row.
+collide, the cell has no free candidate; if not, their clearance bounds that of every candidate, and so does
+that of links which hardly move to each other (see `symgrasp.engine.clearance_bound`). The search of a cell
+ends at the first candidate that comes near these bounds, see `CLEARANCE_TOLERANCE`. Against each other and
+against the object, which is round, the distances of the pieces fixed to the tool do not depend on the angle
+θ: one check serves a whole row.
 
 The result of a cell depends on its tool pose alone, not on the other cells.
 """
@@ -44,6 +46,7 @@ from symgrasp.poses import Array
 
 __all__ = [
     "BLOCKED",
+    "CLEARANCE_TOLERANCE",
     "FEASIBLE",
     "HIT",
     "LIMITS",
@@ -55,6 +58,10 @@ __all__ = [
     "SearchResult",
     "search",
 ]
+
+
+CLEARANCE_TOLERANCE = 2e-3
+"""No candidate of a cell has a clearance that is larger than the best one's by more than this (m)."""
 
 
 def search(
@@ -163,7 +170,7 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                     return
                 scratch.hit[2] = -1
             place_arm(moving, pieces, scratch, q[b])
-            gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, best)
+            gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, best + CLEARANCE_TOLERANCE)
             if gap == -math.inf:
                 if result.pair[cell, 0] < 0 and result.status[cell] == HIT:
                     _name_pair(scratch, result, cell)
@@ -189,7 +196,7 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                 best = gap
                 copy_row(q[b], result.q[cell])
                 result.solution[cell, 0], result.solution[cell, 1] = k, b
-        if best > -math.inf and best >= hand:
+        if best > -math.inf and best >= hand - CLEARANCE_TOLERANCE:
             break
     if best > -math.inf:
         result.status[cell] = FEASIBLE

@@ -18,6 +18,7 @@ from symgrasp.engine.balance import loaded
 from symgrasp.engine.boxes import box_of
 from symgrasp.engine.broad_phase import mark_near
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
+from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import new_scratch, place_arm, place_hand
 from symgrasp.engine.pieces import pose_rows
@@ -83,6 +84,8 @@ class ExactEngine:
         # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.pairs_within(arm, self._reach)
+        geometry, limits = self._geometry, np.array([arm.lower, arm.upper])
+        self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, CLEARANCE_LIMIT)
         self._balance, self._holders = self._geometry.balance, (arm.name,)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
@@ -160,7 +163,7 @@ class ExactEngine:
     def _fixed_bodies(self) -> FixedBodies:
         """Measure the bodies that the arm does not move, with the object where it is now."""
         with_object = self.world.pairs_within(self.arm, self._reach, (self.world.scene.file.object.name,))
-        gap, deepest = CLEARANCE_LIMIT, None
+        gap, deepest = self._most, None
         for c in [*self._fixed_pairs, *filter(self._is_fixed, with_object)]:
             distance = self._reach - c.depth
             gap = min(gap, distance - HIT_BAND)

@@ -58,8 +58,8 @@ class FeasibilityMap:
         sample: (R, H, A) int32 redundancy sample of the witness, -1 where infeasible.
         branch: (R, H, A) int16 branch of the witness, -1 where infeasible.
         clearance: (R, H, A) distance (m) that all bodies which must not touch have at the witness at
-            least, at most `CLEARANCE_LIMIT`; NaN where infeasible. The reference, which only asks
-            whether bodies touch, has 0.
+            least, at most `CLEARANCE_LIMIT`; NaN where infeasible. At no other sample and branch is it
+            larger by more than 2 mm. The reference, which only asks whether bodies touch, has 0.
         phi: (K,) redundancy samples (rad).
         opening: (H,) opening of the hand (m).
         bodies: names of bodies.

@@ -18,7 +18,7 @@ class FixedBodies(NamedTuple):
     """How close the bodies are that the arm does not move: the same for every candidate of a map.
 
     Attributes:
-        gap: distance (m) that they have at least, at most `CLEARANCE_LIMIT`.
+        gap: distance (m) that they have at least, at most what any configuration has.
         collision: their deepest collision, which every candidate shares; None where there is none.
     """
 
