@@ -13,7 +13,7 @@ from symgrasp.hands.structure import find_hand_structure, palm_candidates
 from symgrasp.references import resolve
 from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
-from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
 
 __all__ = ["FoundArm", "find_arms", "in_catalogue"]
@@ -93,7 +93,7 @@ def _known_arm(model: RobotModel, arm: CatalogueArm) -> FoundArm:
     joints = tuple(joints_between(model, arm.tool, *arm.joints))
     resting = tuple(name for name in revolute_joints(model, arm.tool) if name not in joints)
     if arm.hand is not None:
-        hand = HANDS[arm.hand]
+        hand = {**HANDS, **SIDED_HANDS}[arm.hand]
         return FoundArm(arm.name, arm.tool, joints, resting, hand, hand.urdf is not None, arm.mount)
     hand, trouble = _measured(model, arm.tool)
     if hand is None:

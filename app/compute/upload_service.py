@@ -12,9 +12,9 @@ from pathlib import Path
 from symgrasp.progress import Progress
 from symgrasp.robot.catalogue import CatalogueRobot
 from symgrasp.scene.format import RobotFile
-from symgrasp.scene.replacing import base_in_reach, renamed, with_base, with_robot
+from symgrasp.scene.replacing import renamed, with_robot
 from symgrasp.scene.scene import Scene
-from symgrasp.world import prepared
+from symgrasp.world import placed, prepared
 
 from ..choices.object_choice import ObjectChoice, from_mesh
 from ..choices.scene_assets import BuiltScene, SceneAssets
@@ -134,12 +134,8 @@ class UploadService:
         changed = with_robot(scene, robot, renamed(scene, robot, entry))
         if "base" not in entry.model_fields_set:
             name = list(changed.robots)[list(scene.robots).index(robot)]
-            old, new = (
-                next(arm for arm in s.arms.values() if arm.robot.name == r)
-                for s, r in ((scene, robot), (changed, name))
-            )
-            point = changed.task().T_world_object[:3, 3]
-            changed = with_base(changed, name, base_in_reach(old, new, point))
+            old = next(arm for arm in scene.arms.values() if arm.robot.name == robot)
+            changed = placed(changed, name, old)
         return _checked(changed, progress)
 
 

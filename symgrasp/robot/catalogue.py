@@ -64,10 +64,14 @@ def _arm(
     return CatalogueArm(name, (first, last), tool, hand, ((0, 0, z), rpy_deg))
 
 
-def _arms(first: str, last: str, tool: str, sides: tuple[str, str] = ("left", "right")) -> list[CatalogueArm]:
-    """Return two arms that differ in a word of their names, or in an initial."""
+def _arms(
+    first: str, last: str, tool: str, sides: tuple[str, str] = ("left", "right"), hand: str = ""
+) -> list[CatalogueArm]:
+    """Return two arms that differ in a word of their names, or in an initial, and in that of their hands."""
     return [
-        CatalogueArm(name, (first.format(side), last.format(side)), tool.format(side))
+        CatalogueArm(
+            name, (first.format(side), last.format(side)), tool.format(side), hand.format(name) or None
+        )
         for name, side in zip(("left", "right"), sides, strict=True)
     ]
 
@@ -105,11 +109,11 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
     ),
     _example(
         "pr2", "Willow Garage PR2", "pr2_description/urdf/pr2.urdf",
-        *_arms("{}_shoulder_pan_joint", "{}_wrist_roll_joint", "{}_gripper_tool_frame", ("l", "r")),
+        *_arms("{}_shoulder_pan_joint", "{}_wrist_roll_joint", "{}_gripper_tool_frame", ("l", "r"), "pr2_{}"),
     ),
     _example(
         "talos", "PAL TALOS", "talos_data/robots/talos_full_v2.urdf",
-        *_arms("arm_{}_1_joint", "arm_{}_7_joint", "gripper_{}_base_link"),
+        *_arms("arm_{}_1_joint", "arm_{}_7_joint", "gripper_{}_base_link", hand="talos_{}"),
     ),
     _example(
         "tiago", "PAL TIAGo", "tiago_description/robots/tiago_no_hand.urdf",
@@ -138,7 +142,7 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
     ),
     _example(
         "g1", "Unitree G1", "g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf",
-        *_arms("{}_shoulder_pitch_joint", "{}_wrist_yaw_joint", "{}_hand_palm_link"),
+        *_arms("{}_shoulder_pitch_joint", "{}_wrist_yaw_joint", "{}_hand_palm_link", hand="dex3_{}"),
     ),
     _example(
         "alex", "IHMC Alex", "alex_description/urdf/alex_sake_hands.urdf",

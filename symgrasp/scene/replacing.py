@@ -6,15 +6,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import count
 
-import numpy as np
-
 from symgrasp.errors import SceneError, one_of
 from symgrasp.poses import Array
-from symgrasp.robot.robot import Arm
 from symgrasp.scene.format import PoseFile, RobotFile
 from symgrasp.scene.scene import Scene
 
-__all__ = ["base_in_reach", "renamed", "with_base", "with_robot"]
+__all__ = ["renamed", "with_base", "with_robot"]
 
 
 def with_base(scene: Scene, name: str, T_world_base: Array) -> Scene:
@@ -89,33 +86,6 @@ def renamed(scene: Scene, name: str, entry: RobotFile) -> RobotFile:
     number = next(k for k in count(1) if not others & {_numbered(n, k) for n in names})
     arms = entry.arms and tuple(a.model_copy(update={"name": _numbered(a.name, number)}) for a in entry.arms)
     return entry.model_copy(update={"name": _numbered(entry.name, number), "arms": arms})
-
-
-def base_in_reach(old: Arm, new: Arm, point: Array) -> Array:
-    """Return where to place a robot so that its arm is to a point as another arm is.
-
-    The first joint is put in the same direction from the point, as far away in proportion to the length of
-    the arm; the robot stands as the other does.
-
-    Args:
-        old: an arm that is well placed.
-        new: the arm of the robot to place.
-        point: the point (3,) in the world.
-
-    Returns:
-        The pose (4, 4) of the root link.
-    """
-    ratio = _length(new) / _length(old)
-    T_world_base = old.robot.T_world_base.copy()
-    rotation = T_world_base[:3, :3]
-    shoulder = T_world_base[:3, 3] + rotation @ old.P[0]
-    T_world_base[:3, 3] = point + ratio * (shoulder - point) - rotation @ new.P[0]
-    return T_world_base
-
-
-def _length(arm: Arm) -> float:
-    """Return the length (m) of an arm: of all its links in a line."""
-    return float(np.linalg.norm(arm.P[1:], axis=-1).sum())
 
 
 def _numbered(name: str, number: int) -> str:

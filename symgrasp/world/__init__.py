@@ -9,11 +9,12 @@ from symgrasp.world.bullet import BulletWorld
 from symgrasp.world.collision import BodyName, Collision, NearBodies
 from symgrasp.world.home import check_homes, with_free_homes
 from symgrasp.world.opening import open_world
+from symgrasp.world.placing import placed
 from symgrasp.world.self_pairs import checked_self_pairs
 from symgrasp.world.shapes import Shape
 from symgrasp.world.tasks import RESTING_DEPTH, check_tasks, prepared
 
 __all__ = [
     "RESTING_DEPTH", "BodyName", "BulletWorld", "Collision", "NearBodies", "Shape", "check_homes",
-    "check_tasks", "checked_self_pairs", "open_world", "prepared", "with_free_homes",
+    "check_tasks", "checked_self_pairs", "open_world", "placed", "prepared", "with_free_homes",
 ]  # fmt: skip

@@ -44,13 +44,13 @@ def test_a_robot_of_the_catalogue_takes_the_place_of_another(service, bottle):
     assert scene.file.obstacles == bottle.file.obstacles
     assert np.array_equal(scene.task().T_world_object, bottle.task().T_world_object)
     assert set(built.visuals) == {scene.robots["iiwa"].model.urdf}
-    # its first joint is in the same direction from the object as that of the other was
+    # it stands as high as the other did, and its first joint is in the same direction from the object
     old, new = (s.robots[n].T_world_base[:3, 3] + a.P[0] for s, n, a in (
         (bottle, "panda", bottle.arm()), (scene, "iiwa", scene.arm()),
     ))  # fmt: skip
+    assert scene.robots["iiwa"].T_world_base[2, 3] == pytest.approx(0.0, abs=2e-3)
     point = bottle.task().T_world_object[:3, 3]
-    assert np.allclose(np.cross(old - point, new - point), 0)
-    assert (old - point) @ (new - point) > 0
+    assert np.allclose(*(np.arctan2(*(p - point)[:2]) for p in (old, new)))
 
 
 def test_the_own_robot_comes_back_as_it_was(service, bottle):
