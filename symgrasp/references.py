@@ -25,7 +25,16 @@ from urllib.parse import unquote
 
 from symgrasp.files import SCENES_DIR
 
-__all__ = ["VARIABLE", "give_packages", "package_dir", "package_dirs", "portable", "resolve", "sought"]
+__all__ = [
+    "VARIABLE",
+    "give_packages",
+    "package_dir",
+    "package_dirs",
+    "package_folders",
+    "portable",
+    "resolve",
+    "sought",
+]
 
 VARIABLE = "SYMGRASP_PACKAGES"
 """Environment variable with packages and their folders: ``NAME=DIR``, several joined by colons."""
@@ -85,6 +94,17 @@ def package_dirs(reference: str) -> list[Path]:
     """
     names = [name for name, _ in _parts(reference)]
     return list(dict.fromkeys(d for name in names for d in (*_given(name), *_installed(name), *_ros(name))))
+
+
+def package_folders(name: str, folder: Path) -> Iterator[Path]:
+    """Yield the folders that a package of a name may have, in the order in which they are tried.
+
+    Args:
+        name: of the package.
+        folder: folder of the file that names it.
+    """
+    if _is_name(name):
+        yield from filter(_is_folder, _candidates(f"package://{name}/", folder))
 
 
 def resolve(reference: str, folder: Path) -> Path | None:

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from pathlib import Path
 
 import yaml
 
 from symgrasp.errors import InputError, SceneError, UrdfError
 from symgrasp.feasibility.starter import robot_content
+from symgrasp.files import read_file
 from symgrasp.hands.measure import hand_yaml, measure_hand
 from symgrasp.references import package_dirs, resolve, sought
 from symgrasp.robot.catalogue import CatalogueRobot
+from symgrasp.robot.description import read_description
 from symgrasp.robot.model import RobotModel
-from symgrasp.scene.format import ArmFile, HandFile, MountFile, RobotFile
+from symgrasp.robot.srdf import find_srdf
+from symgrasp.robot.xml_file import LARGEST_XML
+from symgrasp.scene.format import ArmFile, HandFile, MountFile, RobotFile, xacro_texts
 from symgrasp.scene.scene import Scene
 from symgrasp.survey import find_arms
 
 from ..choices.robot_arms import arm_file, tool_link
 from .archives import unpack
 
-__all__ = ["catalogue_entry", "check_inside", "read_robot_entry", "rearmed"]
+__all__ = ["catalogue_entry", "plain_urdf", "read_robot_entry", "rearmed"]
 
 
 def read_robot_entry(name: str, content: bytes, folder: Path) -> RobotFile:
@@ -33,18 +40,33 @@ def read_robot_entry(name: str, content: bytes, folder: Path) -> RobotFile:
         folder: an empty one to unpack it into.
 
     Raises:
-        InputError: see `app.files.archives.unpack`; or there is not exactly one URDF in it.
+        InputError: see `app.files.archives.unpack`; or it is not clear which file in it is the robot's.
         UrdfError, MeshError: the robot is unusable, or it is not clear what it grasps with.
     """
-    files = unpack(name, content, folder)
-    urdfs = [path for path in files if path.suffix.lower() == ".urdf"]
-    if len(urdfs) != 1:
-        found = [path.relative_to(folder).as_posix() for path in urdfs]
-        raise InputError(name, "files", found or "no .urdf file", "one .urdf file, with its meshes")
-    path = urdfs[0].resolve()
-    check_inside(path, folder)
+    path = plain_urdf(_robot_file(name, unpack(name, content, folder), folder), folder)
     called = re.sub(r"\W+", "_", path.stem).strip("_")[:50] or "robot"
-    return _entry(called, str(path), RobotModel(path))
+    return _entry(called, str(path), RobotModel(path, srdf=find_srdf(path)))
+
+
+def _robot_file(name: str, files: list[Path], folder: Path) -> Path:
+    """Return the file of the robot in an archive: a URDF, or else a xacro file that no other one includes."""
+    for endings in (".urdf",), (".xacro",):
+        found = [path for path in files if path.name.lower().endswith(endings)]
+        if len(found) > 1:
+            texts = {path: read_file(path, LARGEST_XML).decode("utf-8", "replace") for path in found}
+            included = {path for path in found if any(_includes(texts[o], path) for o in found if o != path)}
+            found = [path for path in found if path not in included] if endings == (".xacro",) else found
+        if len(found) == 1:
+            return found[0].resolve()
+        if found:
+            names = [path.relative_to(folder).as_posix() for path in found]
+            raise InputError(name, "files", names, f"one {endings[0]} file, with its meshes")
+    raise InputError(name, "files", "no .urdf file", "one .urdf or .xacro file, with its meshes")
+
+
+def _includes(text: str, path: Path) -> bool:
+    """Return whether a xacro file includes another one, by its name."""
+    return re.search(rf"""include[^>]*["'/]{re.escape(path.name)}["']""", text) is not None
 
 
 def catalogue_entry(robot: CatalogueRobot) -> RobotFile:
@@ -69,26 +91,42 @@ def _entry(name: str, urdf: str, model: RobotModel) -> RobotFile:
     return RobotFile.model_validate(robot_content(name, urdf, usable))
 
 
-def check_inside(urdf: Path, folder: Path) -> None:
-    """Check that a URDF refers to no file but those in a folder and of installed packages.
+def plain_urdf(path: Path, folder: Path, xacro_args: Mapping[str, str] | None = None) -> Path:
+    """Return the URDF that the file of a robot in an unpacked archive is, or is made.
+
+    What is made is written beside the file, so that it is expanded once, here, where nothing outside of the
+    archive is read.
+
+    Args:
+        path: the file.
+        folder: that of the archive.
+        xacro_args: values of the arguments of a xacro file.
 
     Raises:
-        UrdfError: it does, or is no XML. The text does not say whether there is such a file elsewhere.
+        UrdfError: the file cannot be read, or refers to a file neither in the folder nor of an installed
+            package. The text does not say whether there is such a file elsewhere.
     """
-    try:
-        root = ET.fromstring(urdf.read_bytes())
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise UrdfError(urdf.name, "urdf", str(error), "a valid URDF document") from None
+    description = read_description(path, xacro_args, folder)
+    robot = description.urdf
     inside = folder.resolve()
-    for element in root.iter():
+    for element in robot.iter():
         reference = element.get("filename")
         if reference is None or element.tag not in ("mesh", "texture"):
             continue
-        found = resolve(reference, urdf.parent)
+        found = resolve(reference, path.parent)
         roots = (inside, *(place.resolve() for place in package_dirs(reference)))
         if found is None or not any(found.resolve().is_relative_to(place) for place in roots):
             expected = "a file of the archive, or of an installed package"
-            raise UrdfError(urdf.name, element.tag, reference, expected)
+            raise UrdfError(path.name, element.tag, reference, expected)
+        if found.resolve().is_relative_to(inside):  # wherever the archive is unpacked
+            element.set("filename", os.path.relpath(found.resolve(), path.resolve().parent))
+    if not description.made:
+        return path
+    stem = path.stem.removesuffix(".urdf")
+    names = (f"{stem}{mark}.urdf" for mark in ("", *(f"_{k}" for k in itertools.count(2))))
+    plain = next(target for name in names if not (target := path.with_name(name)).exists())
+    plain.write_bytes(ET.tostring(robot))
+    return plain
 
 
 def rearmed(scene: Scene, arm: str, link: str, hand: str | None) -> RobotFile:
@@ -109,7 +147,7 @@ def rearmed(scene: Scene, arm: str, link: str, hand: str | None) -> RobotFile:
     if path is None:
         raise SceneError(scene.source, "urdf", entry.urdf, "an existing file")
     if hand is None:
-        measured = measure_hand(RobotModel(path), link)
+        measured = measure_hand(RobotModel(path, xacro_args=xacro_texts(entry.xacro_args)), link)
         held = HandFile.model_validate(yaml.safe_load(hand_yaml(measured))["hand"])
         mount, tool = None, None if measured.tool else link
     else:

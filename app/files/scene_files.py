@@ -8,6 +8,7 @@ such a file.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,12 +20,13 @@ from pydantic import ValidationError
 from symgrasp.errors import InputError, SceneError
 from symgrasp.files import LARGEST_YAML, SCENES_DIR, parse_yaml, read_file
 from symgrasp.references import package_dirs, portable, resolve
-from symgrasp.scene.format import SceneFile, describe_error
+from symgrasp.robot.srdf import find_srdf
+from symgrasp.scene.format import SceneFile, describe_error, xacro_texts
 from symgrasp.scene.scene import Scene
 
 from ..choices.uploaded_scene import UploadedScene
 from .archives import pack, unpack
-from .robot_files import check_inside
+from .robot_files import plain_urdf
 
 __all__ = [
     "MAX_NAME",
@@ -113,6 +115,7 @@ def read_scene(
     for field, holder, key in _references(plain):
         holder[key] = _allowed(source, field, holder[key], roots)
     check(plain)
+    _check_xacro_args(source, plain)
     return UploadedScene(f"{source} (upload)", Scene.from_content(plain, source))
 
 
@@ -149,7 +152,10 @@ def read_scene_archive(name: str, content: bytes, folder: Path, folders: Iterabl
                 expected = "a file of an installed package, or one of the server's scenes"
                 raise SceneError(name, field, path.name, expected)
             if key == "urdf":
-                check_inside(path, folder)
+                plain = plain_urdf(path, folder, xacro_texts(holder.pop("xacro_args", None)))
+                if plain != path and "srdf" not in holder and (srdf := find_srdf(path)):
+                    holder["srdf"] = str(srdf)
+                holder[key] = str(plain)
 
     content = read_file(scenes[0], SCENE_LIMIT + 1)
     uploaded = read_scene(scenes[0].name, content, (scenes[0].parent.resolve(), *folders), check)
@@ -190,6 +196,19 @@ def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable
         if not reference.startswith("package://") and not Path(reference).is_absolute():
             raise SceneError(source, field, reference, "package://<package>/<path>, or an absolute path")
         _allowed(source, field, reference, roots)
+    _check_xacro_args(source, plain)
+
+
+def _check_xacro_args(source: str, content: dict[str, Any]) -> None:
+    """Check that what an uploaded scene gives to xacro files of the server names no files in them.
+
+    Raises:
+        SceneError: an argument holds more than a plain word or number.
+    """
+    for i, robot in enumerate(content["robots"]):
+        for name, value in xacro_texts(robot.get("xacro_args")).items():
+            if ".." in value or not re.fullmatch(r"[\w+\-. ]*", value):
+                raise SceneError(source, f"robots[{i}].xacro_args.{name}", value, "words or numbers")
 
 
 def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> str:

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symgrasp.cli.shared import Commands, add_command, say, write_out
+from symgrasp.cli.shared import Commands, add_command, add_packages, say, write_out
 from symgrasp.errors import InputError, SymgraspError, one_of
 
 if TYPE_CHECKING:
@@ -20,12 +20,26 @@ __all__ = ["add_parser", "run"]
 def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "robot", run, "Say what a URDF holds: arms, hands, solvers.")
-    command.add_argument("urdf", metavar="URDF", help="a file, or package://<package>/<path>")
+    text = "a URDF, xacro or MJCF file, or package://<package>/<path>"
+    command.add_argument("urdf", metavar="FILE", help=text)
+    add_packages(command)
+    text = "value of an argument of a xacro file; may be given several times"
+    command.add_argument(
+        "--xacro", metavar="NAME:=VALUE", type=_xacro_arg, action="append", default=[], help=text
+    )
     text = "write a scene to start from: the robot, and a can where its first arm reaches"
     command.add_argument("--scene", metavar="FILE.yaml", type=Path, help=text)
     command.add_argument(
         "--arm", metavar="NAME", help="the arm that is to reach the can; the first by default"
     )
+
+
+def _xacro_arg(text: str) -> tuple[str, str]:
+    """Read a value of ``--xacro``."""
+    name, colon, value = text.partition(":=")
+    if not (name and colon):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected NAME:=VALUE")
+    return name, value
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,25 +52,27 @@ def run(args: argparse.Namespace) -> int:
     if args.scene and args.scene.suffix not in (".yaml", ".yml"):
         raise InputError("command line", "--scene", str(args.scene), "a name that ends in .yaml")
 
-    from symgrasp.feasibility.starter import robot_content
+    from symgrasp.feasibility.starter import robot_content, starter_scene
     from symgrasp.robot.model import RobotModel
+    from symgrasp.robot.srdf import find_srdf
     from symgrasp.survey import find_arms, in_catalogue
 
-    model = RobotModel(path)
+    xacro_args = dict(args.xacro)
+    model = RobotModel(path, srdf=find_srdf(path), xacro_args=xacro_args)
     known = in_catalogue(model)
     say(f"{model.name}: {len(model.link_names)} links, {len(model.joint_names)} joints that take a value")
     arms = find_arms(model)
     usable = [arm for arm in arms if arm.joints and arm.hand is not None]
     name = known.name if known else re.sub(r"\W+", "_", model.name).strip("_") or "robot"
     reference = portable(args.urdf, path) or str(path.resolve())
-    entry = robot_content(name, reference, usable) if usable else {}
+    entry = robot_content(name, reference, usable, xacro_args) if usable else {}
     solved = []
     for arm in arms:
         _say_arm(arm)
         if arm in usable and _solver_said(entry, arm):
             solved.append(arm)
     if solved:
-        _say_home(robot_content(name, reference, solved), solved[0].name)
+        _say_home(robot_content(name, reference, solved, xacro_args), solved[0].name)
     if not arms:
         say("  no arm: no chain of five or more joints that turn")
     _say_missing(model)
@@ -65,22 +81,18 @@ def run(args: argparse.Namespace) -> int:
             raise InputError("command line", "--arm", args.arm, one_of(arm.name for arm in solved))
         solved.sort(key=lambda arm: arm.name != args.arm)
     if args.scene:
-        _write_scene(args.scene, name, reference, solved, path)
+        if not solved:
+            raise InputError(path, "robot", name, "an arm with a solver and a hand")
+        _write_scene(args.scene, starter_scene(name, reference, solved, xacro_args), solved[0].name)
     return 0
 
 
-def _write_scene(out: Path, name: str, reference: str, arms: list[FoundArm], path: Path) -> None:
-    """Write a scene with a can for the first of the arms."""
-    if not arms:
-        raise InputError(path, "robot", name, "an arm with a solver and a hand")
-
+def _write_scene(out: Path, content: dict[str, Any], arm: str) -> None:
+    """Write a scene with a can that an arm reaches."""
     import yaml
 
-    from symgrasp.feasibility.starter import starter_scene
-
-    content = starter_scene(name, reference, arms)
     x, y, z = content["tasks"][0]["pose"]["position"]
-    say(f"  a can 5 cm thick at {x:g}, {y:g}, {z:g} m is in reach of {arms[0].name}")
+    say(f"  a can 5 cm thick at {x:g}, {y:g}, {z:g} m is in reach of {arm}")
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=100)
     write_out(out, text.encode())
 

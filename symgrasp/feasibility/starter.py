@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,15 +43,19 @@ COARSE = (4, 16)
 """Heights and angles of that map."""
 
 
-def robot_content(name: str, urdf: str, arms: Sequence[FoundArm]) -> dict[str, Any]:
+def robot_content(
+    name: str, urdf: str, arms: Sequence[FoundArm], xacro_args: Mapping[str, str] | None = None
+) -> dict[str, Any]:
     """Return a robot as scene files have it.
 
     Args:
         name: its name.
         urdf: the reference to its URDF.
         arms: its arms, all with joints and a hand.
+        xacro_args: values of the arguments of a xacro file.
     """
-    return {"name": name, "urdf": urdf, "arms": [_arm_entry(arm) for arm in arms]}
+    given = {"xacro_args": dict(xacro_args)} if xacro_args else {}
+    return {"name": name, "urdf": urdf, **given, "arms": [_arm_entry(arm) for arm in arms]}
 
 
 def scene_content(robot: dict[str, Any], arm: str) -> dict[str, Any]:
@@ -68,19 +72,22 @@ def scene_content(robot: dict[str, Any], arm: str) -> dict[str, Any]:
     }
 
 
-def starter_scene(name: str, urdf: str, arms: Sequence[FoundArm]) -> dict[str, Any]:
+def starter_scene(
+    name: str, urdf: str, arms: Sequence[FoundArm], xacro_args: Mapping[str, str] | None = None
+) -> dict[str, Any]:
     """Return the content of a scene with a robot, and a can that stands where its first arm reaches it best.
 
     Args:
         name: the robot's name.
         urdf: the reference to its URDF.
         arms: its arms, that which is to reach the can first.
+        xacro_args: values of the arguments of a xacro file.
 
     Raises:
         SceneError: the arm reaches no can, or the robot hits itself whatever the arm does.
         SymgraspError: a scene with that robot cannot be loaded.
     """
-    content = scene_content(robot_content(name, urdf, arms), arms[0].name)
+    content = scene_content(robot_content(name, urdf, arms, xacro_args), arms[0].name)
     scene = with_free_homes(Scene.from_content(content))
     check_homes(scene)
     home = scene.file.robots[0].home

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -12,20 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from symgrasp.errors import UrdfError, one_of
-from symgrasp.files import read_file
 from symgrasp.poses import Array, from_position_quat, rpy
 from symgrasp.references import resolve, sought
+from symgrasp.robot.description import read_description
 
-__all__ = ["LARGEST_URDF", "Frame", "Mount", "assemble", "parse_xml"]
-
-LARGEST_URDF = 5_000_000
-"""Largest URDF file (bytes) that is read."""
+__all__ = ["Frame", "Mount", "assemble"]
 
 MOST_LINKS = 5000
 """Most links of a URDF file, and most joints."""
-
-MOST_ELEMENTS, DEEPEST = 100_000, 50
-"""Most XML elements of a URDF file, and how deep they may be nested."""
 
 NUMBERS = {
     "origin": {"xyz": (3,), "rpy": (3,)},
@@ -41,13 +34,6 @@ NUMBERS = {
 
 SHAPES = ("box", "cylinder", "sphere", "mesh")
 """Geometries that a link may have."""
-
-
-XACRO = ("wiki.ros.org/xacro}", "ros.org/wiki/xacro}")
-"""In the tags of elements that the program xacro expands."""
-
-OTHER_FORMATS = {"mujoco": "an MJCF file of MuJoCo", "sdf": "an SDF file of Gazebo"}
-"""Tag of the first element → what such a file is."""
 
 
 @dataclass(frozen=True)
@@ -89,41 +75,26 @@ class Mount:
     name: str
 
 
-def assemble(path: Path, mounts: Sequence[Mount] = ()) -> bytes:
+def assemble(path: Path, mounts: Sequence[Mount] = (), robot: ET.Element | None = None) -> bytes:
     """Return the text of a URDF with the mounts added and every mesh reference made an absolute path.
 
     Args:
-        path: the URDF file.
+        path: the file of the robot.
         mounts: what to add, in order; a later one may be fixed to an earlier one.
+        robot: what `read_description` made of the file, which is changed; it is read unless given.
 
     Raises:
         UrdfError: a file is not a URDF, refers to a mesh that does not exist, lacks the link that
             something is to be mounted on, or two links or joints would have the same name.
     """
-    robot = _read(path)
+    robot = _checked(path, read_description(path).urdf if robot is None else robot)
     for mount in mounts:
         _add(robot, path, mount)
     return ET.tostring(robot)
 
 
-def _read(path: Path) -> ET.Element:
-    """Parse a URDF file, check that its names are unique, and make its mesh references absolute."""
-    try:
-        robot = parse_xml(read_file(path, LARGEST_URDF))
-    except OSError as error:
-        raise UrdfError(path, "urdf", str(path), "a readable URDF file") from error
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
-    if any(name in element.tag for element in robot.iter() for name in XACRO):
-        expected = (
-            f"a plain URDF; expand the file first: xacro {path.name} > {path.name.partition('.')[0]}.urdf"
-        )
-        raise UrdfError(path, "urdf", "a xacro file", expected)
-    if robot.tag in OTHER_FORMATS:
-        raise UrdfError(path, "urdf", OTHER_FORMATS[robot.tag], "a URDF; convert the file first")
-    if robot.tag != "robot" or robot.find("link") is None:
-        found = f"<{robot.tag}> without links" if robot.tag == "robot" else f"<{robot.tag}>"
-        raise UrdfError(path, "urdf", found, "<robot> with links, as in a URDF")
+def _checked(path: Path, robot: ET.Element) -> ET.Element:
+    """Check names, numbers and shapes of a URDF, make its mesh references absolute, and return it."""
     for tag in ("link", "joint"):
         names = _names(robot, tag)
         if len(names) > MOST_LINKS:
@@ -143,21 +114,6 @@ def _read(path: Path) -> ET.Element:
                 raise UrdfError(path, f"link {link.get('name')}", reference, expected)
             mesh.set("filename", str(file.resolve()))
     return robot
-
-
-def parse_xml(content: bytes) -> ET.Element:
-    """Parse XML; raise ValueError as soon as it has too many elements or nests them too deeply."""
-    root, depth = None, 0
-    events = ET.iterparse(io.BytesIO(content), ("start", "end"))
-    for count, (event, element) in enumerate(events):
-        root = element if root is None else root
-        depth += 1 if event == "start" else -1
-        if depth > DEEPEST:
-            raise ValueError(f"elements nested more than {DEEPEST} deep")
-        if count > 2 * MOST_ELEMENTS:
-            raise ValueError(f"more than {MOST_ELEMENTS:,} elements")
-    assert root is not None  # else the parser raises
-    return root
 
 
 def _no_repeats(path: Path, field: str, names: Sequence[str]) -> None:
@@ -206,7 +162,7 @@ def _add(robot: ET.Element, path: Path, mount: Mount) -> None:
         added = ET.Element("robot")
         ET.SubElement(added, "link", name=mount.name)
     else:
-        added = _read(mount.urdf)
+        added = _checked(mount.urdf, read_description(mount.urdf).urdf)
         for element, key in _references(added):
             element.set(key, mount.name + element.get(key, ""))
     for tag in ("link", "joint"):

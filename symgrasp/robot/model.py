@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
+from symgrasp.robot.description import read_description
 from symgrasp.robot.joint import Joint, joint_motion
 from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
@@ -34,16 +35,17 @@ class RobotModel:
     Models of equal content are equal, so that what is computed for one serves its copies too.
 
     Args:
-        path: the URDF file.
+        path: the file: a URDF, or one that `read_description` makes a URDF of.
         mounts: hands and tool frames to add to what the file holds.
         srdf: the file with the robot's semantic description; None where it has none.
+        xacro_args: values of the arguments of a xacro file.
 
     Raises:
         UrdfError: a file is missing, not a URDF, uses an unknown joint type, or refers to a
             mesh that does not exist; or a mount does not fit.
 
     Attributes:
-        path: the URDF file.
+        path: the file.
         urdf: text of the URDF with the mounts added, every mesh as an absolute path.
         sha256: SHA-256 of that URDF, of its collision meshes and of the links that may touch, as they were
             when it was loaded.
@@ -56,10 +58,17 @@ class RobotModel:
         upper: their upper limits (n,), inf where there is none.
     """
 
-    def __init__(self, path: Path, mounts: Sequence[Mount] = (), srdf: Path | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        mounts: Sequence[Mount] = (),
+        srdf: Path | None = None,
+        xacro_args: Mapping[str, str] | None = None,
+    ) -> None:
         self.path = Path(path)
-        self.srdf = None if srdf is None else read_srdf(srdf)
-        self.urdf = assemble(self.path, mounts)
+        description = read_description(self.path, xacro_args)
+        self.srdf = description.srdf if srdf is None else read_srdf(srdf)
+        self.urdf = assemble(self.path, mounts, description.urdf)
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite are refused below
                 urdf = yourdfpy.URDF.load(io.BytesIO(self.urdf), build_scene_graph=False, load_meshes=False)

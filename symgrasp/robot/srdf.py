@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from symgrasp.errors import UrdfError
-from symgrasp.files import read_file
-from symgrasp.robot.assembly import LARGEST_URDF, parse_xml
+from symgrasp.robot.xacro_file import is_xacro
+from symgrasp.robot.xml_file import read_xml
 
 __all__ = ["Srdf", "find_srdf", "read_srdf"]
 
@@ -37,7 +36,7 @@ def find_srdf(urdf: Path) -> Path | None:
     """
     folders = (urdf.parent, urdf.parent.parent / "srdf")
     for folder in folders:
-        if (path := folder / f"{urdf.stem}.srdf").is_file():
+        if (path := folder / f"{urdf.stem.removesuffix('.urdf')}.srdf").is_file():  # also of .urdf.xacro
             return path
     found = [path for folder in folders for path in folder.glob("*.srdf")]
     return found[0] if len(found) == 1 else None
@@ -49,12 +48,9 @@ def read_srdf(path: Path) -> Srdf:
     Raises:
         UrdfError: it is no SRDF, or a joint of a state has no number.
     """
-    try:
-        root = parse_xml(read_file(path, LARGEST_URDF))
-    except OSError as error:
-        raise UrdfError(path, "srdf", str(path), "a readable SRDF file") from error
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise UrdfError(path, "srdf", str(error), "a valid SRDF document") from error
+    root = read_xml(path, "SRDF")
+    if is_xacro(path, root):
+        raise UrdfError(path, "srdf", "a xacro file", f"a plain SRDF: xacro {path.name} > {path.stem}")
     if root.tag != "robot":
         raise UrdfError(path, "srdf", f"<{root.tag}>", "<robot>, as in an SRDF")
     disabled = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -35,6 +36,7 @@ __all__ = [
     "TaskFile",
     "describe_error",
     "scene_schema",
+    "xacro_texts",
 ]
 
 LARGEST = 1e4
@@ -155,6 +157,9 @@ class RobotFile(_Strict):
 
     name: Name
     urdf: str
+    """a URDF, or a xacro or MJCF file, which is made one"""
+    xacro_args: Annotated[dict[Name, str | StrictBool | int | Number], Field(max_length=100)] | None = None
+    """values of the arguments of a xacro file"""
     srdf: str | None = None
     """links that may touch, and states to park in; the file beside the URDF unless given"""
     base: PoseFile = PoseFile()
@@ -186,6 +191,12 @@ class RobotFile(_Strict):
         return (
             ArmFile(name=self.name, tool=self.tool, joints=self.joints, hand=self.hand, mount=self.mount),
         )
+
+
+def xacro_texts(given: Mapping[str, str | float] | None) -> dict[str, str]:
+    """Return the arguments that a scene file gives a xacro file as xacro takes them."""
+    texts = {name: str(value) for name, value in (given or {}).items()}
+    return {name: text.lower() if text in ("True", "False") else text for name, text in texts.items()}
 
 
 class ObjectFile(_Strict):

@@ -17,7 +17,7 @@ from symgrasp.robot.robot import Arm, Robot
 from symgrasp.robot.srdf import find_srdf
 from symgrasp.robot.support import area_of_corners, area_of_feet
 from symgrasp.robot.torso import Torso
-from symgrasp.scene.format import ArmFile, RobotFile
+from symgrasp.scene.format import ArmFile, RobotFile, xacro_texts
 
 __all__ = ["BuiltRobot", "RobotBuilder"]
 
@@ -48,7 +48,7 @@ class RobotBuilder:
 
     def __init__(self, source: str, folder: Path) -> None:
         self._source, self._folder = source, folder
-        self._models: dict[tuple[Path, tuple[Mount, ...], Path | None], RobotModel] = {}
+        self._models: dict[tuple[object, ...], RobotModel] = {}
 
     def build(self, i: int, entry: RobotFile) -> BuiltRobot:
         """Return the robot with index i in the file, and its arms.
@@ -73,7 +73,7 @@ class RobotBuilder:
                 mounts.append(Mount(hand.tool, None, tools[-1]))
         urdf = self._path(entry.urdf)
         srdf = self._path(entry.srdf) if entry.srdf else find_srdf(urdf)
-        model = self.model(urdf, tuple(mounts), srdf)
+        model = self.model(urdf, tuple(mounts), srdf, xacro_texts(entry.xacro_args))
         chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
         torso = self._torso(field, entry, model, tools)
         shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
@@ -101,11 +101,17 @@ class RobotBuilder:
         guessed = {"joints": files[0].joints} if entry.arms is None else {"arms": files}
         return BuiltRobot(entry.model_copy(update=guessed), robot, arms, notes)
 
-    def model(self, path: Path, mounts: tuple[Mount, ...] = (), srdf: Path | None = None) -> RobotModel:
+    def model(
+        self,
+        path: Path,
+        mounts: tuple[Mount, ...] = (),
+        srdf: Path | None = None,
+        xacro_args: Mapping[str, str] | None = None,
+    ) -> RobotModel:
         """Return the model of a URDF with mounts, shared by robots and obstacles that are alike."""
-        key = path, mounts, srdf
+        key = path, mounts, srdf, tuple(sorted((xacro_args or {}).items()))
         if key not in self._models:
-            self._models[key] = RobotModel(*key)
+            self._models[key] = RobotModel(path, mounts, srdf, xacro_args)
         return self._models[key]
 
     def _path(self, reference: str) -> Path:
@@ -120,7 +126,7 @@ class RobotBuilder:
             return []
         if hand.urdf is None:
             raise SceneError(self._source, f"{field}.mount", hand.name, "a hand with a urdf of its own")
-        bare = self.model(self._path(robot.urdf))
+        bare = self.model(self._path(robot.urdf), xacro_args=xacro_texts(robot.xacro_args))
         if arm.mount.link not in bare.link_names:
             expected = f"a link of {bare.path.name}: " + one_of(bare.link_names, arm.mount.link)
             raise SceneError(self._source, f"{field}.mount.link", arm.mount.link, expected)

@@ -10,16 +10,9 @@ from symgrasp.errors import UrdfError
 from symgrasp.poses import from_position_rpy, quat_wxyz
 from symgrasp.references import resolve
 from symgrasp.robot import assembly
-from symgrasp.robot.assembly import (
-    DEEPEST,
-    LARGEST_URDF,
-    MOST_ELEMENTS,
-    MOST_LINKS,
-    Frame,
-    Mount,
-    assemble,
-)
+from symgrasp.robot.assembly import MOST_LINKS, Frame, Mount, assemble
 from symgrasp.robot.model import RobotModel
+from symgrasp.robot.xml_file import DEEPEST, LARGEST_XML, MOST_ELEMENTS
 from tests.hostile import chain_urdf
 
 WSG = resolve("package://static_scenes/hands/wsg50.urdf", Path()) or Path()
@@ -48,9 +41,9 @@ def test_a_mounted_hand_is_where_it_was_put():
     [
         (chain_urdf(MOST_LINKS + 1), f"links: '5,001 of them': expected at most {MOST_LINKS:,} of them"),
         (chain_urdf(15_000), "links: '15,000 of them'"),
-        ("<a>" * (LARGEST_URDF // 3), f"elements nested more than {DEEPEST} deep"),
+        ("<a>" * (LARGEST_XML // 3), f"elements nested more than {DEEPEST} deep"),
         (f"<robot name='r'>{'<a/>' * 1_000_000}</robot>", f"more than {MOST_ELEMENTS:,} elements"),
-        (" " * (LARGEST_URDF + 1), "more than 5 MB"),
+        (" " * (LARGEST_XML + 1), "more than 5 MB"),
         (
             f"<!DOCTYPE r [<!ENTITY a '{'b' * 100_000}'>]><robot name='r'>{'&a;' * 10_000}</robot>",
             "amplification",
@@ -142,9 +135,6 @@ def test_robots_of_a_data_package_find_their_meshes(robot):
     ("name", "text", "message"),
     [
         ("arm.urdf.xacro", '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"/>', "without links"),
-        ("arm.urdf.xacro", '<robot name="a" xmlns:xacro="http://wiki.ros.org/xacro"><link name="b"/>'
-         '<xacro:include filename="x"/></robot>',
-         "'a xacro file': expected a plain URDF; expand the file first: xacro arm.urdf.xacro > arm.urdf"),
         ("arm.xml", "<mujoco/>", "'an MJCF file of MuJoCo': expected a URDF"),
         ("arm.sdf", "<sdf/>", "'an SDF file of Gazebo': expected a URDF"),
     ],
