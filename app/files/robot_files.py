@@ -123,8 +123,11 @@ def plain_urdf(path: Path, folder: Path, xacro_args: Mapping[str, str] | None = 
     if not description.made:
         return path
     stem = path.stem.removesuffix(".urdf")
-    names = (f"{stem}{mark}.urdf" for mark in ("", *(f"_{k}" for k in itertools.count(2))))
-    plain = next(target for name in names if not (target := path.with_name(name)).exists())
+    plain = path.with_name(f"{stem}.urdf")
+    for k in itertools.count(2):
+        if not plain.exists():
+            break
+        plain = path.with_name(f"{stem}_{k}.urdf")
     plain.write_bytes(ET.tostring(robot))
     return plain
 

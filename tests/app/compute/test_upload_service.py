@@ -111,8 +111,9 @@ def test_a_robot_refers_to_no_file_of_the_server(reference, service, bottle, tmp
 @pytest.mark.parametrize(
     ("files", "expected"),
     [
-        ({"readme.txt": b""}, "one .urdf file"),
+        ({"readme.txt": b""}, "one .urdf or .xacro file"),
         ({"a.urdf": b"", "b.urdf": b""}, "one .urdf file"),
+        ({"a.xacro": b"<a/>", "b.xacro": b"<a/>"}, "one .xacro file"),
         ({"a.urdf": b"<robot"}, "a valid URDF document"),
         ({"a.urdf": b'<robot name="x"><link name="a"/></robot>'}, "an arm of five or more joints"),
     ],
@@ -121,6 +122,66 @@ def test_what_is_no_robot_is_refused_in_one_line(files, expected, service, bottl
     with pytest.raises(SymgraspError, match=expected) as caught:
         service.read_robot(bottle, "panda", "p.zip", pack(files.items()), tmp_path, quiet)
     assert "\n" not in str(caught.value)
+
+
+def test_an_uploaded_xacro_file_is_expanded_once_and_saved_as_a_urdf(service, bottle, tmp_path):
+    folder = tmp_path / "upload"
+    folder.mkdir()
+    files = {f"ws/arm_description/{k}": v for k, v in xacro_files().items()}
+    entry, built = service.read_robot(bottle, "panda", "arm.zip", pack(files.items()), folder, quiet)
+    assert Path(entry.urdf) == folder.resolve() / "ws/arm_description/urdf/arm.urdf"
+    assert entry.xacro_args is None
+    model = built.scene.arm().robot.model
+    assert model.joint_names[:6] == tuple(f"joint{k}" for k in range(1, 7))
+    there = tmp_path / "there"
+    unpack("mine.zip", scene_archive(built.scene, "mine.yaml", [folder]), there)
+    folder.rename(tmp_path / "gone")
+    assert Scene.load(there / "mine.yaml").arm().robot.model.link_names == model.link_names
+
+
+def test_a_scene_in_an_archive_gives_arguments_to_its_xacro_file(service, bottle, tmp_path):
+    robot = {"name": "arm", "urdf": "urdf/arm.urdf.xacro", "hand": "wsg50", "mount": {"link": "my_link6"}}
+    content = {key: value for key, value in bottle.content.items() if key != "robots"}
+    content["robots"] = [robot | {"xacro_args": {"prefix": "my_", "scale": 1.25}}]
+    content["tasks"] = [{"name": "hold", "pose": content["tasks"][0]["pose"]}]
+    files = {"arm.yaml": yaml.safe_dump(content).encode(), **xacro_files()}
+    opened = service.read_scene("arm.zip", pack(files.items()), tmp_path, quiet).scene
+    model = opened.robots["arm"].model
+    assert model.forward(model.default_values())[6, 2, 3] == pytest.approx(1.25 * 1.23)
+    assert opened.file.robots[0].xacro_args is None
+    assert Path(opened.file.robots[0].urdf).name == "arm.urdf"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<xacro:include filename="/etc/hostname"/>',
+        "<link name=\"${xacro.load_yaml('../../../../etc/hostname')}\"/>",
+        '<link name="l"><visual><geometry><mesh filename="/etc/hostname"/></geometry></visual></link>',
+        '<xacro:include filename="$(find static_scenes)/hands/wsg50.urdf"/>',
+    ],
+)
+@pytest.mark.parametrize("name", ["arm.urdf.xacro", "arm.urdf"])
+def test_a_xacro_file_reads_no_file_of_the_server(text, name, service, bottle, tmp_path):
+    content = (
+        f'<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">{text}<xacro:if value="0"/></robot>'
+    )
+    with pytest.raises(InputError, match=r"its own parts|a file of the archive|a package that can be found"):
+        service.read_robot(bottle, "panda", "p.zip", pack([(name, content.encode())]), tmp_path, quiet)
+
+
+def test_a_scene_alone_gives_no_paths_to_xacro_files_of_the_server(service, bottle):
+    robot = bottle.content["robots"][0] | {"xacro_args": {"a": "../../etc/hostname"}}
+    content = yaml.safe_dump(bottle.content | {"robots": [robot]}).encode()
+    with pytest.raises(SymgraspError, match=r"robots\[0\].xacro_args.a: .* expected words or numbers"):
+        service.read_scene("s.yaml", content, None, quiet)
+
+
+def xacro_files() -> dict[str, bytes]:
+    """Return the files of a robot in xacro: name in its package → content."""
+    folder = Path(__file__).parents[2] / "data/arm_description"
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
 def test_obstacles_of_an_archive_are_refused(service, bottle, tmp_path):
