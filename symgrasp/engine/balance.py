@@ -67,8 +67,8 @@ def _weight(mass: Array, points: Array) -> Array:
 
 
 @njit(**FAST)
-def stands(balance, frames, T_world_base, T, row):
-    """Whether the centre of mass is inside the support.
+def stands(balance, frames, T_world_base, T, row, holds):
+    """Whether the centre of mass is inside the support, or there is none.
 
     Args:
         balance: see `Balance`.
@@ -76,10 +76,13 @@ def stands(balance, frames, T_world_base, T, row):
         T_world_base: (4, 4) pose of the robot's base.
         T: (4, 4) tool pose in the base.
         row: row of the grasp.
+        holds: whether it bears the load.
     """
-    hand, load = balance.hand[row], balance.load[row]
-    mass = balance.fixed[0] + hand[0] + load[0]
-    x, y = balance.fixed[1] + load[1], balance.fixed[2] + load[2]
+    hand = balance.hand[row]
+    mass, x, y = balance.fixed[0] + hand[0], balance.fixed[1], balance.fixed[2]
+    if holds:
+        load = balance.load[row]
+        mass, x, y = mass + load[0], x + load[1], y + load[2]
     for k in range(len(balance.joints) - 1):
         w = balance.joints[k]
         mass += w[0]

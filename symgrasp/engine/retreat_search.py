@@ -1,7 +1,7 @@
 """The tool's own checks, and the search along the straight retreat from a grasp. Compiled.
 
-Arguments that the functions share: chain, moving, pieces, tree and inputs are those of `search`; scratch
-is `Scratch`, branches is `BranchScratch` and rows is `RowChecks`. T is a tool pose (4, 4) in the base.
+Arguments that the functions share: chain, moving, pieces, tree, inputs and balance are those of `search`;
+scratch is `Scratch`, branches is `BranchScratch`, rows is `RowChecks`. T is a tool pose (4, 4) in the base.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from symgrasp.compiling import njit
+from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import UNDECIDED, check_arm, check_hand
 from symgrasp.engine.kinematics import place_arm, place_hand
 from symgrasp.engine.search_types import BLOCKED, FEASIBLE, RETREAT_UNDECIDED
@@ -56,8 +57,10 @@ def tool_retreats(moving, pieces, tree, scratch, branches, inputs, rows, run, T)
 
 
 @njit(**STRICT)
-def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, rows, run, T, k, b, tool_free):
-    """Follow a candidate along the retreat, in the same steps as `CandidateChecker`.
+def arm_retreats(
+    chain, moving, pieces, tree, scratch, branches, inputs, balance, rows, run, T, k, b, tool_free
+):
+    """Follow a candidate, at which the arm is placed, along the retreat, in the steps of `CandidateChecker`.
 
     Args:
         k: redundancy sample of the candidate.
@@ -68,8 +71,11 @@ def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, rows, r
         FEASIBLE, BLOCKED, or RETREAT_UNDECIDED.
     """
     q, exists, inside, at = branches.q[1], branches.exists[1], branches.inside[1], branches.at
-    moved = branches.T
+    moved, falls, row = branches.T, len(balance.edges) > 0, inputs.row[run]
     copy_row(branches.q[0][b], at)
+    if falls and not stands(balance, scratch.frames, inputs.T_world_base, T, row, False):
+        scratch.hit[0] = scratch.hit[2] = -1
+        return BLOCKED
     furthest = FEASIBLE
     for s in range(len(inputs.retreat)):
         moved_along(T, inputs.retreat[s], moved)
@@ -78,9 +84,14 @@ def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, rows, r
         if not _follow(chain.limits, q, inside, at):
             furthest = BLOCKED
             break
+        if falls:
+            place_arm(moving, pieces, scratch, at)
+            if not stands(balance, scratch.frames, inputs.T_world_base, moved, row, False):
+                furthest = BLOCKED
+                break
         gap = 0.0  # on the retreat only collisions matter, not the clearance
         if tool_free:
-            place_hand(moving, pieces, scratch, inputs.T_world_base, moved, inputs.row[run])
+            place_hand(moving, pieces, scratch, inputs.T_world_base, moved, row)
         else:
             gap = min(gap, tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, s + 1, moved))
         if gap != -math.inf:

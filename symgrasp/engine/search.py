@@ -158,7 +158,7 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                 continue
             if len(balance.edges):
                 place_arm(moving, pieces, scratch, q[b])
-                if not stands(balance, scratch.frames, inputs.T_world_base, T, inputs.row[run]):
+                if not stands(balance, scratch.frames, inputs.T_world_base, T, inputs.row[run], True):
                     if math.isnan(hand):
                         result.status[cell] = UNBALANCED
                     continue
@@ -180,7 +180,20 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                     retreat_known = True
                     tool_free = tool_retreats(moving, pieces, tree, scratch, branches, inputs, rows, run, T)
                 furthest = arm_retreats(
-                    chain, moving, pieces, tree, scratch, branches, inputs, rows, run, T, k, b, tool_free
+                    chain,
+                    moving,
+                    pieces,
+                    tree,
+                    scratch,
+                    branches,
+                    inputs,
+                    balance,
+                    rows,
+                    run,
+                    T,
+                    k,
+                    b,
+                    tool_free,
                 )
                 place_hand(moving, pieces, scratch, inputs.T_world_base, T, inputs.row[run])
                 if furthest == BLOCKED:

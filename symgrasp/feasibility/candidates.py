@@ -16,7 +16,7 @@ from symgrasp.ik.retreat import RETREAT_TURN, retreat_distances, retreated
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
-from symgrasp.scene.balance import load_of_hand, support_margin
+from symgrasp.scene.balance import Load, load_of_hand, support_margin
 from symgrasp.world import BulletWorld, Collision, NearBodies
 
 __all__ = ["Candidate", "CandidateChecker", "CheckResult"]
@@ -50,12 +50,15 @@ class CheckResult(NamedTuple):
         collision: the deepest collision of that stage, None where it is not a collision.
         retreat: how far (m) from the grasp that was, along the retreat; the whole length if FEASIBLE.
         q: (n,) joint values there, or the last ones before the arm could not follow.
+        imbalance: how far (m) the centre of mass is outside of the robot's support there, where that is what
+            failed, else 0.
     """
 
     reason: Reason
     collision: Collision | None
     retreat: float
     q: Array
+    imbalance: float = 0.0
 
 
 class CandidateChecker:
@@ -101,7 +104,10 @@ class CandidateChecker:
             yield Candidate(q, float(self.ik.phi[sample]), sample, branch, reason, collision)
 
     def check(self, T_base_tool: Array, q: Array, sample: int, opening: float) -> CheckResult:
-        """Check a candidate inside the limits: balance at the grasp, collisions there and along the retreat.
+        """Check a candidate inside the limits: balance and collisions, at the grasp and along the retreat.
+
+        At the grasp the robot bears the object; where a retreat is asked for, it must stand with an empty
+        hand too, there and all along it.
 
         Args:
             T_base_tool: tool pose (4, 4) in the frame of the robot's base.
@@ -109,30 +115,38 @@ class CandidateChecker:
             sample: their redundancy sample, which the retreat keeps.
             opening: opening (m) of the hand.
         """
-        if self.support_margin(T_base_tool, q, opening) < 0:
-            return CheckResult(Reason.OUT_OF_BALANCE, None, 0.0, q)
+        if imbalance := self._imbalance(q, opening, [self._load(T_base_tool)]):
+            return CheckResult(Reason.OUT_OF_BALANCE, None, 0.0, q, imbalance)
         collision = self._collision(T_base_tool, q, opening)
         if collision:
             return CheckResult(collision.reason, collision, 0.0, q)
+        if self._retreat and (imbalance := self._imbalance(q, opening)):
+            return CheckResult(Reason.APPROACH_BLOCKED, None, 0.0, q, imbalance)
         for distance in self._retreat:
             T = retreated(T_base_tool, distance)
             follow = self._follow(T, q, sample)
             if follow is None:
                 return CheckResult(Reason.APPROACH_BLOCKED, None, distance, q)
             q = follow
+            if imbalance := self._imbalance(q, opening):
+                return CheckResult(Reason.APPROACH_BLOCKED, None, distance, q, imbalance)
             collision = self._collision(T, q, opening)
             if collision:
                 return CheckResult(Reason.APPROACH_BLOCKED, collision, distance, q)
         return CheckResult(Reason.FEASIBLE, None, self._retreat[-1] if self._retreat else 0.0, q)
 
-    def support_margin(self, T_base_tool: Array, q: Array, opening: float) -> float:
-        """Return how far (m) the robot's centre of mass is inside its support; inf where it cannot fall."""
-        scene, robot, T = self.world.scene, self.arm.robot, self.world.object_pose
+    def _load(self, T_base_tool: Array) -> Load:
+        """Return what the arm's robot bears of the object that a hand at a tool pose (4, 4) holds."""
+        T = self.world.object_pose
+        height = float((inverse(T) @ self.arm.robot.T_world_base @ T_base_tool)[2, 3])
+        return load_of_hand(self.world.scene, self.arm, self._holders, T, height)
+
+    def _imbalance(self, q: Array, opening: float, loads: Sequence[Load] = ()) -> float:
+        """Return how far (m) the robot's centre of mass is outside of its support; 0 where it stands."""
+        robot = self.arm.robot
         if robot.support is None:
-            return np.inf
-        height = float((inverse(T) @ robot.T_world_base @ T_base_tool)[2, 3])
-        load = load_of_hand(scene, self.arm, self._holders, T, height)
-        return support_margin(robot, self.arm.robot_values(q, opening), [load])
+            return 0.0
+        return max(0.0, -support_margin(robot, self.arm.robot_values(q, opening), loads))
 
     def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
         self.world.set_arm(self.arm, q, opening)

@@ -76,8 +76,8 @@ class CandidateResult:
         retreat: how far (m) from the grasp the retreat ended, the whole length if FEASIBLE.
         failure: why the arm could not follow the retreat, None where it could.
         ended: (n,) joint values where it ended: those of the collisions.
-        imbalance: how far (m) the centre of mass is outside of the robot's support at least; for
-            OUT_OF_BALANCE, else 0.
+        imbalance: how far (m) the centre of mass is outside of the robot's support, at the grasp or where the
+            retreat ended, if that is what failed, else 0.
         clearance: distance (m) at the grasp of all pairs that are checked at least, at most
             `CLEARANCE_LIMIT`; for FEASIBLE, else None.
     """
@@ -243,15 +243,13 @@ def _checked(
     """Check a candidate inside the limits, and measure all its collisions or its clearance."""
     world, arm = checker.world, checker.arm
     check = checker.check(T_base_tool, q, sample, opening)
-    collisions, failure, clearance, imbalance = (), None, None, 0.0
-    if check.reason == Reason.OUT_OF_BALANCE:
-        imbalance = -checker.support_margin(T_base_tool, q, opening)
-    elif check.collision:
+    collisions, failure, clearance = (), None, None
+    if check.collision:
         world.set_arm(arm, check.q, opening)
         collisions = tuple(world.arm_collisions(arm))
-    elif check.reason == Reason.APPROACH_BLOCKED:
+    elif check.reason == Reason.APPROACH_BLOCKED and not check.imbalance:
         failure = _failure(checker.ik, retreated(T_base_tool, check.retreat), sample)
-    else:
+    elif check.reason == Reason.FEASIBLE:
         world.set_arm(arm, q, opening)
         clearance = world.clearance(arm, CLEARANCE_LIMIT)
     return CandidateResult(
@@ -266,7 +264,7 @@ def _checked(
         failure=failure,
         ended=check.q,
         clearance=clearance,
-        imbalance=imbalance,
+        imbalance=check.imbalance,
     )
 
 

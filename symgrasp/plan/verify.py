@@ -310,9 +310,9 @@ def _check_margins(
     report: Report,
     progress: Progress | None,
 ) -> None:
-    """Check that a grasp closer by a cell than each margin is still feasible, one arm at a time.
+    """Check that a hand gets away from its grasp, and that grasps closer than each margin are still feasible.
 
-    The torso may move for it, unless the arm shares it with another one.
+    One arm at a time. The torso may move for another grasp, unless the arm shares it with another one.
     """
     scene = world.scene
     arm, grid, g = scene.arm(hold.arm), scene.manifold, hold.grasp
@@ -325,6 +325,7 @@ def _check_margins(
     checker = CandidateChecker(world, arm, ik, scene.settings.approach, holders=holders)
     for name in scene.robots:
         world.park(name)
+    _check_retreat(hold, checker, T, who, report)
     margins = (
         ("margin_along", hold.margin_along / grid.dh, grid.heights, (grid.dh, 0.0)),
         ("margin_around", hold.margin_around / grid.dtheta, grid.angles // 2, (0.0, grid.dtheta)),
@@ -342,6 +343,24 @@ def _check_margins(
             progress(done / len(cells))
         free = _feasible(checker, world, T, h, theta, g.roll)
         report.expect(free, f"{who}: {text} is overstated: {away:+d} cells away is infeasible")
+
+
+def _check_retreat(hold: Hold, checker: CandidateChecker, T: Array, who: str, report: Report) -> None:
+    """Check that the straight retreat from a grasp is free, and that the robot stands along it."""
+    world, arm = checker.world, checker.arm
+    if not world.scene.settings.approach:
+        return
+    world.set_object(T)
+    q = np.array([hold.joints[name] for name in arm.joint_names])
+    T_base_tool = arm.tool_pose(q)
+    found = checker.ik.solve(T_base_tool)
+    if not report.expect(len(found.q), f"{who}: no configuration of the grasp is found"):
+        return
+    away = np.abs((found.q - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)  # a full turn is none
+    sample = int(found.sample[away.argmin()])
+    result = checker.check(T_base_tool, q, sample, hold.opening)
+    text = f"{who}: {result.reason.label}, {1e3 * result.retreat:.0f} mm from the grasp"
+    report.expect(result.reason == Reason.FEASIBLE, text)
 
 
 def _feasible(

@@ -2,7 +2,8 @@
 
 A held object is a load. Where all hands that hold it are of one robot, it is a body of that robot, and its
 weight acts at its own centre of mass. Where several robots hold it together, nobody knows how they share it:
-each hand is taken to bear an equal part, which acts on the object's axis at the height of the grasp.
+each hand is taken to bear an equal part, which acts on the object's axis at the height of the grasp. On the
+retreat from a grasp the hand is empty, and so is the robot.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symgrasp.errors import SceneError
+from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.create import MapMaker, create_map, explain
+from symgrasp.ik import solver_for
 from symgrasp.object.profile import Profile
 from symgrasp.plan.verify import verify
-from symgrasp.planners.planning import plan_bimanual
-from symgrasp.poses import from_position_rpy
+from symgrasp.planners.planning import plan_bimanual, plan_sequential, sequential_plans
+from symgrasp.poses import from_position_rpy, inverse, translation
 from symgrasp.reason import Reason
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Robot
@@ -38,13 +41,21 @@ def standing(mass: float = 0.0, half: float = 0.2, arms: tuple[str, ...] = ("lef
     return scene
 
 
-def centre_of_mass(values) -> np.ndarray:
+@cache
+def weighed(urdf: bytes):
+    """Pinocchio's model of a URDF."""
+    return pinocchio.buildModelFromXML(urdf.decode())
+
+
+def centre_of_mass(own: RobotModel, values: np.ndarray) -> np.ndarray:
     """Pinocchio's centre of mass in the base frame."""
-    model = pinocchio.buildModelFromUrdf(str(URDF))
-    names = RobotModel(URDF).joint_names
+    model = weighed(own.urdf)
     q = pinocchio.neutral(model)
-    for name, value in zip(names, values, strict=True):
-        q[model.joints[model.getJointId(name)].idx_q] = value
+    for joint in own.joints:
+        if joint.source >= 0:
+            q[model.joints[model.getJointId(joint.name)].idx_q] = (
+                joint.ratio * values[joint.source] + joint.offset
+            )
     data = model.createData()
     # links fixed to the base are no body of Pinocchio's model, but of its universe
     moved = pinocchio.centerOfMass(model, data, q)
@@ -65,7 +76,7 @@ def test_the_margin_is_that_of_pinocchio_s_centre_of_mass(seed):
     robot = Robot("r", model, base, np.zeros(len(values)), support=corners)
     load = Load(float(rng.uniform(0, 50)), rng.uniform(-1, 1, 3))
     mass = model.masses()[0].sum()
-    at = base[:3, :3] @ centre_of_mass(values) + base[:3, 3]
+    at = base[:3, :3] @ centre_of_mass(model, values) + base[:3, 3]
     x, y = ((mass * at + load.mass * load.point) / (mass + load.mass))[:2]
     expected = min(x - low[0], high[0] - x, y - low[1], high[1] - y)
     assert support_margin(robot, values, [load]) == pytest.approx(expected, abs=1e-9)
@@ -180,3 +191,81 @@ def test_plans_keep_all_robots_standing():
     margins = support_margins(scene, task.object_pose_turned.array(), held)
     assert margins["body"] == pytest.approx(task.balance["body"])
     assert margins["body"] >= 0
+
+
+IN_FRONT = (0.085, 0.2)
+"""From where to where (m) the support of `tipping` reaches, in front of the robot."""
+
+
+def tipping(approach: float) -> Scene:
+    """One arm and a stick; the support is so far in front that the robot may fall backwards without it."""
+    scene = standing(2.0, arms=("left",))
+    scene["robots"][0]["support"] = [[x, y] for x in IN_FRONT for y in (-0.2, 0.2)]
+    del scene["robots"][0]["torso"]
+    scene["tasks"] = scene["tasks"][:1]
+    scene["map"] = {"heights": 6, "angles": 12, "redundancy": 1, "approach": approach}
+    return Scene.from_content(scene)
+
+
+def stands_by_pinocchio(scene: Scene, values: np.ndarray, load: float, point: np.ndarray) -> bool:
+    """Whether the centre of mass, with a load (kg) at a point (3,), is inside the support of `tipping`."""
+    robot = scene.robots["body"]
+    mass = robot.model.masses()[0].sum()
+    at = robot.T_world_base[:3, :3] @ centre_of_mass(robot.model, values) + robot.T_world_base[:3, 3]
+    middle = (mass * at + load * point) / (mass + load) - robot.T_world_base[:3, 3]
+    return bool(IN_FRONT[0] <= middle[0] <= IN_FRONT[1] and abs(middle[1]) <= 0.2)
+
+
+def test_a_robot_must_stand_along_the_retreat_too():
+    """Every candidate that is free without a support is followed here, and weighed by Pinocchio."""
+    scene = tipping(0.1)
+    content = scene.file.model_dump(mode="json", exclude_none=True)
+    del content["robots"][0]["support"]
+    free = Scene.from_content(content)
+    arm, task, grid = free.arm("left"), free.task(), free.manifold
+    ik = solver_for(arm, 1)
+    tools = inverse(arm.robot.T_world_base) @ grid.tool_poses(task.T_world_object, arm.hand.finger_depth)
+    middle = (task.T_world_object @ [0, 0, free.profile.centre_of_mass, 1])[:3]
+    expected = np.zeros((2, grid.heights, grid.angles), dtype=bool)
+    tipped = 0
+    with open_world(free) as world:
+        checker = CandidateChecker(world, arm, ik, 0.1)
+        world.set_object(task.T_world_object)
+        for cell in np.ndindex(expected.shape):
+            opening = arm.hand.opening(float(free.profile.radius(grid.h[cell[1]])))
+            for c in checker.candidates(tools[cell], opening):
+                if c.reason != Reason.FEASIBLE:
+                    continue
+                held = stands_by_pinocchio(scene, arm.robot_values(c.q, opening), 2.0, middle)
+                path = [c.q]
+                for distance in np.linspace(0.01, 0.1, 10):
+                    found = ik.solve_sample(tools[cell] @ translation([0, 0, -distance]), c.sample).q
+                    path.append(found[np.abs(found - path[-1]).max(axis=1).argmin()])
+                empty = [stands_by_pinocchio(scene, arm.robot_values(q, opening), 0.0, middle) for q in path]
+                expected[cell] |= held and all(empty)
+                tipped += held and not all(empty)
+    the_map = create_map(scene)
+    np.testing.assert_array_equal(the_map.feasible, expected)
+    np.testing.assert_array_equal(create_map(scene, method="reference").feasible, expected)
+    assert tipped > 5
+    assert expected.any()
+
+
+def test_where_a_robot_falls_on_the_retreat_is_explained_and_verified():
+    """A plan of the same scene without a retreat is refuted once the retreat counts."""
+    scene, still = tipping(0.1), tipping(0.0)
+    with_retreat, without = create_map(scene), create_map(still)
+    blocked = np.argwhere((with_retreat.reason == Reason.APPROACH_BLOCKED) & without.feasible)
+    grid = scene.manifold
+    explanations = [
+        explain(scene, float(grid.h[i]), float(grid.theta[j]), [0.0, np.pi][r]) for r, i, j in blocked
+    ]
+    fallen = [e for e in explanations if e.candidates[0].imbalance]
+    assert fallen
+    assert all(e.reason == Reason.APPROACH_BLOCKED for e in fallen)
+    assert all("mm outside of the support" in e.candidates[0].why.split("after ")[1] for e in fallen)
+    cells = {(e.cell.row, e.cell.column) for e in fallen}
+    plans = sequential_plans(scene, maps={("carry", "left"): without})
+    holds = next(plan for plan in plans if grid.cell((g := plan.tasks[0].holds[0].grasp).h, g.theta) in cells)
+    assert "approach blocked" in str(verify(holds))
+    assert verify(plan_sequential(scene)).failures == []
