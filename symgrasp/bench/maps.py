@@ -6,10 +6,13 @@ import importlib.util
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
+import trimesh
 import yaml
 
 from symgrasp.bench.figures import Figure
@@ -40,6 +43,9 @@ SECONDS = {"reference": 0.9, "Pinocchio and Coal": 0.5}
 
 CALIBRATION = 60
 """Number of cells that are timed to find out how many take that long."""
+
+FINE = 12288
+"""Number of triangles of a fine mesh: those of a box, each cut into four, five times over."""
 
 CUTS = 10
 """Number of parts that a box is cut into along each of two sides, to make a hundred of one."""
@@ -179,7 +185,7 @@ def growth(rounds: int) -> Iterator[Figure]:
 
 
 def boxes(rounds: int) -> Iterator[Figure]:
-    """Time a map among four boxes, and among the same boxes cut into a hundred each; the maps are equal."""
+    """Time a map among four boxes, and among the same in pieces and as fine meshes; the maps are equal."""
     content = yaml.safe_load((SCENES_DIR / "bottle_on_table.yaml").read_text())
     few = [
         {"name": "table", "box": [1.2, 1.2, 0.04], "pose": {"position": [0.4, 0, -0.02]}},
@@ -187,16 +193,32 @@ def boxes(rounds: int) -> Iterator[Figure]:
         {"name": "side", "box": [0.6, 0.04, 0.5], "pose": {"position": [0.5, 0.3, 0.25]}},
         {"name": "shelf", "box": [0.3, 0.5, 0.04], "pose": {"position": [0.7, 0, 0.55]}},
     ]
-    many = [part for box in few for part in _cut(box)]
-    made = {}
-    for count, obstacles in ((4, few), (400, many)):
-        content["obstacles"] = obstacles
-        made[count] = Scene.from_content(content).with_settings(**GRID)
-        assert len(made[count].obstacles) == count
-    with _MapTimer(scene=made[4]) as quick, _MapTimer(scene=made[400]) as slow:
-        assert np.array_equal(quick.map().feasible, slow.map().feasible)
-        ratios = tuple(slow.time() / quick.time() for _ in range(rounds))
-    yield Figure("the same boxes, 4 cut into 400", "×", ratios)
+
+    def among(obstacles: list[dict[str, Any]]) -> Scene:
+        return Scene.from_content({**content, "obstacles": obstacles}).with_settings(**GRID)
+
+    with TemporaryDirectory() as folder, _MapTimer(scene=among(few)) as quick:
+        others = {
+            "the same boxes, 4 cut into 400": [part for box in few for part in _cut(box)],
+            f"the same boxes as meshes of {4 * FINE:,} triangles": [
+                _fine_mesh(box, Path(folder)) for box in few
+            ],
+        }
+        for name, obstacles in others.items():
+            with _MapTimer(scene=among(obstacles)) as slow:
+                assert np.array_equal(quick.map().feasible, slow.map().feasible)
+                ratios = tuple(slow.time() / quick.time() for _ in range(rounds))
+            yield Figure(name, "×", ratios)
+
+
+def _fine_mesh(box: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a box as an obstacle that is a mesh of `FINE` triangles, and write its file."""
+    mesh = trimesh.creation.box(box["box"])
+    while len(mesh.faces) < FINE:
+        mesh = mesh.subdivide()
+    file = folder / f"{box['name']}.stl"
+    mesh.export(file)
+    return {"name": box["name"], "mesh": str(file), "pose": box["pose"]}
 
 
 def _cut(box: dict[str, Any]) -> Iterator[dict[str, Any]]:

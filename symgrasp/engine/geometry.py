@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.engine.balance import balance_of
+from symgrasp.engine.flat_faces import convex_faces
 from symgrasp.engine.kinematics import MovingPieces
 from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.engine.search_types import Balance
@@ -218,7 +219,7 @@ def _revolved(vertices: Array) -> Piece:
 
 
 def _obstacles(scene: Scene) -> Iterator[_Placed]:
-    """Yield the pieces of the obstacles; a mesh is one piece for each triangle."""
+    """Yield the pieces of the obstacles; those of a mesh are its flat faces."""
     for o in scene.obstacles:
         for link, shape in o.shapes():
             name, pose = BodyName(o.name, link), o.T_world_obstacle @ shape.pose
@@ -236,7 +237,7 @@ def _exact(shape: CollisionShape, name: BodyName) -> Iterator[Piece]:
     elif shape.kind == "sphere":
         yield Piece(np.zeros((1, 3)), rounding=shape.size[0])
     else:
-        yield from map(Piece, np.asarray(shape.mesh(f"obstacle {name}").triangles))
+        yield from map(Piece, convex_faces(shape.mesh(f"obstacle {name}")))
 
 
 def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[_Placed]:

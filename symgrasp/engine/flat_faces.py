@@ -1,0 +1,53 @@
+"""The surface of a mesh as convex polygons, which are fewer than its triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull, QhullError
+
+from symgrasp.poses import Array
+
+__all__ = ["convex_faces"]
+
+FLATNESS = 1e-7
+"""Vertices within this distance (m) of a plane lie in it. It is far below the bands of
+`symgrasp.engine.checks`, so merged triangles are certified as they would be one by one."""
+
+AREA_TOLERANCE = 1e-9
+"""Relative difference of the areas of triangles and of their hull below which they fill it."""
+
+
+def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
+    """Return convex polygons (n, 3), in no order of corners, that together are the surface of a mesh.
+
+    Triangles that share edges and lie in a plane are one polygon where they fill their convex hull.
+    """
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    mesh.merge_vertices()
+    single = np.ones(len(mesh.faces), dtype=bool)
+    faces = []
+    for group in mesh.facets:
+        polygon = _polygon(np.asarray(mesh.triangles[group]))
+        if polygon is not None:
+            faces.append(polygon)
+            single[group] = False
+    return [*faces, *np.asarray(mesh.triangles)[single]]
+
+
+def _polygon(triangles: Array) -> Array | None:
+    """Return the corners (n, 3) of the convex polygon that triangles (k, 3, 3) form, None if they do not."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    areas = 0.5 * np.linalg.norm(normals, axis=1)
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    centred = points - points.mean(axis=0)
+    across, along, normal = np.linalg.svd(centred, full_matrices=False)[2]
+    if abs(centred @ normal).max() > FLATNESS:
+        return None
+    try:
+        hull = ConvexHull(centred @ np.column_stack([across, along]))
+    except QhullError:  # the triangles have no area
+        return None
+    if abs(areas.sum() - hull.volume) > AREA_TOLERANCE * hull.volume:
+        return None
+    return points[hull.vertices]
