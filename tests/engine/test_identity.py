@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
-from trimesh.creation import box, icosphere
+from trimesh.creation import annulus, box, icosphere
 
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.exact import ExactEngine
@@ -100,6 +101,26 @@ def test_robots_that_may_fall_have_the_same_maps():
     feasible = sum(check(random_torso_scene(seed, falls=True), fallen) for seed in range(AT_ONCE // 2))
     assert feasible > 50
     assert fallen[Reason.OUT_OF_BALANCE] > 20
+
+
+def test_among_meshes_the_maps_are_the_same(tmp_path):
+    """Fine flat faces, one with a hole, and a surface that is flat nowhere."""
+    meshes = {"ball": icosphere(3, 0.1), "ring": annulus(0.05, 0.12, 0.1), "block": box((0.1, 0.15, 0.2))}
+    meshes["block"] = meshes["block"].subdivide().subdivide().subdivide()
+    for name, mesh in meshes.items():
+        mesh.export(tmp_path / f"{name}.stl")
+    blocked = feasible = 0
+    for seed in range(8):
+        content = random_scene(seed)
+        for obstacle, name in zip(content["obstacles"], itertools.cycle(meshes), strict=False):
+            for shape in ("box", "cylinder", "sphere"):
+                obstacle.pop(shape, None)
+            obstacle["mesh"] = str(tmp_path / f"{name}.stl")
+        counts = np.zeros(len(Reason), dtype=int)
+        feasible += check(content, counts)
+        blocked += counts[Reason.SCENE_COLLISION]
+    assert feasible > 50
+    assert blocked > 50
 
 
 def check(content, counts=None):
