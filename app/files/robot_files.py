@@ -19,7 +19,7 @@ from symgrasp.references import package_dirs, resolve, sought
 from symgrasp.robot.catalogue import CatalogueRobot
 from symgrasp.robot.description import read_description
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.srdf import find_srdf
+from symgrasp.robot.srdf import find_srdf, srdf_text
 from symgrasp.robot.xml_file import LARGEST_XML
 from symgrasp.scene.format import ArmFile, HandFile, MountFile, RobotFile, xacro_texts
 from symgrasp.scene.scene import Scene
@@ -49,23 +49,29 @@ def read_robot_entry(name: str, content: bytes, folder: Path) -> RobotFile:
 
 
 def _robot_file(name: str, files: list[Path], folder: Path) -> Path:
-    """Return the file of the robot in an archive: a URDF, or else a xacro file that no other one includes."""
-    for endings in (".urdf",), (".xacro",):
-        found = [path for path in files if path.name.lower().endswith(endings)]
-        if len(found) > 1:
+    """Return the file of the robot in an archive: a URDF, or else a xacro or MJCF file.
+
+    Of several xacro or MJCF files it is the one that no other one includes.
+    """
+    for ending in (".urdf", ".xacro", ".xml"):
+        found = [path for path in files if path.suffix.lower() == ending]
+        if ending != ".urdf":
             texts = {path: read_file(path, LARGEST_XML).decode("utf-8", "replace") for path in found}
-            included = {path for path in found if any(_includes(texts[o], path) for o in found if o != path)}
-            found = [path for path in found if path not in included] if endings == (".xacro",) else found
+            found = [
+                path for path in found
+                if (ending == ".xacro" or "<mujoco" in texts[path])
+                and not any(_includes(texts[other], path) for other in found if other != path)
+            ]  # fmt: skip
         if len(found) == 1:
             return found[0].resolve()
         if found:
             names = [path.relative_to(folder).as_posix() for path in found]
-            raise InputError(name, "files", names, f"one {endings[0]} file, with its meshes")
-    raise InputError(name, "files", "no .urdf file", "one .urdf or .xacro file, with its meshes")
+            raise InputError(name, "files", names, f"one {ending} file, with its meshes")
+    raise InputError(name, "files", "no .urdf file", "one .urdf, .xacro or MJCF file, with its meshes")
 
 
 def _includes(text: str, path: Path) -> bool:
-    """Return whether a xacro file includes another one, by its name."""
+    """Return whether a file includes another one, by its name."""
     return re.search(rf"""include[^>]*["'/]{re.escape(path.name)}["']""", text) is not None
 
 
@@ -129,6 +135,8 @@ def plain_urdf(path: Path, folder: Path, xacro_args: Mapping[str, str] | None = 
             break
         plain = path.with_name(f"{stem}_{k}.urdf")
     plain.write_bytes(ET.tostring(robot))
+    if description.srdf is not None and find_srdf(plain) is None:
+        plain.with_suffix(".srdf").write_bytes(srdf_text(description.srdf))
     return plain
 
 

@@ -8,15 +8,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from symgrasp.errors import UrdfError
+from symgrasp.robot.mjcf import read_mjcf
 from symgrasp.robot.srdf import Srdf
 from symgrasp.robot.xacro_file import expand_xacro, is_xacro
 from symgrasp.robot.xml_file import read_xml
 
 __all__ = ["Description", "read_description"]
-
-
-OTHER_FORMATS = {"mujoco": "an MJCF file of MuJoCo", "sdf": "an SDF file of Gazebo"}
-"""Tag of the first element → what such a file is."""
 
 
 class Description(NamedTuple):
@@ -36,7 +33,7 @@ class Description(NamedTuple):
 def read_description(
     path: Path, xacro_args: Mapping[str, str] | None = None, inside: Path | None = None
 ) -> Description:
-    """Read the file of a robot: a URDF, or a xacro file, which is expanded.
+    """Read the file of a robot: a URDF, a xacro file, which is expanded, or MJCF, which is converted.
 
     Args:
         path: the file.
@@ -52,9 +49,12 @@ def read_description(
         root = expand_xacro(path, xacro_args or {}, inside)
     elif xacro_args:
         raise UrdfError(path, "xacro_args", sorted(xacro_args), "a xacro file, which takes arguments")
-    if root.tag in OTHER_FORMATS:
-        raise UrdfError(path, "urdf", OTHER_FORMATS[root.tag], "a URDF; convert the file first")
+    srdf = None
+    if root.tag == "mujoco":
+        made, (root, srdf) = True, read_mjcf(path, root, inside)
+    if root.tag == "sdf":
+        raise UrdfError(path, "urdf", "an SDF file of Gazebo", "a URDF; convert the file first")
     if root.tag != "robot" or root.find("link") is None:
         found = f"<{root.tag}> without links" if root.tag == "robot" else f"<{root.tag}>"
         raise UrdfError(path, "urdf", found, "<robot> with links, as in a URDF")
-    return Description(root, made)
+    return Description(root, made, srdf)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from symgrasp.errors import UrdfError
 from symgrasp.robot.xacro_file import is_xacro
 from symgrasp.robot.xml_file import read_xml
 
-__all__ = ["Srdf", "find_srdf", "read_srdf"]
+__all__ = ["Srdf", "find_srdf", "read_srdf", "srdf_text"]
 
 
 @dataclass(frozen=True)
@@ -72,3 +73,15 @@ def read_srdf(path: Path) -> Srdf:
                 raise UrdfError(path, where, numbers[0], "a number")
             values[joint.get("name", "")] = value
     return Srdf(path, frozenset(disabled), states)
+
+
+def srdf_text(srdf: Srdf) -> bytes:
+    """Return an SRDF as the text of a file, which `read_srdf` reads as the same."""
+    root = ET.Element("robot", name=srdf.path.stem)
+    for pair in sorted(sorted(pair) for pair in srdf.disabled):
+        ET.SubElement(root, "disable_collisions", link1=pair[0], link2=pair[-1])
+    for name, state in srdf.states.items():
+        group = ET.SubElement(root, "group_state", name=name)
+        for joint, value in state.items():
+            ET.SubElement(group, "joint", name=joint, value=repr(value))
+    return ET.tostring(root)

@@ -83,6 +83,8 @@ class RobotBuilder:
             entry = entry.model_copy(update={"srdf": _beside(entry.urdf, urdf, srdf)})
             allowed = len(model.allowed_pairs())
             notes.append(f"{entry.name}: srdf: {srdf.name}, which lets {allowed} pairs of links touch")
+        elif srdf is None and (allowed := len(model.allowed_pairs())):
+            notes.append(f"{entry.name}: {urdf.name} lets {allowed} pairs of links touch")
         for k, (f, a, hand) in enumerate(zip(fields, files, hands, strict=True)):
             joints.append(self._joints(f, a, tools[k], model, shared, hand))
             resting = [n for n in chains[k] if n not in (*joints[k], *shared, *hand.joints)]

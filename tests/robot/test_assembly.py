@@ -135,7 +135,6 @@ def test_robots_of_a_data_package_find_their_meshes(robot):
     ("name", "text", "message"),
     [
         ("arm.urdf.xacro", '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"/>', "without links"),
-        ("arm.xml", "<mujoco/>", "'an MJCF file of MuJoCo': expected a URDF"),
         ("arm.sdf", "<sdf/>", "'an SDF file of Gazebo': expected a URDF"),
     ],
 )  # fmt: skip

@@ -148,7 +148,7 @@ def test_a_hand_that_is_not_on_the_robot(panda, change, message):
             "floating",
         ),
         ("<robot name='r'/>", "without links"),
-        ("<mujoco model='r'/>", "an MJCF file of MuJoCo"),
+        ("<mujoco model='r'><worldbody><bod/></worldbody></mujoco>", "what MuJoCo can read"),
         (
             "<robot name='r'><link name='a'><collision><geometry><plane/></geometry></collision></link>"
             "</robot>",

@@ -111,9 +111,11 @@ def test_a_robot_refers_to_no_file_of_the_server(reference, service, bottle, tmp
 @pytest.mark.parametrize(
     ("files", "expected"),
     [
-        ({"readme.txt": b""}, "one .urdf or .xacro file"),
+        ({"readme.txt": b""}, "one .urdf, .xacro or MJCF file"),
         ({"a.urdf": b"", "b.urdf": b""}, "one .urdf file"),
         ({"a.xacro": b"<a/>", "b.xacro": b"<a/>"}, "one .xacro file"),
+        ({"a.xml": b"<mujoco/>", "b.xml": b"<mujoco/>", "package.xml": b"<package/>"}, "one .xml file"),
+        ({"a.xml": b'<mujoco><asset><mesh file="/etc/passwd"/></asset></mujoco>'}, "a file of the archive"),
         ({"a.urdf": b"<robot"}, "a valid URDF document"),
         ({"a.urdf": b'<robot name="x"><link name="a"/></robot>'}, "an arm of five or more joints"),
     ],
@@ -127,7 +129,7 @@ def test_what_is_no_robot_is_refused_in_one_line(files, expected, service, bottl
 def test_an_uploaded_xacro_file_is_expanded_once_and_saved_as_a_urdf(service, bottle, tmp_path):
     folder = tmp_path / "upload"
     folder.mkdir()
-    files = {f"ws/arm_description/{k}": v for k, v in xacro_files().items()}
+    files = {f"ws/arm_description/{k}": v for k, v in arm_files().items()}
     entry, built = service.read_robot(bottle, "panda", "arm.zip", pack(files.items()), folder, quiet)
     assert Path(entry.urdf) == folder.resolve() / "ws/arm_description/urdf/arm.urdf"
     assert entry.xacro_args is None
@@ -139,12 +141,26 @@ def test_an_uploaded_xacro_file_is_expanded_once_and_saved_as_a_urdf(service, bo
     assert Scene.load(there / "mine.yaml").arm().robot.model.link_names == model.link_names
 
 
+def test_an_uploaded_mjcf_file_is_converted_once_and_saved_as_urdf_and_srdf(service, bottle, tmp_path):
+    folder = tmp_path / "upload"
+    folder.mkdir()
+    files = {name: content for name, content in arm_files().items() if name.startswith("mjcf")}
+    entry, built = service.read_robot(bottle, "panda", "arm.zip", pack(files.items()), folder, quiet)
+    assert Path(entry.urdf) == folder.resolve() / "mjcf/arm.urdf"
+    model = built.scene.arm().robot.model
+    assert model.allowed_pairs() == {frozenset(("link1", "link3"))}
+    there = tmp_path / "there"
+    unpack("mine.zip", scene_archive(built.scene, "mine.yaml", [folder]), there)
+    again = Scene.load(there / "mine.yaml").arm().robot.model
+    assert (again.link_names, again.allowed_pairs()) == (model.link_names, model.allowed_pairs())
+
+
 def test_a_scene_in_an_archive_gives_arguments_to_its_xacro_file(service, bottle, tmp_path):
     robot = {"name": "arm", "urdf": "urdf/arm.urdf.xacro", "hand": "wsg50", "mount": {"link": "my_link6"}}
     content = {key: value for key, value in bottle.content.items() if key != "robots"}
     content["robots"] = [robot | {"xacro_args": {"prefix": "my_", "scale": 1.25}}]
     content["tasks"] = [{"name": "hold", "pose": content["tasks"][0]["pose"]}]
-    files = {"arm.yaml": yaml.safe_dump(content).encode(), **xacro_files()}
+    files = {"arm.yaml": yaml.safe_dump(content).encode(), **arm_files()}
     opened = service.read_scene("arm.zip", pack(files.items()), tmp_path, quiet).scene
     model = opened.robots["arm"].model
     assert model.forward(model.default_values())[6, 2, 3] == pytest.approx(1.25 * 1.23)
@@ -177,8 +193,8 @@ def test_a_scene_alone_gives_no_paths_to_xacro_files_of_the_server(service, bott
         service.read_scene("s.yaml", content, None, quiet)
 
 
-def xacro_files() -> dict[str, bytes]:
-    """Return the files of a robot in xacro: name in its package → content."""
+def arm_files() -> dict[str, bytes]:
+    """Return the files of a robot in xacro and in MJCF: name in its package → content."""
     folder = Path(__file__).parents[2] / "data/arm_description"
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
