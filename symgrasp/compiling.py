@@ -11,12 +11,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
+from llvmlite.binding import Linkage
 from numba.core import config, event
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.typed_passes import NopythonTypeInference
+from numba.extending import register_jitable
 
-__all__ = ["COMPILING_MESSAGE", "SOURCES", "njit", "notify_on_compile"]
+__all__ = ["COMPILING_MESSAGE", "ENTRY", "SOURCES", "njit", "notify_on_compile"]
 
 SOURCES = (
     "engine/*.py",
@@ -30,9 +37,9 @@ SOURCES = (
 COMPILING_MESSAGE = "compiling what this needs, once on this machine; it takes up to a minute"
 """Shown to the user while something is compiled."""
 
-# By default OpenMP threads spin while they wait for each other. Where another program, such as a browser,
-# occupies a core, spinning makes a map take three times as long; otherwise it gains next to nothing.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+ENTRY: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "_nrt": False}
+"""Options of `njit` for functions that are called from Python and call inner ones. numba translates an inner
+function anew for entries with other options. Arrays are allocated by Python, not in compiled code."""
 
 log = logging.getLogger(__name__)
 
@@ -65,22 +72,31 @@ def notify_on_compile(notify: Callable[[], None]) -> Iterator[None]:
         yield
 
 
-def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def njit(*, inner: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile like `numba.njit`, with a separate disk cache for every state of the files in `SOURCES`.
 
     numba's own cache checks only the file that a function stands in. Compiled functions contain copies
     of those that they call, so after a change in one file, callers in other files would run old code.
     Where the folder of the cache cannot be written, nothing is cached. With ``NUMBA_DISABLE_JIT`` set,
     functions are interpreted.
+
+    Args:
+        inner: the function is there for compiled functions only; from Python it is interpreted. It is
+            compiled as a part of those that call it, which takes half the time: numba by itself makes machine
+            code of every function, from copies of all that it calls, and writes each to the disk.
+        options: of `numba.njit`.
     """
 
     def compile_later(function: Callable[..., Any]) -> Any:
         if _config.DISABLE_JIT:
             return function
+        if inner:
+            return register_jitable(pipeline_class=_Compiler, **options)(function)
         before = _config.CACHE_DIR
         _config.CACHE_DIR = _cache_dir(before)
         folder = _config.CACHE_DIR
-        settings: dict[str, Any] = {**options, "cache": options.get("cache", False) and _is_writable(folder)}
+        settings: dict[str, Any] = {**options, "pipeline_class": _Compiler, "no_cfunc_wrapper": True}
+        settings["cache"] = options.get("cache", False) and _is_writable(folder)
         try:
             compiled: Any = numba.njit(**settings)(function)
         finally:
@@ -90,6 +106,65 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         return compiled
 
     return compile_later
+
+
+class _InnerLibrary(JITCodeLibrary):
+    """The code of an inner function, which is only linked into that of others."""
+
+    def _optimize_final_module(self) -> None:
+        """Leave that to the function that it is linked into."""
+
+    def _finalize_final_module(self) -> None:
+        """Make no machine code."""
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return 0: there is no machine code."""
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        """What tells machine code where its environment is: there is none to tell."""
+        return SimpleNamespace(set_env=lambda name, environment: None)
+
+
+class _EntryLibrary(JITCodeLibrary):
+    """The code of a function that is called from Python, with that of all inner functions that it calls."""
+
+    def _optimize_final_module(self) -> None:
+        """Optimise all together; nobody else calls these copies, so LLVM may change how they are called."""
+        for function in self._final_module.functions:
+            if function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._optimize_final_module()
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _ChooseLibrary(FunctionPass):
+    """Says what is compiled next goes into, an `_InnerLibrary` or an `_EntryLibrary`."""
+
+    _name = "choose_library"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> Any:
+        """Give the lowering, which follows, the library to use; return that no code was changed."""
+        library = _InnerLibrary if state.flags.no_cpython_wrapper else _EntryLibrary
+        state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return False
+
+
+class _Compiler(CompilerBase):
+    """numba's compiler, for entries and inner functions."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return numba's own passes, and one more."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(_ChooseLibrary, NopythonTypeInference)
+        passes.finalize()
+        return [passes]
 
 
 @cache

@@ -15,9 +15,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-import numba
-
 from symgrasp.compiling import notify_on_compile
+from symgrasp.engine.threads import use_cores
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
 
@@ -84,7 +83,7 @@ class _Server:
             message = self._channel.receive()
             if isinstance(message, Call):  # else it cancels a call that has ended
                 self._job_id, self._reported = message.job_id, 0.0
-                numba.set_num_threads(message.cores)
+                use_cores(message.cores)
                 answer = self._answer(message)
                 try:
                     self._channel.send(answer)

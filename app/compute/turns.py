@@ -7,9 +7,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
-from numba.core import config
+from symgrasp.engine.threads import CORES
 
 __all__ = ["Place", "Turns"]
 
@@ -19,8 +18,6 @@ SLICE = 1.0
 POLL_INTERVAL = 0.05
 """Longest time (s) between two calls of what a computation does while it waits."""
 
-_config: Any = config  # numba sets its attributes at import time, where type checkers do not see them
-
 
 class Turns:
     """A line in which computations wait for their turn, first come, first served; thread-safe.
@@ -29,7 +26,7 @@ class Turns:
         count: how many may compute at the same time.
     """
 
-    def __init__(self, count: int = _config.NUMBA_NUM_THREADS) -> None:
+    def __init__(self, count: int = CORES) -> None:
         self._count = count
         self._changed = threading.Condition()
         self._line: deque[Place] = deque()

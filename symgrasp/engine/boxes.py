@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from symgrasp.compiling import njit
 from symgrasp.engine.simplex import FAST
+from symgrasp.poses import Array
 
-__all__ = ["box_of", "boxes_apart", "oriented_boxes_apart"]
+__all__ = ["box_of", "boxes_apart", "boxes_of", "oriented_boxes_apart"]
+
+
+def boxes_of(size: Array, pose: Array) -> Array:
+    """Return the lower and upper corners (P, 6) of the axis-aligned boxes around pieces, rounding included.
+
+    Args:
+        size: (P, 9) see `PackedPieces`.
+        pose: (P, 12) poses of the pieces.
+    """
+    R = pose[:, :9].reshape(-1, 3, 3)
+    centre = (R @ size[:, 3:6, None])[..., 0] + pose[:, 9:]
+    half = (np.abs(R) @ size[:, 6:9, None])[..., 0] + size[:, :1]
+    return np.hstack([centre - half, centre + half])
 
 
 @njit(**FAST)

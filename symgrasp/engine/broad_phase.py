@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from symgrasp.compiling import njit
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
+from symgrasp.engine.kinematics import place_arm, place_hand
 from symgrasp.engine.simplex import FAST
 
 __all__ = ["mark_near"]
 
 
-@njit(**FAST)
-def mark_near(moving, size, tree, scratch, reach, near, near_pairs):
+@njit(**ENTRY)
+def mark_near(moving, pieces, tree, scratch, T_world_base, T, row, q, reach, near, near_pairs):
     """Mark the pieces and pairs whose boxes are within ``reach`` (m), among those that must not collide.
 
     Args:
         moving: see `MovingPieces`.
-        size: (P, 9) see `PackedPieces`.
+        pieces: see `PackedPieces`.
         tree: the tree of boxes of the static pieces.
-        scratch: poses and boxes of the moving pieces.
+        scratch: receives poses and boxes of the moving pieces.
+        T_world_base: (4, 4) pose of the robot's base.
+        T: (4, 4) tool pose in the base.
+        row: row of the grasp.
+        q: (n,) joint values.
         reach: the distance (m).
         near: (P,) bool, receives the marks of the object's and the static pieces that are near a moving one.
         near_pairs: (.,) bool, receives the marks of the pairs of the robot's own pieces: ``hand_pairs``,
             then ``base_pairs``, then ``arm_pairs``.
     """
-    box, hands = scratch.box, moving.hand.shape[1]
+    place_hand(moving, pieces, scratch, T_world_base, T, row)
+    place_arm(moving, pieces, scratch, q)
+    box, size, hands = scratch.box, pieces.size, moving.hand.shape[1]
     for k in range(len(moving.frame)):
         node = 0
         while node < len(tree.skip):

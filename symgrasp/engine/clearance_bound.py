@@ -18,11 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from symgrasp.compiling import njit
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.kinematics import MovingPieces, compose, rotate
 from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
-from symgrasp.engine.simplex import FAST
 from symgrasp.poses import Array, axis_frame, from_rotation, inverse
 
 __all__ = ["clearance_bound", "core"]
@@ -172,7 +171,7 @@ def _axis_frame(axis: Array) -> Array:
     return axis_frame(T)
 
 
-@njit(**FAST)
+@njit(**ENTRY)
 def _furthest_at(pieces, pose, origin, axis, local, angles, most, work):
     """Return the largest distance (m) at some angles of a joint, or the first one above ``most``."""
     furthest = -math.inf

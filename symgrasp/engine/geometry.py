@@ -126,7 +126,7 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
         moving=MovingPieces(
             joint_origin=pose_rows(np.array([frames[0], *(inverse(a) @ b for a, b in pairwise(frames))])),
             joint_axis=np.array([j.axis for j in joints]),
-            frame=np.array([last_joint[link] for link in links[:moving_count]], dtype=np.int32),
+            frame=np.array([last_joint[link] for link in links[:moving_count]], dtype=np.int64),
             local=pose_rows(np.array(local).reshape(-1, 4, 4)),
             hand=_hand_poses(arm, links[:tool_count], openings),
             touch=np.array([link in arm.hand.touch_links for link in links[:tool_count]], dtype=bool),
@@ -134,9 +134,9 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
             base_pairs=pairs[base],
             arm_pairs=arm_pairs,
             arm_pair_start=start,
-            objects=np.arange(len(own), len(own) + len(objects), dtype=np.int32),
+            objects=np.arange(len(own), len(own) + len(objects), dtype=np.int64),
         ),
-        tree=build(pieces, pose, np.arange(len(own) + len(objects), len(placed))),
+        tree=build(pieces.size, pose, np.arange(len(own) + len(objects), len(placed))),
         pairs=[
             frozenset((links[a], links[b]))
             for a, b in np.concatenate([pairs[together], pairs[base], arm_pairs]).tolist()
@@ -186,7 +186,7 @@ def _own_pairs(model: RobotModel, links: list[str], count: int) -> np.ndarray:
         for a in by_link.get(first, []):
             for b in by_link.get(second, []):
                 found.append((min(a, b), max(a, b)))
-    pairs = np.array([pair for pair in found if pair[0] < count], dtype=np.int32)
+    pairs = np.array([pair for pair in found if pair[0] < count], dtype=np.int64)
     return pairs.reshape(-1, 2)
 
 
@@ -202,8 +202,8 @@ def _sort_by_arm_piece(pairs: np.ndarray, hands: int, count: int) -> tuple[np.nd
         The pairs (., 2), and (M + 1,) where those of each moving piece begin.
     """
     turned = [(b, a) if a < hands else (a, b) for a, b in pairs.tolist()]
-    ordered = np.array(sorted(turned), dtype=np.int32).reshape(-1, 2)
-    return ordered, np.searchsorted(ordered[:, 0], np.arange(count + 1)).astype(np.int32)
+    ordered = np.array(sorted(turned), dtype=np.int64).reshape(-1, 2)
+    return ordered, np.searchsorted(ordered[:, 0], np.arange(count + 1))
 
 
 def _revolved(vertices: Array) -> Piece:

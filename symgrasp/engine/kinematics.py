@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.compiling import njit
-from symgrasp.engine.boxes import box_of
+from symgrasp.engine.boxes import box_of, boxes_of
 from symgrasp.engine.simplex import FAST
 from symgrasp.poses import Array
 
-__all__ = ["MovingPieces", "Scratch", "new_scratch", "place_arm", "place_hand"]
+__all__ = ["MovingPieces", "Scratch", "copied", "new_scratch", "place_arm", "place_hand"]
 
 
 class MovingPieces(NamedTuple):
@@ -76,16 +76,31 @@ class Scratch(NamedTuple):
     last_pose: Array
 
 
-@njit(cache=True)
-def new_scratch(pose, pieces, joints):
-    """Return scratch with all pieces at the poses (P, 12) given, for an arm of that many joints."""
-    own = pose.copy()
-    box = np.empty((len(pose), 6))
-    for k in range(len(pose)):
-        box_of(pieces.size, own, k, box[k])
-    hit = np.full(4, -1, dtype=np.int64)
-    frames, last_pose = np.empty((joints, 12)), np.empty((2, 12))
-    return Scratch(own, box, frames, np.empty((4, 4)), np.empty((4, 3)), hit, np.zeros(2), last_pose)
+def new_scratch(pose: Array, size: Array, joints: int) -> Scratch:
+    """Return scratch with all pieces at given poses.
+
+    Args:
+        pose: (P, 12) poses of the pieces, which are copied.
+        size: (P, 9) see `PackedPieces`.
+        joints: number n of joints of the arm.
+    """
+    return Scratch(
+        pose=pose.copy(),
+        box=boxes_of(size, pose),
+        frames=np.empty((joints, 12)),
+        tool=np.empty((4, 4)),
+        simplex=np.empty((4, 3)),
+        hit=np.full(4, -1, dtype=np.int64),
+        depth=np.zeros(2),
+        last_pose=np.empty((2, 12)),
+    )
+
+
+def copied(scratch: Scratch) -> Scratch:
+    """Return scratch for another thread, with all pieces where they are in this one."""
+    copy = Scratch(*(part.copy() for part in scratch))
+    copy.hit[:] = -1
+    return copy
 
 
 @njit(**FAST)

@@ -13,14 +13,14 @@ The result of a cell depends on its tool pose alone, not on the other cells.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
-from numba import prange
 
-from symgrasp.compiling import njit
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm, check_row
-from symgrasp.engine.kinematics import MovingPieces, new_scratch, place_arm, place_hand
+from symgrasp.engine.kinematics import MovingPieces, Scratch, copied, place_arm, place_hand
 from symgrasp.engine.pieces import PackedPieces
 from symgrasp.engine.retreat_search import arm_retreats, copy_row, moved_along, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
@@ -33,16 +33,16 @@ from symgrasp.engine.search_types import (
     UNDECIDED_KEPT,
     UNREACHABLE,
     Balance,
-    BranchScratch,
     RowChecks,
     SearchInput,
     SearchResult,
+    new_branches,
 )
+from symgrasp.engine.threads import in_parallel
 from symgrasp.engine.tree import Tree
-from symgrasp.ik.branches import branch_count, branches_at, new_memory
+from symgrasp.ik.branches import branches_at
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.vectors import STRICT
-from symgrasp.poses import Array
 
 __all__ = [
     "BLOCKED",
@@ -69,7 +69,7 @@ def search(
     moving: MovingPieces,
     pieces: PackedPieces,
     tree: Tree,
-    pose: Array,
+    scratch: Scratch,
     inputs: SearchInput,
     balance: Balance,
     joints: int,
@@ -81,7 +81,7 @@ def search(
         moving: the pieces that the arm moves.
         pieces: all P pieces.
         tree: the boxes of the static pieces.
-        pose: (P, 12) poses of all pieces; those of moving ones do not matter.
+        scratch: the poses of all pieces and the boxes around them; those of moving ones do not matter.
         inputs: the cells and what applies to all of them.
         balance: what decides whether the robot stands.
         joints: number n of joints.
@@ -98,35 +98,46 @@ def search(
         undecided_q=np.empty((m, UNDECIDED_KEPT, joints)),
         undecided_solution=np.empty((m, UNDECIDED_KEPT, 2), dtype=np.int16),
     )
+    runs, steps = len(inputs.row), 1 + len(inputs.retreat)
+    rows = RowChecks(
+        gap=np.empty((runs, steps)),
+        hit=np.full((runs, steps, 2), -1, dtype=np.int64),
+        depth=np.full((runs, steps), np.nan),
+    )
+    own = [(copied(scratch), new_branches(chain, joints)) for _ in range(inputs.parts)]
+
     # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
-    _search(chain, moving, pieces, tree, pose, inputs, balance, result)
+    def search_part(part: int, wants_rows: bool) -> None:
+        _search_part(chain, moving, pieces, tree, *own[part], inputs, balance, rows, result, part, wants_rows)
+
+    search_part(0, wants_rows=True)  # here, where Ctrl-C can interrupt its compiling
+    in_parallel(partial(search_part, wants_rows=True), range(1, inputs.parts))
+    in_parallel(partial(search_part, wants_rows=False), range(inputs.parts))
     return result
 
 
-@njit(cache=True, error_model="numpy", parallel=True, nogil=True)
-def _search(chain, moving, pieces, tree, pose, inputs, balance, result):
-    m, n = len(inputs.T_base_tool), chain.limits.shape[1]
-    runs, steps = len(inputs.row), 1 + len(inputs.retreat)
-    rows = RowChecks(
-        np.empty((runs, steps)), np.full((runs, steps, 2), -1, dtype=np.int64), np.full((runs, steps), np.nan)
-    )
-    for chunk in prange(inputs.chunks):
-        scratch = new_scratch(pose, pieces, n)
-        T = np.empty((4, 4))
-        for run in range(chunk, runs, inputs.chunks):
-            _check_rows(moving, pieces, scratch, inputs, run, m // runs, T, rows)
-    for chunk in prange(inputs.chunks):
-        scratch = new_scratch(pose, pieces, n)
-        branches = BranchScratch(
-            np.empty((2, branch_count(chain), n)),
-            np.empty((2, branch_count(chain)), dtype=np.bool_),
-            np.empty((2, branch_count(chain)), dtype=np.bool_),
-            np.empty(n),
-            np.empty((4, 4)),
-            new_memory(n),
-        )
-        # Interleaved, so that every chunk has its share of easy and of hard cells.
-        for cell in range(chunk, m, inputs.chunks):
+@njit(**ENTRY)
+def _search_part(
+    chain, moving, pieces, tree, scratch, branches, inputs, balance, rows, result, part, wants_rows
+):
+    """Write the row checks of one part; or with these its cells.
+
+    Parts are interleaved, so that each has its share of easy and of hard cells.
+
+    Args:
+        scratch: `Scratch` of this part alone.
+        branches: `BranchScratch` of this part alone.
+        rows: receives the row checks, of all parts before the first cell is searched.
+        result: receives what is found.
+        part: index of the part.
+        wants_rows: whether it is the row checks that are wanted.
+    """
+    m, runs = len(inputs.T_base_tool), len(inputs.row)
+    if wants_rows:
+        for run in range(part, runs, inputs.parts):
+            _check_rows(moving, pieces, scratch, inputs, run, m // runs, branches.T, rows)
+    else:
+        for cell in range(part, m, inputs.parts):
             _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance, rows, cell, result)
 
 

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.ik.branches import Memory
+from symgrasp.ik.branches import Memory, branch_count, new_memory
+from symgrasp.ik.chain import Chain
 from symgrasp.poses import Array
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "RowChecks",
     "SearchInput",
     "SearchResult",
+    "new_branches",
 ]
 
 UNDECIDED_KEPT = 32
@@ -66,7 +68,7 @@ class SearchInput(NamedTuple):
         clearance: the clearance (m) of pieces that the arm does not move; that of a candidate is not
             larger.
         always_collides: whether pieces that the arm does not move collide, so that no candidate is free.
-        chunks: number of parts that the cells are split into for the threads.
+        parts: number of parts that the cells are split into for the threads.
     """
 
     sample_order: np.ndarray
@@ -77,7 +79,7 @@ class SearchInput(NamedTuple):
     margin: float
     clearance: float
     always_collides: bool
-    chunks: int
+    parts: int
 
 
 class SearchResult(NamedTuple):
@@ -139,3 +141,16 @@ class BranchScratch(NamedTuple):
     at: Array
     T: Array
     memory: Memory
+
+
+def new_branches(chain: Chain, joints: int) -> BranchScratch:
+    """Return arrays for the inverse kinematics of an arm with that many joints."""
+    count = branch_count(chain)
+    return BranchScratch(
+        q=np.empty((2, count, joints)),
+        exists=np.empty((2, count), dtype=bool),
+        inside=np.empty((2, count), dtype=bool),
+        at=np.empty(joints),
+        T=np.empty((4, 4)),
+        memory=new_memory(joints),
+    )

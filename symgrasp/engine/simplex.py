@@ -12,8 +12,8 @@ from symgrasp.compiling import njit
 
 __all__ = ["FAST", "SURROUNDS", "depth_inside", "reduce_to_nearest"]
 
-FAST: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
-"""Options of numba for code whose last bits do not matter: products and sums may be fused. The last one
+FAST: dict[str, Any] = {"inner": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+"""Options of `njit` for code whose last bits do not matter: products and sums may be fused. The last one
 switches off reference counting of arrays, which costs more than the functions themselves and is not
 needed, because nothing here allocates arrays."""
 

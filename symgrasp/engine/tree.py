@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.compiling import njit
-from symgrasp.engine.boxes import box_of
-from symgrasp.engine.pieces import PackedPieces
+from symgrasp.engine.boxes import boxes_of
 from symgrasp.poses import Array
 
 __all__ = ["Tree", "build"]
@@ -30,57 +28,37 @@ class Tree(NamedTuple):
     piece: np.ndarray
 
 
-def build(pieces: PackedPieces, pose: Array, indices: np.ndarray) -> Tree:
-    """Build the tree over some of the pieces.
+def build(size: Array, pose: Array, indices: np.ndarray) -> Tree:
+    """Build the tree over some of the pieces, splitting at the median along the axis of the widest spread.
 
     Args:
-        pieces: all P pieces.
-        pose: (P, 12) their poses.
+        size: (P, 9) see `PackedPieces`.
+        pose: (P, 12) poses of all P pieces.
         indices: indices of the pieces to put into the tree.
     """
-    boxes = np.zeros((len(indices), 6))
-    for row, k in enumerate(indices):
-        box_of(pieces.size, pose, k, boxes[row])
-    return Tree(*_build(boxes, np.asarray(indices, dtype=np.int32)))
-
-
-@njit(cache=True)
-def _build(boxes, indices):
-    """Return the arrays of `Tree`, splitting at the median along the axis of the widest spread."""
-    count = len(indices)
+    boxes, count = boxes_of(size[indices], pose[indices]), len(indices)
     nodes = max(2 * count - 1, 0)
-    box = np.empty((nodes, 6))
-    skip = np.empty(nodes, dtype=np.int32)
-    piece = np.full(nodes, -1, dtype=np.int32)
+    tree = Tree(np.empty((nodes, 6)), np.empty(nodes, dtype=np.int64), np.full(nodes, -1, dtype=np.int64))
+    middles = boxes[:, :3] + boxes[:, 3:]
     order = np.arange(count)
-    stack = np.empty((64, 3), dtype=np.int64)
-    height = 0
-    if count:
-        stack[0, 0], stack[0, 1], stack[0, 2] = 0, 0, count
-        height = 1
-    while height:
-        height -= 1
-        node, first, end = stack[height, 0], stack[height, 1], stack[height, 2]
-        for i in range(3):
-            box[node, i] = boxes[order[first:end], i].min()
-            box[node, 3 + i] = boxes[order[first:end], 3 + i].max()
-        skip[node] = node + 2 * (end - first) - 1
-        if end - first == 1:
-            piece[node] = indices[order[first]]
-            continue
-        axis = 0
-        widest = -1.0
-        for i in range(3):
-            middles = boxes[order[first:end], i] + boxes[order[first:end], 3 + i]
-            width = middles.max() - middles.min()
-            if width > widest:
-                widest, axis = width, i
-        middles = boxes[order[first:end], axis] + boxes[order[first:end], 3 + axis]
-        order[first:end] = order[first:end][np.argsort(middles)]
-        half = first + (end - first) // 2
-        left = 2 * (half - first) - 1
-        # The left child is pushed last and popped next: depth first, so the stack stays shallow.
-        stack[height, 0], stack[height, 1], stack[height, 2] = node + 1 + left, half, end
-        stack[height + 1, 0], stack[height + 1, 1], stack[height + 1, 2] = node + 1, first, half
-        height += 2
-    return box, skip, piece
+    # Level by level: the nodes of a level have all pieces between them, leaves of earlier levels included.
+    first, node = np.zeros(min(count, 1), dtype=np.int64), np.zeros(min(count, 1), dtype=np.int64)
+    while len(first):
+        length = np.diff(first, append=count)
+        tree.box[node, :3] = np.minimum.reduceat(boxes[order, :3], first)
+        tree.box[node, 3:] = np.maximum.reduceat(boxes[order, 3:], first)
+        tree.skip[node] = node + 2 * length - 1
+        is_leaf = length == 1
+        if is_leaf.all():
+            tree.piece[node] = indices[order]
+            break
+        spread = np.maximum.reduceat(middles[order], first) - np.minimum.reduceat(middles[order], first)
+        owner = np.repeat(np.arange(len(first)), length)
+        order = order[np.lexsort((middles[order, spread.argmax(axis=1)[owner]], owner))]
+        half = first + length // 2
+        # A node's left child comes right after it, the right one after all of the left one's.
+        node = np.column_stack([np.where(is_leaf, node, node + 1), node + 2 * (half - first)])
+        first = np.column_stack([first, half])
+        stays = np.column_stack([np.ones_like(is_leaf), ~is_leaf])
+        first, node = first[stays], node[stays]
+    return tree

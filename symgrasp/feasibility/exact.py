@@ -6,22 +6,21 @@ through the very functions of the reference. So a cell is feasible here exactly 
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from time import perf_counter
 
-import numba
 import numpy as np
 
 from symgrasp.engine import search
 from symgrasp.engine.balance import loaded
-from symgrasp.engine.boxes import box_of
+from symgrasp.engine.boxes import boxes_of
 from symgrasp.engine.broad_phase import mark_near
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
-from symgrasp.engine.kinematics import new_scratch, place_arm, place_hand
+from symgrasp.engine.kinematics import new_scratch
 from symgrasp.engine.pieces import pose_rows
+from symgrasp.engine.threads import core_count
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
 from symgrasp.feasibility.fit import fit
@@ -46,9 +45,6 @@ PARTS = 4
 
 TELL = 0.05
 """Time (s) after which progress is told, and may cancel: rows are searched in parts of about that long."""
-
-_ALL_CORES = threading.Lock()
-"""Of numba's thread pools, one does not bear two parallel searches at once, and none is faster for it."""
 
 
 class ExactEngine:
@@ -80,7 +76,7 @@ class ExactEngine:
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
-        self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces, arm.dof)
+        self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces.size, arm.dof)
         # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.pairs_within(arm, self._reach)
@@ -137,9 +133,9 @@ class ExactEngine:
         self.world.set_arms([(self.arm, self.arm.home, float(self._opening[0]))])
         self.world.set_object(T_world_object)
         geometry, scratch = self._geometry, self._scratch
-        scratch.pose[geometry.moving.objects] = pose_rows(axis_frame(T_world_object))
-        for k in geometry.moving.objects:
-            box_of(geometry.pieces.size, scratch.pose, k, scratch.box[k])
+        objects = geometry.moving.objects
+        scratch.pose[objects] = pose_rows(axis_frame(T_world_object))
+        scratch.box[objects] = boxes_of(geometry.pieces.size[objects], scratch.pose[objects])
 
     def _search_rows(self, draft: MapDraft, T_base_tool: Array, progress: Progress | None) -> None:
         """Fill the rows at which the hand fits, some at a time so that progress is told often enough."""
@@ -213,19 +209,18 @@ class ExactEngine:
             margin=float(self._settings.margin),
             clearance=fixed.gap,
             always_collides=fixed.collision is not None,
-            chunks=PARTS * numba.get_num_threads(),
+            parts=PARTS * core_count(),
         )
-        with _ALL_CORES:
-            found = search.search(
-                self.ik.chain,
-                self._geometry.moving,
-                self._geometry.pieces,
-                self._geometry.tree,
-                self._scratch.pose,
-                inputs,
-                self._balance,
-                self.arm.dof,
-            )
+        found = search.search(
+            self.ik.chain,
+            self._geometry.moving,
+            self._geometry.pieces,
+            self._geometry.tree,
+            self._scratch,
+            inputs,
+            self._balance,
+            self.arm.dof,
+        )
         roll, row, column = np.indices((len(ROLLS), len(rows), draft.manifold.angles)).reshape(3, -1)
         cells = (roll, rows[row], column)
         record_search(draft, bodies, found, cells, fixed)
@@ -271,12 +266,13 @@ class ExactEngine:
     def _near(self, q: Array, T_base_tool: Array, row: int) -> NearBodies:
         """Return the bodies near the arm at joint values (n,); all others are certified free."""
         geometry, scratch = self._geometry, self._scratch
-        moving, size = geometry.moving, geometry.pieces.size
-        place_hand(moving, geometry.pieces, scratch, self._T_world_base, T_base_tool, row)
-        place_arm(moving, geometry.pieces, scratch, q)
         near = np.zeros(len(geometry.names), dtype=bool)
         pairs = np.zeros(len(geometry.pairs), dtype=bool)
-        mark_near(moving, size, geometry.tree, scratch, self.world.margin + FREE_BAND, near, pairs)
+        reach = self.world.margin + FREE_BAND
+        mark_near(
+            geometry.moving, geometry.pieces, geometry.tree, scratch, self._T_world_base, T_base_tool,
+            row, q, reach, near, pairs,
+        )  # fmt: skip
         bodies = {geometry.names[k].body for k in np.flatnonzero(near)}
         return bodies | {geometry.pairs[k] for k in np.flatnonzero(pairs)}
 

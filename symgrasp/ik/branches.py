@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.compiling import njit
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik.chain import THREE_PARALLEL
 from symgrasp.ik.joints import misses, settle
 from symgrasp.ik.newton import polish_in
@@ -41,8 +41,7 @@ class Memory(NamedTuple):
     A: Array
 
 
-@njit(cache=True)
-def new_memory(joints):
+def new_memory(joints: int) -> Memory:
     """Return memory for an arm of that many joints."""
     return Memory(
         np.empty(NUMBERS, dtype=np.complex128), np.empty((joints, 6)), np.empty((joints, joints + 1))
@@ -55,10 +54,9 @@ def branch_count(chain):
     return PAIR_BRANCHES if chain.joint[8] == MEETING_PAIR else CLOSED_FORM_BRANCHES
 
 
-@njit(cache=True, error_model="numpy")
-def solve_range(chain, T, first, last, q, exists, inside):
+@njit(**ENTRY)
+def solve_range(chain, T, first, last, q, exists, inside, memory):
     """Solve a pose T (4, 4) at the redundancy values from first to before last; see `branches_at`."""
-    memory = new_memory(q.shape[2])
     for k in range(first, last):
         i = k - first
         branches_at(chain, k, T, False, q[i], exists[i], inside[i], memory)

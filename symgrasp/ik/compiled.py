@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from symgrasp.ik.arm_ik import ArmIK, Solutions, Tolerance
-from symgrasp.ik.branches import branch_count, solve_range
+from symgrasp.ik.branches import branch_count, new_memory, solve_range
 from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries, is_rounded
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.poses import Array
@@ -79,7 +79,7 @@ class CompiledIK(ArmIK):
         # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
         q = np.empty((last - first, branch_count(self.chain), self.arm.dof))
         exists, inside = np.empty(q.shape[:-1], dtype=bool), np.empty(q.shape[:-1], dtype=bool)
-        solve_range(self.chain, T, first, last, q, exists, inside)
+        solve_range(self.chain, T, first, last, q, exists, inside, new_memory(self.arm.dof))
         sample, branch = np.nonzero(exists)
         return Solutions(q[exists], sample + first, branch, inside[exists])
 

@@ -27,8 +27,8 @@ __all__ = [
     "vec",
 ]
 
-STRICT: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-"""Options of numba: plain IEEE arithmetic. The last one switches off reference counting of arrays, which
+STRICT: dict[str, Any] = {"inner": True, "error_model": "numpy", "_nrt": False}
+"""Options of `njit`: plain IEEE arithmetic. The last one switches off reference counting of arrays, which
 is safe because nothing that has them allocates any."""
 
 

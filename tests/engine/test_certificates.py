@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry
@@ -24,10 +25,12 @@ from tests.conftest import PLAIN, load_small
 
 NEAR = 0.1
 
+compiled_bounds = njit(**ENTRY)(distance_bounds)
+
 
 def bounds(pieces, pose, a: int, b: int) -> tuple[float, float]:
     """Both bounds as sharp as they get."""
-    return distance_bounds(pieces, pose, a, b, math.inf, math.inf, -math.inf, np.zeros((4, 3)))
+    return compiled_bounds(pieces, pose, a, b, math.inf, math.inf, -math.inf, np.zeros((4, 3)))
 
 
 def distance_of_hulls(a: np.ndarray, b: np.ndarray) -> float:
@@ -103,7 +106,7 @@ def by_bodies(
 ) -> dict[frozenset[str], tuple[float, float]]:
     """Return for every pair of bodies of which one moves the bounds of the true shapes' distance."""
     moving, pieces = geometry.moving, geometry.pieces
-    scratch = new_scratch(geometry.pose, pieces, len(q))
+    scratch = new_scratch(geometry.pose, pieces.size, len(q))
     T_base_world = np.ascontiguousarray(arm.robot.T_world_base)
     place_hand(moving, pieces, scratch, T_base_world, np.ascontiguousarray(arm.tool_pose(q)), row)
     place_arm(moving, pieces, scratch, q)

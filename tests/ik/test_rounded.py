@@ -10,6 +10,7 @@ import ssik
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik import CompiledIK
 from symgrasp.ik.branches import branch_count, branches_at, new_memory
 from symgrasp.poses import pose_error, rotation_about
@@ -21,6 +22,8 @@ from symgrasp.robot.robot import Arm, Robot
 from tests.ik.redundancy import solve_at
 from tests.ik.rounding import rounded
 from tests.ik.synthetic import distance, synthetic
+
+compiled_branches_at = njit(**ENTRY)(branches_at)
 
 X, Y, Z = np.eye(3)
 ARMS = {
@@ -152,7 +155,7 @@ def test_an_answer_does_not_depend_on_what_is_left_out(name):
                 np.empty(shape[0], dtype=bool),
                 np.empty(shape[0], dtype=bool),
             )
-            branches_at(ik.chain, 0, T, inside_only, q, exists, inside, new_memory(arm.dof))
+            compiled_branches_at(ik.chain, 0, T, inside_only, q, exists, inside, new_memory(arm.dof))
             answers.append((q[inside], inside))
         np.testing.assert_array_equal(answers[0][1], answers[1][1])
         np.testing.assert_array_equal(answers[0][0], answers[1][0])
