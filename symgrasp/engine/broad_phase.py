@@ -6,6 +6,7 @@ from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
 from symgrasp.engine.kinematics import place_arm, place_hand
 from symgrasp.engine.simplex import FAST
+from symgrasp.ik.vectors import STRICT
 
 __all__ = ["mark_near"]
 
@@ -28,9 +29,21 @@ def mark_near(moving, pieces, tree, scratch, T_world_base, T, row, q, reach, nea
         near_pairs: (.,) bool, receives the marks of the pairs of the robot's own pieces: ``hand_pairs``,
             then ``base_pairs``, then ``arm_pairs``.
     """
+    _place(moving, pieces, scratch, T_world_base, T, row, q)
+    _mark(moving, pieces.size, tree, scratch, reach, near, near_pairs)
+
+
+@njit(**STRICT)
+def _place(moving, pieces, scratch, T_world_base, T, row, q):
+    """Place all moving pieces."""
     place_hand(moving, pieces, scratch, T_world_base, T, row)
     place_arm(moving, pieces, scratch, q)
-    box, size, hands = scratch.box, pieces.size, moving.hand.shape[1]
+
+
+@njit(**FAST)
+def _mark(moving, size, tree, scratch, reach, near, near_pairs):
+    """Mark what is near the moving pieces where they are; see `mark_near`."""
+    box, hands = scratch.box, moving.hand.shape[1]
     for k in range(len(moving.frame)):
         node = 0
         while node < len(tree.skip):
