@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from symgrasp.errors import SymgraspError
 from symgrasp.hands.measure import measure_hand
-from symgrasp.hands.structure import find_hand_structure, palm_candidates
+from symgrasp.hands.structure import find_hand_structure, jaw_candidates, palm_candidates
 from symgrasp.references import resolve
 from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
@@ -72,16 +72,23 @@ def find_arms(model: RobotModel) -> list[FoundArm]:
     if known is not None:
         found = [_known_arm(model, arm) for arm in known.arms]
         return found if len(found) != 1 else [_renamed(found[0], known.name)]
-    arms = [
-        _arm(model, link)
-        for link in palm_candidates(model)
-        if len(revolute_joints(model, link)) >= LEAST_JOINTS and not _is_leg(model, link)
-    ]
-    arms = [arm for arm in arms if arm.hand is not None] or [
-        _arm(model, link, mounted=True) for link in _ends(model)
-    ]
+    arms = (
+        _with_hands(model, palm_candidates(model))
+        or _with_hands(model, jaw_candidates(model))
+        or [_arm(model, link, mounted=True) for link in _ends(model)]
+    )
     name = model.name if re.fullmatch(r"\w{1,50}", model.name) else "arm"
     return arms if len(arms) != 1 else [_renamed(arms[0], name)]
+
+
+def _with_hands(model: RobotModel, palms: Iterable[str]) -> list[FoundArm]:
+    """Return the arms that end at some links and whose hands can be measured."""
+    arms = [
+        _arm(model, link)
+        for link in palms
+        if len(revolute_joints(model, link)) >= LEAST_JOINTS and not _is_leg(model, link)
+    ]
+    return [arm for arm in arms if arm.hand is not None]
 
 
 def _renamed(arm: FoundArm, name: str) -> FoundArm:

@@ -122,9 +122,7 @@ def _time_scene(scene: Scene, rounds: int) -> _SceneTimes:
         maker = MapMaker(world)
         m = maker.map(arm.name, task)  # compiles what is not compiled yet
         build = [_time(lambda: ExactEngine(world, arm, scene.manifold)) for _ in range(3)]
-        tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(
-            task.T_world_object, arm.hand.finger_depth
-        )
+        tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, task.T_world_object)
         world.margin = scene.settings.margin
         methods = dict(_slow_methods(world, scene))
         cells = [Cell(*cell) for cell in np.argwhere(m.reason >= Reason.UNREACHABLE)]

@@ -17,7 +17,7 @@ from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
-from symgrasp.object.manifold import ROLLS, grasp_to_tool
+from symgrasp.object.manifold import ROLLS
 from symgrasp.planners.bimanual import Climb, hill_climb
 from symgrasp.planners.configurations import ConfigurationFinder, witnesses
 from symgrasp.planners.free import FreePlacements
@@ -130,7 +130,7 @@ def _sample_grasps(
 
         def feasible(T_world_object: Array, h=h, theta=theta, roll=roll, radius=radius) -> bool:
             world.set_object(T_world_object)
-            tool = grasp_to_tool(T_world_object, h, theta, roll, arm.hand.standoff(radius))
+            tool = arm.hand.tool_pose(T_world_object, h, theta, roll, radius)
             candidates = checker.candidates(T_base_world @ tool, arm.hand.opening(radius))
             return any(c.reason == Reason.FEASIBLE for c in candidates)
 

@@ -200,7 +200,7 @@ def _measured(name: str, content: dict[str, Any], poses: int) -> RobotRow:
 def _enough(maker: MapMaker, first: FeasibilityMap) -> list[FeasibilityMap]:
     """Return maps with enough cells to check, if `MAPS` have them: the first, then at other poses."""
     arm, grid = maker.scene.arm(first.arm), maker.scene.manifold
-    T_tool_object = inverse(grid.tool_poses(np.eye(4), arm.hand.finger_depth)[0, grid.heights // 2, 0])
+    T_tool_object = inverse(arm.hand.tool_poses(grid, np.eye(4))[0, grid.heights // 2, 0])
     maps, rng = [first], np.random.default_rng(0)
     while len(maps) < MAPS and any(len(_cells(maps, kind)) < CHECKED for kind in KINDS):
         T = arm.world_tool_pose(rng.uniform(-np.pi, np.pi, arm.dof)) @ T_tool_object
@@ -227,7 +227,7 @@ def check(scene: Scene, ik: ArmIK, maps: Sequence[FeasibilityMap], reasons: Sequ
     found = []
     for which, *cell in cells.tolist():
         the_map = maps[which]
-        tools = scene.manifold.tool_poses(the_map.T_world_object, arm.hand.finger_depth)
+        tools = arm.hand.tool_poses(scene.manifold, the_map.T_world_object)
         T = inverse(arm.robot.T_world_base) @ tools[tuple(cell)]
         q = reach(arm, T, rng)
         if q is not None:

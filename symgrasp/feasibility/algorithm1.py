@@ -46,9 +46,7 @@ def create_map_reference(
     ik = solver_for(arm, settings.redundancy)
     radii = manifold.profile.radius(manifold.h)
     draft = MapDraft(arm, manifold, np.array([arm.hand.opening(float(r)) for r in radii]), ik)
-    T_base_tool = inverse(arm.robot.T_world_base) @ manifold.tool_poses(
-        task.T_world_object, arm.hand.finger_depth
-    )
+    T_base_tool = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(manifold, task.T_world_object)
     world.margin = settings.margin
     world.set_arms(())  # a map that was cancelled in this world may have left an arm elsewhere
     world.set_object(task.T_world_object)

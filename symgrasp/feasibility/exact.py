@@ -120,8 +120,8 @@ class ExactEngine:
         for row, misfit in enumerate(self._misfit):
             if misfit is not None:
                 draft.reason[:, row] = misfit
-        T_base_tool = inverse(self.arm.robot.T_world_base) @ grid.tool_poses(
-            task.T_world_object, self.arm.hand.finger_depth
+        T_base_tool = inverse(self.arm.robot.T_world_base) @ self.arm.hand.tool_poses(
+            grid, task.T_world_object
         )
         self._search_rows(draft, T_base_tool, progress)
         self.world.set_arms(())

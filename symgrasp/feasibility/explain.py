@@ -188,7 +188,7 @@ def explain_cell(
         cell: the cell.
         progress: called with the finished share; may raise `Cancelled`.
     """
-    tools = manifold.tool_poses(task.T_world_object, arm.hand.finger_depth)
+    tools = arm.hand.tool_poses(manifold, task.T_world_object)
     h = float(manifold.h[cell.row])
     opening = arm.hand.opening(float(manifold.profile.radius(h)))
     reason, candidates = fit(arm.hand, manifold.profile, h), []

@@ -12,7 +12,7 @@ from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.hands.measure import hand_yaml
 from symgrasp.object.manifold import Manifold
-from symgrasp.poses import Array, translation
+from symgrasp.poses import Array, inverse, translation
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -136,5 +136,6 @@ def _places(arm: Arm) -> list[Array]:
     T = arm.world_tool_pose(q)
     upright = np.abs(T[:, 2, 0]) > UPRIGHT
     order = np.argsort(-np.where(upright, margin, -1.0))[:TRIALS]
-    axis = T[:, :3, 3] + arm.hand.standoff(RADIUS) * T[:, :3, 2]
+    T_tool_axis = inverse(arm.hand.tool_pose(np.eye(4), 0.0, 0.0, 0.0, RADIUS))
+    axis = (T @ T_tool_axis)[:, :3, 3]
     return [axis[k] - [0.0, 0.0, HEIGHT / 2] for k in order if upright[k]]

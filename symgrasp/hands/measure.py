@@ -1,4 +1,4 @@
-"""Measuring a parallel hand in its URDF: fingers, joint tables, tool frame and palm."""
+"""Measuring a hand in its URDF: fingers, joint tables, tool frame and palm."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import yaml
 from symgrasp.errors import UrdfError, printable
 from symgrasp.hands.finger_fit import SAMPLES, TABLE_ERROR, best_fit, openings_of
 from symgrasp.hands.gripper import FingerMotion, find_gripper
-from symgrasp.hands.structure import find_hand_structure, links_with_shapes
+from symgrasp.hands.jaw import fit_jaw
+from symgrasp.hands.structure import HandStructure, find_hand_structure, links_with_shapes
 from symgrasp.hands.thumb import find_thumb
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, inverse, quat_wxyz, rpy
@@ -28,20 +29,21 @@ MOST_LISTED = 8
 
 
 def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand:
-    """Measure a parallel hand.
+    """Measure a hand whose fingers close from two sides, or of which one jaw closes on one that is fixed.
 
     Args:
         urdf: the hand's URDF, or that of a robot with the hand on it: loaded, a path, or
             ``package://<package>/<path>``.
-        tool: a link fixed to the palm, needed where a robot has several hands. Where its origin lies
-            in front of the palm, it becomes that of the tool frame; the axes are measured.
+        tool: a link fixed to the palm, needed where a robot has several hands or only one jaw turns. Where
+            its origin lies in front of the palm, it becomes that of the tool frame; the axes are measured.
 
     Raises:
-        UrdfError: the URDF is unusable, there is no such link, or no part opens and closes like a
-            parallel hand.
+        UrdfError: the URDF is unusable, there is no such link, or no part opens and closes like a hand.
     """
     model = urdf if isinstance(urdf, RobotModel) else _load(urdf)
     structure = find_hand_structure(model, tool)
+    if len(structure.fingers) == 1:
+        return _jaw_hand(model, structure, tool)
     gripper = find_thumb(model, structure) or find_gripper(model, structure)
     palm, fingers = links_with_shapes(model, structure.palm), links_with_shapes(model, *gripper.sides)
     fit = best_fit(gripper, palm, tool)
@@ -64,6 +66,26 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
     )
 
 
+def _jaw_hand(model: RobotModel, structure: HandStructure, tool: str | None) -> Hand:
+    fit = fit_jaw(model, structure, tool)
+    palm, jaw = links_with_shapes(model, structure.palm), links_with_shapes(model, *structure.fingers)
+    return Hand(
+        name=model.path.stem,
+        links=(*palm, *jaw),
+        touch_links=(*fit.fixed, *jaw),
+        joints=_tables(fit.motion, fit.values, fit.openings),
+        min_opening=_round(fit.openings[0]),
+        max_opening=_round(fit.openings[-1]),
+        finger_depth=_round(fit.depth),
+        pad_width=_round(fit.pad_width),
+        palm_width=_round(fit.palm_width),
+        palm_depth=_round(fit.palm_depth),
+        shift=_table(fit.openings, fit.shifts),
+        tool=_tool_frame(model, fit.T_base_tool, structure.base, tool),
+        urdf=str(model.path.resolve()) if structure.standalone else None,
+    )
+
+
 def _load(reference: str | Path) -> RobotModel:
     path = resolve(str(reference), Path())
     if path is None:
@@ -80,6 +102,8 @@ def hand_yaml(hand: Hand) -> str:
         f"# objects may reach {mm['finger_depth']} behind the tool frame; the palm is {mm['palm_depth']}"
         f" behind it, {mm['palm_width']} wide there",
     ]
+    if hand.shift:
+        summary.append("# one jaw is fixed: objects touch it, and shift is where their axis lies along y")
     if len(hand.joints) > 2:
         summary.append("# these joints are taken to move together; the URDF does not say whether they can")
     summary = [printable(line) for line in summary]  # a line break would end the comment
@@ -91,13 +115,12 @@ def hand_yaml(hand: Hand) -> str:
         "tool": hand.tool and _frame_content(hand.tool),
         "links": list(hand.links),
         "touch_links": list(hand.touch_links),
-        "joints": {
-            name: table if isinstance(table, float | int) else [list(knot) for knot in table]
-            for name, table in hand.joints.items()
-        },
+        "joints": {name: _table_content(table) for name, table in hand.joints.items()},
     }
     for key in ("min_opening", "max_opening", "finger_depth", "pad_width", "palm_width", "palm_depth"):
         content[key] = getattr(hand, key)
+    if hand.shift:
+        content["shift"] = _table_content(hand.shift)
     content = {key: value for key, value in content.items() if value is not None}
     text = yaml.safe_dump({"hand": content}, sort_keys=False, default_flow_style=None, width=100)
     return "\n".join([*summary, text])
@@ -116,20 +139,25 @@ def _frame_content(frame: Frame) -> dict[str, Any]:
     return {"link": frame.link, "pose": {"position": list(frame.position), "rpy_deg": turn.tolist()}}
 
 
+def _table_content(table: JointTable) -> Any:
+    """Return a table in the notation of scene files."""
+    return table if isinstance(table, float | int) else [list(knot) for knot in table]
+
+
 def _tables(motion: FingerMotion, values: Array, openings: Array) -> dict[str, JointTable]:
     """Return joint name → table over the opening, given joint values (m, k) at openings (m,) (m)."""
-    tables: dict[str, JointTable] = {}
-    for k, source in enumerate(motion.sources):
-        at = values[:, k]
-        error = TABLE_ERROR * np.ptp(at) / np.ptp(openings)
-        ratio = float(openings @ at / (openings @ openings))
-        if np.abs(ratio * openings - at).max() <= error:
-            tables[motion.model.joint_names[source]] = float(f"{ratio:.4g}")
-        else:
-            knots = simplify(np.column_stack([openings, at]), error)
-            table = tuple((_round(opening), round(float(value), 5)) for opening, value in knots)
-            tables[motion.model.joint_names[source]] = table
-    return tables
+    names = [motion.model.joint_names[source] for source in motion.sources]
+    return {name: _table(openings, at) for name, at in zip(names, values.T, strict=True)}
+
+
+def _table(openings: Array, at: Array) -> JointTable:
+    """Return the table of values (m,) at openings (m,) (m)."""
+    error = TABLE_ERROR * np.ptp(at) / np.ptp(openings)
+    ratio = float(openings @ at / (openings @ openings))
+    if np.abs(ratio * openings - at).max() <= error:
+        return float(f"{ratio:.4g}")
+    knots = simplify(np.column_stack([openings, at]), error)
+    return tuple((_round(opening), round(float(value), 5)) for opening, value in knots)
 
 
 def _tool_frame(model: RobotModel, T_base_tool: Array, base: str, tool: str | None) -> Frame:

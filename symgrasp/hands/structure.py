@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.robot.model import RobotModel
 
-__all__ = ["HandStructure", "find_hand_structure", "links_with_shapes", "palm_candidates"]
+__all__ = ["HandStructure", "find_hand_structure", "jaw_candidates", "links_with_shapes", "palm_candidates"]
 
 
 class HandStructure(NamedTuple):
@@ -17,7 +17,8 @@ class HandStructure(NamedTuple):
     Attributes:
         base: the link that carries all fingers.
         palm: the links that are fixed to the base, and the base.
-        fingers: for each moving joint on the palm, the links that it moves.
+        fingers: for each moving joint on the palm, the links that it moves; one where a jaw closes on a part
+            of the palm.
         standalone: whether the URDF holds the hand only, and no robot.
     """
 
@@ -28,35 +29,35 @@ class HandStructure(NamedTuple):
 
 
 def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
-    """Find the palm that carries two or more fingers.
+    """Find the palm that carries two or more fingers, or one jaw.
 
     Args:
         model: the URDF.
-        tool: a link fixed to the palm; may be None where there is one palm only.
+        tool: a link fixed to the palm; may be None where there is only one palm that carries fingers.
 
     Raises:
         UrdfError: there is no such palm, or several.
     """
-    hands, group = _hands(model)
+    movers, group = _movers(model)
     if tool is not None:
         mover = group[model.link_names[model.link_index(tool)]]
-        if mover not in hands:
-            raise UrdfError(model.path, "tool", tool, "a link of a palm that two or more fingers hang on")
+        if mover not in _innermost(movers, group) and len(movers.get(mover, ())) < 2:
+            raise UrdfError(model.path, "tool", tool, "a link of a palm that fingers or a jaw hang on")
     else:
-        inner = _innermost(hands, group)
+        inner = _innermost(_hands(movers), group)
         if len(inner) != 1:
             palms = [link for link in model.link_names if group[link] in inner]
-            expected = f"--tool, {one_of(palms)}" if palms else "a palm with two or more moving fingers"
+            expected = f"--tool, {one_of(palms)}" if palms else "two or more fingers, or --tool for one jaw"
             raise UrdfError(model.path, "hand", f"{len(inner)} hands", expected)
         mover = inner[0]
     together = [link for link in model.link_names if group[link] == mover]
-    parents = [model.chain(finger[0])[:-1] for finger in hands[mover]]
+    parents = [model.chain(finger[0])[:-1] for finger in movers[mover]]
     shared = [j for j in parents[0] if all(j in chain for chain in parents)]
     base = model.link_names[shared[-1].child] if shared else model.root
     # On a robot the last link of the arm moves with the palm, but is not part of the hand.
     own = [link for link in together if model.chain(link)[: len(shared)] == shared]
     palm = together if mover is None else own
-    return HandStructure(base, palm, hands[mover], mover is None)
+    return HandStructure(base, palm, movers[mover], mover is None)
 
 
 def palm_candidates(model: RobotModel) -> list[str]:
@@ -64,12 +65,29 @@ def palm_candidates(model: RobotModel) -> list[str]:
 
     Palms are among them, and so may be the body of a robot whose arms and legs carry no hands.
     """
-    hands, group = _hands(model)
-    firsts = {mover: next(link for link in model.link_names if group[link] == mover) for mover in hands}
-    return [firsts[mover] for mover in _innermost(hands, group)]
+    movers, group = _movers(model)
+    return _firsts(model, _innermost(_hands(movers), group), group)
 
 
-def _hands(model: RobotModel) -> tuple[dict[str | None, list[list[str]]], dict[str, str | None]]:
+def jaw_candidates(model: RobotModel) -> list[str]:
+    """Return a link of each rigid group that one moving part hangs on, on which nothing moves.
+
+    Those that carry a jaw are among them, and so is the link before the last of any arm.
+    """
+    movers, group = _movers(model)
+    single = [mover for mover in _innermost(movers, group) if len(movers[mover]) == 1]
+    return _firsts(model, single, group)
+
+
+def _firsts(model: RobotModel, movers: Iterable[str | None], group: Mapping[str, str | None]) -> list[str]:
+    return [next(link for link in model.link_names if group[link] == mover) for mover in movers]
+
+
+def _hands(movers: Mapping[str | None, list[list[str]]]) -> dict[str | None, list[list[str]]]:
+    return {mover: parts for mover, parts in movers.items() if len(parts) > 1}
+
+
+def _movers(model: RobotModel) -> tuple[dict[str | None, list[list[str]]], dict[str, str | None]]:
     """Return the parts that hang on groups of links, and the group that each link belongs to.
 
     Links that only fixed joints connect move as one rigid group. A group is named by the last joint that
@@ -88,12 +106,11 @@ def _hands(model: RobotModel) -> tuple[dict[str | None, list[list[str]]], dict[s
     for joint in model.joints:
         if joint.source >= 0 and shaped[joint.child]:
             first_of.setdefault(mover[joint.parent], []).append(joint.child)
-    hands = {
+    movers = {
         group: [[names[k] for k in _subtree(children, first)] for first in firsts]
         for group, firsts in first_of.items()
-        if len(firsts) > 1
     }
-    return hands, dict(zip(names, mover, strict=True))
+    return movers, dict(zip(names, mover, strict=True))
 
 
 def _subtree(children: Sequence[Sequence[int]], first: int) -> list[int]:
@@ -104,7 +121,9 @@ def _subtree(children: Sequence[Sequence[int]], first: int) -> list[int]:
     return sorted(found)
 
 
-def _innermost(hands: dict[str | None, list[list[str]]], group: dict[str, str | None]) -> list[str | None]:
+def _innermost(
+    hands: Mapping[str | None, list[list[str]]], group: Mapping[str, str | None]
+) -> list[str | None]:
     """Return the groups without those whose "fingers" carry fingers themselves: the torso is no palm."""
     return [m for m, fs in hands.items() if not any(group[link] in hands for f in fs for link in f)]
 

@@ -38,26 +38,36 @@ def wrap(angle: ArrayLike) -> Array:
 
 
 def grasp_to_tool(
-    T_world_object: ArrayLike, h: ArrayLike, theta: ArrayLike, roll: ArrayLike, standoff: ArrayLike
+    T_world_object: ArrayLike,
+    h: ArrayLike,
+    theta: ArrayLike,
+    roll: ArrayLike,
+    standoff: ArrayLike,
+    shift: ArrayLike = 0.0,
 ) -> Array:
-    """Return the tool poses of grasps: ``T_world_object · Rz(θ) · Trans(d, 0, h) · R_hand(roll)``.
+    """Return the tool poses of grasps.
+
+    ``T_world_tool = T_world_object · Rz(θ) · Trans(d, 0, h) · R_hand(roll) · Trans(0, -s, 0)``
 
     Args:
         T_world_object: one object pose (4, 4).
         h: heights (...) in metres.
         theta: angles (...) in radians.
         roll: 0 or π (...), the turn about the approach.
-        standoff: distance d(h) (...) of the tool frame from the axis, in metres.
+        standoff: distance d(h) (...) of the tool frame from the axis along z, in metres.
+        shift: y (...) of the axis in the tool frame s(h), in metres.
 
     Returns:
         Poses ``T_world_tool`` (..., 4, 4) over the broadcast batch shape.
     """
-    h, theta, roll, standoff = (np.asarray(part, dtype=float) for part in (h, theta, roll, standoff))
+    h, theta, roll, standoff, shift = (
+        np.asarray(part, dtype=float) for part in (h, theta, roll, standoff, shift)
+    )
     # Written through the axis frame, so that the object's own spin enters only as a sum of
     # angles: m((h, θ), T·Rz(δ)) and m((h, θ + δ), T) then share every bit (equation 3).
     azimuth = wrap(np.round(wrap(spin(T_world_object) + theta) / AZIMUTH_STEP) * AZIMUTH_STEP)
-    offset = np.stack(np.broadcast_arrays(standoff, 0.0, h), axis=-1)
     sign = np.where(np.cos(roll) >= 0, 1.0, -1.0)
+    offset = np.stack(np.broadcast_arrays(standoff, -sign * shift, h), axis=-1)
     hand = np.zeros((*sign.shape, 3, 3))  # columns: x, y (closing), z (approach) of the tool
     hand[..., 2, 0] = sign
     hand[..., 1, 1] = sign
@@ -158,12 +168,13 @@ class Manifold:
         rest = 0.0 if abs(cells - k) < 1e-9 else (cells - k) * self.dtheta
         return Manifold(self.profile, self.heights, self.angles, self.theta_start - rest), k
 
-    def tool_poses(self, T_world_object: ArrayLike, finger_depth: float) -> Array:
+    def tool_poses(self, T_world_object: ArrayLike, finger_depth: float, shift: ArrayLike = 0.0) -> Array:
         """Return ``T_world_tool`` (rolls, heights, angles, 4, 4) at every cell centre.
 
         Args:
             T_world_object: object pose (4, 4).
             finger_depth: how deep (m) an object may reach between the fingers.
+            shift: y (m) of the axis in the tool frame, one for all heights or one for each (heights,).
         """
         standoff = np.maximum(0.0, self.profile.radius(self.h) - finger_depth)
         return grasp_to_tool(
@@ -172,4 +183,5 @@ class Manifold:
             self.theta[None, None, :],
             np.array(ROLLS)[:, None, None],
             standoff[None, :, None],
+            np.broadcast_to(shift, standoff.shape)[None, :, None],
         )

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import yaml
 
-from symgrasp.object.manifold import grasp_to_tool
 from symgrasp.plan.plan import Hold, Plan
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
@@ -80,7 +79,7 @@ def to_tsr(plan: Plan) -> str:
 
 def _region(plan: Plan, scene: Scene, hold: Hold) -> dict[str, Any]:
     arm = scene.arm(hold.arm)
-    standoff = arm.hand.standoff(float(scene.profile.radius(hold.grasp.h)))
+    radius = float(scene.profile.radius(hold.grasp.h))
     low, high = _height_range(scene, arm, hold)
     free = [0.0, 0.0]
     return {
@@ -90,7 +89,7 @@ def _region(plan: Plan, scene: Scene, hold: Hold) -> dict[str, Any]:
         "subject": arm.hand.name,
         "reference": scene.file.object.name,
         "T_ref_tsr": np.eye(4).tolist(),
-        "Tw_e": grasp_to_tool(np.eye(4), 0.0, 0.0, hold.grasp.roll, standoff).tolist(),
+        "Tw_e": arm.hand.tool_pose(np.eye(4), 0.0, 0.0, hold.grasp.roll, radius).tolist(),
         "Bw": [free, free, [low, high], free, free, [-np.pi, np.pi]],
         "preshape": [hold.opening],
     }

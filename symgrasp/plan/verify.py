@@ -297,6 +297,7 @@ def _tool_of(arm: Arm, T: Array, h: float, theta: float, flipped: bool, radius: 
     tool = np.eye(4)
     tool[:3, :3] = np.column_stack([np.cross(tangent, -out), tangent, -out])
     tool[:3, 3] = max(0.0, radius - arm.hand.finger_depth) * out + [0.0, 0.0, h]
+    tool[:3, 3] -= float(arm.hand.shift_at(radius)) * tangent
     return T @ tool
 
 

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.object.manifold import ROLLS, grasp_to_tool
+from symgrasp.object.manifold import ROLLS
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold, Plan, Planner, PlanTask, Pose, SceneRecord
 from symgrasp.poses import rotation_z
 from symgrasp.robot.configuration import ArmConfiguration
@@ -54,13 +54,13 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
         margin = m.margin(cell)
         h, theta = float(m.manifold.h[grasp.row]), float(m.manifold.theta[grasp.column])
         roll = ROLLS[grasp.roll]
-        standoff = arm.hand.standoff(float(m.manifold.profile.radius(h)))
+        radius = float(m.manifold.profile.radius(h))
         entries.append(
             Hold(
                 arm=arm.name,
                 robot=arm.robot.name,
                 grasp=Grasp(h=h, theta=theta, roll=roll),
-                tool_pose=Pose.of(grasp_to_tool(turned, h, theta, roll, standoff)),
+                tool_pose=Pose.of(arm.hand.tool_pose(turned, h, theta, roll, radius)),
                 joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
                 hand_joints=arm.hand.joint_values(opening),
                 opening=opening,

@@ -11,7 +11,7 @@ from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
-from symgrasp.object.manifold import ROLLS, grasp_to_tool
+from symgrasp.object.manifold import ROLLS
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.configuration import ArmConfiguration
@@ -110,8 +110,8 @@ class ConfigurationFinder:
             self.world.park(robot)
         self.world.set_object(m.T_world_object)
         h, theta = m.manifold.h[cell.row], m.manifold.theta[cell.column]
-        standoff = arm.hand.standoff(float(m.manifold.profile.radius(h)))
-        tool = grasp_to_tool(m.T_world_object, h, theta, ROLLS[cell.roll], standoff)
+        radius = float(m.manifold.profile.radius(h))
+        tool = arm.hand.tool_pose(m.T_world_object, h, theta, ROLLS[cell.roll], radius)
         opening = float(m.opening[cell.row])
         candidates = self._checker(k, torso).candidates(inverse(arm.robot.T_world_base) @ tool, opening)
         return [ArmConfiguration(arm, c.q, opening) for c in candidates if c.reason == Reason.FEASIBLE]

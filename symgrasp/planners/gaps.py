@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.compiling import njit
-from symgrasp.object.manifold import ROLLS, Manifold, grasp_to_tool
+from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.planners.passing import Hands
 from symgrasp.poses import Array
 from symgrasp.robot.handprint import Handprint
@@ -135,8 +135,7 @@ class PrintGaps:
 
     def _tool(self, a: int, line: _Line, h: float) -> Array:
         """Return the tool pose (4, 4) on the object at column 0 and a height (m)."""
-        standoff = self.arms[a].hand.standoff(line.radius)
-        return grasp_to_tool(np.eye(4), h, 0.0, ROLLS[line.roll], standoff)
+        return self.arms[a].hand.tool_pose(np.eye(4), h, 0.0, ROLLS[line.roll], line.radius)
 
 
 class _Line(NamedTuple):

@@ -16,9 +16,12 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from symgrasp.errors import InputError
+from symgrasp.object.manifold import Manifold, grasp_to_tool
 from symgrasp.object.profile import Profile
+from symgrasp.poses import Array
 from symgrasp.robot.assembly import Frame
 
 __all__ = ["HANDS", "SIDED_HANDS", "Hand", "JointTable"]
@@ -47,6 +50,8 @@ class Hand:
         palm_width: extent of the palm along the object's axis; 0 leaves contact of the palm to the
             collision check.
         palm_depth: distance from the tool frame back to the face of the palm that has this width.
+        shift: y of the tool frame where the axis of the object lies, over the opening: 0 for fingers that
+            close from two sides; with a jaw that is fixed it moves with the opening.
         tool: the tool frame, for arms that do not name a link of their own.
         urdf: the hand's own URDF, for hands that are not part of the robot's URDF.
 
@@ -66,6 +71,7 @@ class Hand:
     radius_tolerance: float = 0.003
     palm_width: float = 0.0
     palm_depth: float = 0.0
+    shift: JointTable = field(default=0.0, hash=False)
     tool: Frame | None = None
     urdf: str | None = None
 
@@ -76,28 +82,56 @@ class Hand:
         if self.palm_width and self.palm_depth < self.finger_depth:
             least = f"at least the finger depth, {self.finger_depth:g}, where the palm has a width"
             raise InputError(where, "palm_depth", self.palm_depth, least)
-        for joint, table in self.joints.items():
+        tables = {f"joints.{joint}": table for joint, table in self.joints.items()}
+        for name, table in {**tables, "shift": self.shift}.items():
             if isinstance(table, float | int):
                 continue
             at = [opening for opening, _ in table]
             if len(at) < 2 or any(b <= a for a, b in pairwise(at)):
                 expected = "a number, or two or more [opening, value] with growing openings"
-                raise InputError(where, f"joints.{joint}", table, expected)
+                raise InputError(where, name, table, expected)
             if at[0] > self.min_opening + 1e-9 or at[-1] < self.max_opening - 1e-9:
                 expected = f"knots from {self.min_opening:g} to {self.max_opening:g} m"
-                raise InputError(where, f"joints.{joint}", table, expected)
+                raise InputError(where, name, table, expected)
 
     def opening(self, radius: float) -> float:
         """Return the opening (m) around a radius (m): ``2·radius + 2·clearance``, clipped to the range."""
-        return float(np.clip(2 * (radius + self.clearance), self.min_opening, self.max_opening))
+        return float(self._opening(radius))
+
+    def _opening(self, radius: ArrayLike) -> Array:
+        return np.clip(2 * (np.asarray(radius) + self.clearance), self.min_opening, self.max_opening)
 
     def joint_values(self, opening: float) -> dict[str, float]:
         """Return joint name → value of the hand's joints (rad or m) at an opening (m)."""
-        return {name: _value(table, opening) for name, table in self.joints.items()}
+        return {name: float(_value(table, opening)) for name, table in self.joints.items()}
 
     def standoff(self, radius: float) -> float:
         """Return the distance d (m) of the tool frame from the axis: ``max(0, radius − finger_depth)``."""
         return max(0.0, radius - self.finger_depth)
+
+    def tool_pose(
+        self, T_world_object: ArrayLike, h: ArrayLike, theta: ArrayLike, roll: ArrayLike, radius: ArrayLike
+    ) -> Array:
+        """Return the tool poses (..., 4, 4) of grasps; see `grasp_to_tool`.
+
+        Args:
+            T_world_object: one object pose (4, 4).
+            h: heights (...) (m).
+            theta: angles (...) (rad).
+            roll: 0 or π (...).
+            radius: radii (...) of the object at these heights (m).
+        """
+        standoff = np.maximum(0.0, np.asarray(radius) - self.finger_depth)
+        return grasp_to_tool(T_world_object, h, theta, roll, standoff, self.shift_at(radius))
+
+    def tool_poses(self, manifold: Manifold, T_world_object: ArrayLike) -> Array:
+        """Return ``T_world_tool`` (rolls, heights, angles, 4, 4) at every cell centre of a manifold."""
+        shift = self.shift_at(manifold.profile.radius(manifold.h))
+        return manifold.tool_poses(T_world_object, self.finger_depth, shift)
+
+    def shift_at(self, radius: ArrayLike) -> Array:
+        """Return y (...) (m) of the tool frame where the axis of an object lies, for radii (...) (m)."""
+        return _value(self.shift, self._opening(radius))
 
     def spans(self, radius: float) -> bool:
         """Whether the diameter of a radius (m) is within the range of openings."""
@@ -129,12 +163,12 @@ class Hand:
         )
 
 
-def _value(table: JointTable, opening: float) -> float:
-    """Evaluate a joint table at an opening (m)."""
+def _value(table: JointTable, opening: ArrayLike) -> Array:
+    """Evaluate a joint table at openings (...) (m)."""
     if isinstance(table, float | int):
-        return table * opening
+        return table * np.asarray(opening)
     at, values = np.transpose(table)
-    return float(np.interp(opening, at, values))
+    return np.interp(np.asarray(opening, dtype=float), at, values)
 
 
 def _pr2(side: str) -> Hand:

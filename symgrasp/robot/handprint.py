@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from symgrasp.object.manifold import ROLLS, Manifold, grasp_to_tool, wrap
+from symgrasp.object.manifold import Manifold, wrap
 from symgrasp.poses import Array
 
 __all__ = ["Handprint", "handprint", "hull_edges", "slab_corners"]
@@ -65,8 +65,8 @@ class Handprint:
         return np.roll(covered, column, axis=1)
 
 
-def handprint(hulls: Sequence[Array], manifold: Manifold, row: int, roll: int, standoff: float) -> Handprint:
-    """Project the convex hulls of a hand that grasps ``row`` at column 0 onto the manifold.
+def handprint(hulls: Sequence[Array], manifold: Manifold, T_object_tool: Array) -> Handprint:
+    """Project the convex hulls of a hand that grasps a row at column 0 onto the manifold.
 
     Exact for each hull and row, then rounded up to whole cells: the slice of a convex hull between
     two heights is convex, so it covers one interval of angles about the axis, which its corners bound,
@@ -75,11 +75,8 @@ def handprint(hulls: Sequence[Array], manifold: Manifold, row: int, roll: int, s
     Args:
         hulls: vertices (n, 3) of each convex hull in the tool frame, at the opening of the grasp.
         manifold: the grid.
-        row: height index of the grasp.
-        roll: index into `ROLLS`.
-        standoff: distance (m) of the tool frame from the axis.
+        T_object_tool: pose (4, 4) of the tool in the object.
     """
-    T_object_tool = grasp_to_tool(np.eye(4), manifold.h[row], 0.0, ROLLS[roll], standoff)
     placed = [points @ T_object_tool[:3, :3].T + T_object_tool[:3, 3] for points in hulls]
     lowest = min(points[:, 2].min() for points in placed)
     highest = max(points[:, 2].max() for points in placed)

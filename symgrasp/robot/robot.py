@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import InputError, UrdfError, one_of
-from symgrasp.object.manifold import Manifold
+from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.poses import Array, from_rotation, inverse, rotation_about
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.handprint import Handprint, handprint
@@ -242,4 +242,5 @@ class Arm:
         """
         radius = float(manifold.profile.radius(manifold.h[row]))
         hulls = self.hand_hulls(self.hand.opening(radius))
-        return handprint(hulls, manifold, row, roll, self.hand.standoff(radius))
+        T_object_tool = self.hand.tool_pose(np.eye(4), manifold.h[row], 0.0, ROLLS[roll], radius)
+        return handprint(hulls, manifold, T_object_tool)

@@ -50,7 +50,7 @@ def test_a_print_is_not_wasteful(name):
     grid = Manifold(BOTTLE, 20, 24)
     standoff = 0.01  # no body of any of the hands holds the axis, which would cover a whole row
     bodies = arm.hand_hulls(0.08)
-    print_ = handprint(bodies, grid, 8, 0, standoff)
+    print_ = handprint(bodies, grid, grasp_to_tool(np.eye(4), grid.h[8], 0.0, 0.0, standoff))
     tool = grasp_to_tool(np.eye(4), grid.h[8], grid.theta[0], 0.0, standoff)
     points = random_points_in(bodies, np.random.default_rng(0), 200_000) @ tool[:3, :3].T + tool[:3, 3]
     h, theta = grid.project(points)
@@ -64,8 +64,8 @@ def test_a_print_is_not_wasteful(name):
 def test_a_body_on_the_axis_covers_every_angle():
     grid = Manifold(BOTTLE, 10, 12)
     cube = 0.01 * np.array(list(np.ndindex(2, 2, 2))) - 0.005
-    assert handprint([cube], grid, 4, 0, 0.0).cells.all()
-    away = handprint([cube], grid, 4, 0, 0.05)
+    assert handprint([cube], grid, grasp_to_tool(np.eye(4), grid.h[4], 0.0, 0.0, 0.0)).cells.all()
+    away = handprint([cube], grid, grasp_to_tool(np.eye(4), grid.h[4], 0.0, 0.0, 0.05))
     assert 0 < away.cells.any(axis=0).sum() <= 2
 
 
@@ -75,14 +75,16 @@ def test_a_body_that_only_touches_the_axis_covers_every_angle_there():
     tip = np.array([[0, 0, 0], [0.001, 0, -0.01], [-0.001, 0, -0.01], [0, 0.001, -0.01]])
     tool = grasp_to_tool(np.eye(4), grid.h[4], 0.0, 0.0, 0.0)
     assert np.allclose((tip @ tool[:3, :3].T)[0, :2], 0.0)
-    assert handprint([tip], grid, 4, 0, 0.0).cells.all()
+    assert handprint([tip], grid, grasp_to_tool(np.eye(4), grid.h[4], 0.0, 0.0, 0.0)).cells.all()
 
 
 def test_a_body_beyond_the_axis_covers_the_far_side():
     """Where it is, as seen from the axis: opposite of the column that the hand grasps at."""
     grid = Manifold(BOTTLE, 10, 12)
     cube = 0.01 * np.array(list(np.ndindex(2, 2, 2))) - 0.005
-    print_ = handprint([cube + np.array([0, 0, 0.05])], grid, 4, 0, 0.0)
+    print_ = handprint(
+        [cube + np.array([0, 0, 0.05])], grid, grasp_to_tool(np.eye(4), grid.h[4], 0.0, 0.0, 0.0)
+    )
     assert np.unique(np.argwhere(print_.cells)[:, 1]).tolist() == [6]
 
 
@@ -114,7 +116,10 @@ def test_bodies_that_share_a_point_have_prints_that_share_a_cell(a, b, point, we
         return
     grid = Manifold(profile, rows, angles)
     row = rows // 2
-    one, other = (handprint([body], grid, row, 0, 0.0) for body in (first, second))
+    one, other = (
+        handprint([body], grid, grasp_to_tool(np.eye(4), grid.h[row], 0.0, 0.0, 0.0))
+        for body in (first, second)
+    )
     assert one.overlap(other, 0) > 0
 
 
