@@ -87,10 +87,10 @@ def test_an_object_touches_both_faces_of_a_wedge(tmp_path_factory, length, turn,
     assert at[1] == pytest.approx(radius, abs=4e-4)
     (angle,) = hand.joint_values(opening).values()
     assert np.tan(abs(angle) / 2) == pytest.approx(radius / at[2], abs=0.02)
-    # It is as wide as friction allows, less the steps in which radii are looked at.
+    # It is as wide as friction allows, less the steps in which radii and depths are looked at.
     most = hand.max_opening / 2
     z = length - 0.01 + hand.standoff(most)
-    assert 2 * np.arctan2(most, z) == pytest.approx(np.deg2rad(44), abs=np.deg2rad(1.5))
+    assert np.deg2rad(40) < 2 * np.arctan2(most, z) < np.deg2rad(45.5)
     assert hand.palm_depth == pytest.approx(length - 0.01, abs=2e-3)
     assert hand.pad_width == pytest.approx(WIDTH)
 
