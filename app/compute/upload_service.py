@@ -19,6 +19,7 @@ from symgrasp.world import placed, prepared
 from ..choices.object_choice import ObjectChoice, from_mesh
 from ..choices.scene_assets import BuiltScene, SceneAssets
 from ..choices.uploaded_scene import UploadedScene
+from ..files.archives import pack
 from ..files.robot_files import catalogue_entry, read_robot_entry, rearmed
 from ..files.scene_files import read_scene, read_scene_archive
 from ..scene3d.visual_meshes import read_visuals
@@ -108,13 +109,13 @@ class UploadService:
     def read_robot(
         self, scene: Scene, robot: str, name: str, content: bytes, folder: Path, progress: Progress
     ) -> tuple[RobotFile, BuiltScene]:
-        """Read the robot in an archive, and put it in the place of one of a scene.
+        """Read an uploaded robot, and put it in the place of one of a scene.
 
         Args:
             scene: the scene.
             robot: name of the robot to replace.
-            name: of the archive.
-            content: of the archive.
+            name: of the file: an archive, or a URDF alone.
+            content: of the file.
             folder: an empty one to unpack it into.
             progress: called with the finished share; may raise `Cancelled`.
 
@@ -126,6 +127,8 @@ class UploadService:
             SceneError, UrdfError, MeshError: the robot is unusable, or its home is not free there.
         """
         progress(0.0)
+        if not name.lower().endswith(".zip"):  # a URDF alone is like an archive of one file
+            content = pack([(name, content)])
         entry = read_robot_entry(name, content, folder)
         progress(0.3)
         return entry, self._put(scene, robot, entry, progress)

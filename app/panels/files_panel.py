@@ -28,14 +28,16 @@ class FilesPanel(Panel):
                 "where robots were uploaded",
             )  # fmt: skip
             self.upload = self.upload_button(
-                "Open a scene (YAML)", ARCHIVE_LIMIT, actions.upload_scene, mime_type=".yaml,.yml,.zip",
+                "Open a scene (YAML or ZIP)", ARCHIVE_LIMIT, actions.upload_scene,
+                mime_type=".yaml,.yml,.zip",
                 hint=f"At most {SCENE_LIMIT / 1e6:g} MB; or a ZIP file of a scene with its robots, at most "
                 f"{ARCHIVE_LIMIT / 1e6:g} MB",
             )  # fmt: skip
         with gui.add_folder("Share"):
             self.button(
                 "Make a link", viser.Icon.LINK, actions.make_link, color="gray",
-                hint="Opens the same scene, poses, grasp and view on this server",
+                hint="Opens the same scene, poses, grasp and view on this server; not robots that were "
+                "changed: save the scene for these",
             )  # fmt: skip
             self.link = self.html()
             self.button(

@@ -31,8 +31,10 @@ class RobotPanel(Panel):
             )
             self.on_select(self.robot, actions.choose_robot)
             self.upload = self.upload_button(
-                "Upload a robot (ZIP)", ARCHIVE_LIMIT, actions.upload_robot, mime_type=".zip",
-                hint=f"A URDF with its meshes; at most {ARCHIVE_LIMIT / 1e6:g} MB",
+                "Upload a robot (ZIP or URDF)", ARCHIVE_LIMIT, actions.upload_robot,
+                mime_type=".zip,.urdf",
+                hint=f"A ZIP file of a URDF with its meshes, or a URDF without any; at most "
+                f"{ARCHIVE_LIMIT / 1e6:g} MB",
             )  # fmt: skip
             self.arm = self.dropdown("Its arm", hint="Which arm of it does what the chosen one does.")
             self.on(self.arm, lambda s, v: robot_changes.use_arm(s, v))

@@ -40,7 +40,7 @@ def download(page: GraspPage, button: str, to: Path) -> Path:
 
 def open_scene(page: GraspPage, path: Path) -> None:
     with page.page.expect_file_chooser() as chooser:
-        page.button("Open a scene (YAML)").click()
+        page.button("Open a scene (YAML or ZIP)").click()
     chooser.value.set_files(path)
 
 

@@ -13,7 +13,7 @@ from tests.e2e.page import GraspPage
 
 def open_robot_folder(page: GraspPage) -> None:
     page.page.get_by_text("Robot", exact=True).first.click()
-    expect(page.button("Upload a robot (ZIP)")).to_be_visible()
+    expect(page.button("Upload a robot (ZIP or URDF)")).to_be_visible()
 
 
 def upload(page: GraspPage, button: str, path: Path) -> None:
@@ -44,12 +44,12 @@ def test_an_uploaded_robot_goes_into_a_file_and_opens_again(open_page, tmp_path)
     open_robot_folder(page)
     bad = tmp_path / "bad.zip"
     bad.write_bytes(pack([("../evil.urdf", b"<robot/>")]))
-    upload(page, "Upload a robot (ZIP)", bad)
+    upload(page, "Upload a robot (ZIP or URDF)", bad)
     expect(page.alerts.first).to_contain_text("a relative path without '..'")
     page.expect_title("panda")  # nothing of the scene is lost
     good = tmp_path / "my panda.zip"
     good.write_bytes(panda_archive())
-    upload(page, "Upload a robot (ZIP)", good)
+    upload(page, "Upload a robot (ZIP or URDF)", good)
     expect(page.page.get_by_label("Robot", exact=True)).to_have_value("my panda.zip (upload)")
     page.expect_title("panda")
     page.tab("Files")
@@ -62,6 +62,6 @@ def test_an_uploaded_robot_goes_into_a_file_and_opens_again(open_page, tmp_path)
     expect(page.alerts.first).to_contain_text("save the scene instead")
     another = open_page()
     another.tab("Files")
-    upload(another, "Open a scene (YAML)", saved)
+    upload(another, "Open a scene (YAML or ZIP)", saved)
     expect(another.page.get_by_label("Scene", exact=True)).to_have_value(f"{saved.name} (upload)")
     assert not page.complaints
