@@ -113,16 +113,28 @@ class ComputeProcess:
         return self._call("read_scene", progress, name, content, folder, reads=name)
 
     def read_robot(
-        self, scene: Scene, robot: str, name: str, content: bytes, folder: Path, progress: Progress
+        self,
+        scene: Scene,
+        robot: str,
+        name: str,
+        content: bytes,
+        folder: Path,
+        opened: Scene,
+        progress: Progress,
     ) -> tuple[RobotFile, BuiltScene]:
         """Put an uploaded robot in the place of another; see `UploadService.read_robot`."""
-        return self._call("read_robot", progress, scene, robot, name, content, folder, reads=name)
+        return self._call("read_robot", progress, scene, robot, name, content, folder, opened, reads=name)
 
     def put_robot(
-        self, scene: Scene, robot: str, other: CatalogueRobot | RobotFile, progress: Progress
+        self,
+        scene: Scene,
+        robot: str,
+        other: CatalogueRobot | RobotFile,
+        opened: Scene,
+        progress: Progress,
     ) -> BuiltScene:
         """Put a robot in the place of another; see `UploadService.put_robot`."""
-        return self._call("put_robot", progress, scene, robot, other, reads=other.name)
+        return self._call("put_robot", progress, scene, robot, other, opened, reads=other.name)
 
     def rearm(self, scene: Scene, arm: str, link: str, hand: str | None, progress: Progress) -> BuiltScene:
         """Return a scene with a hand on a link of an arm; see `UploadService.rearm`."""

@@ -88,7 +88,12 @@ class UploadService:
         return _checked(with_robot(scene, robot, rearmed(scene, arm, link, hand)), progress)
 
     def put_robot(
-        self, scene: Scene, robot: str, other: CatalogueRobot | RobotFile, progress: Progress
+        self,
+        scene: Scene,
+        robot: str,
+        other: CatalogueRobot | RobotFile,
+        opened: Scene,
+        progress: Progress,
     ) -> BuiltScene:
         """Return a scene with another robot in the place of one.
 
@@ -96,7 +101,8 @@ class UploadService:
             scene: the scene.
             robot: name of the robot to replace.
             other: a robot of the catalogue, or a robot as a scene file has it. Unless that says where it
-                stands, it is placed so that its arm is to the object as the other arm is.
+                stands, it is placed; see `symgrasp.world.placing.placed`.
+            opened: the scene as it was opened, with the robot that is well placed in the same position.
             progress: called with the finished share; may raise `Cancelled`.
 
         Raises:
@@ -104,10 +110,17 @@ class UploadService:
         """
         progress(0.0)
         entry = catalogue_entry(other) if isinstance(other, CatalogueRobot) else other
-        return self._put(scene, robot, entry, progress)
+        return self._put(scene, robot, entry, opened, progress)
 
     def read_robot(
-        self, scene: Scene, robot: str, name: str, content: bytes, folder: Path, progress: Progress
+        self,
+        scene: Scene,
+        robot: str,
+        name: str,
+        content: bytes,
+        folder: Path,
+        opened: Scene,
+        progress: Progress,
     ) -> tuple[RobotFile, BuiltScene]:
         """Read an uploaded robot, and put it in the place of one of a scene.
 
@@ -117,6 +130,7 @@ class UploadService:
             name: of the file: an archive, or a URDF alone.
             content: of the file.
             folder: an empty one to unpack it into.
+            opened: see `put_robot`.
             progress: called with the finished share; may raise `Cancelled`.
 
         Returns:
@@ -131,14 +145,17 @@ class UploadService:
             content = pack([(name, content)])
         entry = read_robot_entry(name, content, folder)
         progress(0.3)
-        return entry, self._put(scene, robot, entry, progress)
+        return entry, self._put(scene, robot, entry, opened, progress)
 
-    def _put(self, scene: Scene, robot: str, entry: RobotFile, progress: Progress) -> BuiltScene:
+    def _put(
+        self, scene: Scene, robot: str, entry: RobotFile, opened: Scene, progress: Progress
+    ) -> BuiltScene:
+        index = list(scene.robots).index(robot)
         changed = with_robot(scene, robot, renamed(scene, robot, entry))
         if "base" not in entry.model_fields_set:
-            name = list(changed.robots)[list(scene.robots).index(robot)]
-            old = next(arm for arm in scene.arms.values() if arm.robot.name == robot)
-            changed = placed(changed, name, old)
+            own = list(opened.robots.values())[index]
+            old = next(arm for arm in opened.arms.values() if arm.robot is own)
+            changed = placed(changed, list(changed.robots)[index], old)
         return _checked(changed, progress)
 
 

@@ -104,7 +104,9 @@ def scene_notes_html(state: State) -> str:
     """Show what the scene's file does not say and was guessed."""
     notes = "".join(f"<li>{escape(note)}</li>" for note in state.scene.notes)
     return (
-        f'<div class="sg sg-note" role="note">Not in the scene file:<ul>{notes}</ul></div>' if notes else ""
+        f'<div class="sg sg-note sg-guessed" role="note">Not in the scene file:<ul>{notes}</ul></div>'
+        if notes
+        else ""
     )
 
 

@@ -26,8 +26,11 @@ MIN_WIDTH = 1.3
 WIDEST = 1.1
 """Ratio of width to height above which a wider view shows no more from bottom to top."""
 
-AROUND_LINKS = 1.07
-"""How much more of the view than the origins of links the links themselves take."""
+NARROWEST = 0.35
+"""Ratio of width to height below which a narrower view is not seen from further away."""
+
+AROUND_LINKS = 1.15
+"""How much further away the camera is than it has to be for the origins of links to be in view."""
 
 STEEP = 1e-3
 """A camera nearer (m) than this to the vertical through the point it looks at has no azimuth."""
@@ -46,12 +49,14 @@ class Viewpoint:
     Attributes:
         look_at: the point (3,) in the middle of the view.
         direction: from there towards the camera (3,), horizontal, of length 1.
-        width: of the view (m) at that point.
+        width: of the view (m) at that point, at the least.
+        points: those (n, 3) that are in view.
     """
 
     look_at: Array
     direction: Array
     width: float
+    points: Array
 
     @property
     def right(self) -> Array:
@@ -66,9 +71,18 @@ class Viewpoint:
 
     def camera(self, aspect: float) -> Array:
         """Return the position (3,) of the camera for a view with this ratio of width to height."""
-        distance = self.width / (2 * np.tan(FIELD_OF_VIEW / 2) * np.clip(aspect, 0.35, WIDEST))
-        rise = np.array([0.0, 0.0, np.sin(ELEVATION)])
-        return self.look_at + distance * (np.cos(ELEVATION) * self.direction + rise)
+        half = np.tan(FIELD_OF_VIEW / 2)
+        aspect = max(aspect, NARROWEST)
+        towards = np.cos(ELEVATION) * self.direction + np.array([0.0, 0.0, np.sin(ELEVATION)])
+        up = np.cross(towards, self.right)
+        offsets = self.points - self.look_at
+        # What is nearer to the camera than the point that it looks at appears further from the middle.
+        apart = np.maximum(np.abs(offsets @ self.right) / aspect, np.abs(offsets @ up)) / half
+        distance = max(
+            self.width / (2 * half * min(aspect, WIDEST)),
+            AROUND_LINKS * float((apart + offsets @ towards).max()),
+        )
+        return self.look_at + distance * towards
 
 
 def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
@@ -97,17 +111,13 @@ def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
         ahead = (bases[-1] - bases[0]) * [1.0, 1.0, 0.0]
     start = np.arctan2(ahead[1], ahead[0]) if np.linalg.norm(ahead) > 1e-6 else 0.0
 
-    links = _link_origins(scene)
+    in_view = np.concatenate([_link_origins(scene), points, centres])
 
     def view(azimuth: float) -> Viewpoint:
         direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         right = np.cross([0.0, 0.0, 1.0], direction)
         reach = np.abs((np.concatenate([bases, points, centres]) - look_at) @ right).max() + margin
-        wide = np.abs((links - look_at) @ right).max()
-        high = np.abs((links - look_at)[:, 2]).max() * WIDEST
-        return Viewpoint(
-            look_at, direction, float(max(MIN_WIDTH, 2 * reach, 2 * AROUND_LINKS * max(wide, high)))
-        )
+        return Viewpoint(look_at, direction, float(max(MIN_WIDTH, 2 * reach)), in_view)
 
     def cost(view: Viewpoint) -> float:
         eye = view.camera(aspect=1.0)

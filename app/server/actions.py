@@ -119,12 +119,14 @@ class Actions:
         name, uploaded = state.robot.name, state.uploaded_robot
 
         def run(progress: Progress) -> BuiltScene:
+            opened = self._as_opened(state)
             if uploaded and option == uploaded.option:
-                return self._process.put_robot(state.scene, name, uploaded.entry, progress)
-            if option == OWN_ROBOT:
-                entry = self._as_opened(state).file.robots[list(state.scene.robots).index(name)]
-                return self._process.put_robot(state.scene, name, entry, progress)
-            return self._process.put_robot(state.scene, name, catalogue_robot(option), progress)
+                other = uploaded.entry
+            elif option == OWN_ROBOT:
+                other = opened.file.robots[list(state.scene.robots).index(name)]
+            else:
+                other = catalogue_robot(option)
+            return self._process.put_robot(state.scene, name, other, opened, progress)
 
         again = uploaded if uploaded and option == uploaded.option else None
         self._session.submit(
@@ -143,7 +145,9 @@ class Actions:
         def run(progress: Progress) -> tuple[BuiltScene, UploadedRobot]:
             folder = UploadFolder()
             option = f"{name[:MAX_NAME]} (upload)"
-            entry, built = self._process.read_robot(state.scene, robot, name, content, folder.path, progress)
+            entry, built = self._process.read_robot(
+                state.scene, robot, name, content, folder.path, self._as_opened(state), progress
+            )
             return built, UploadedRobot(option, entry, folder)
 
         def show(state: State, result: tuple[BuiltScene, UploadedRobot]) -> State:

@@ -37,7 +37,7 @@ def service() -> UploadService:
 
 
 def test_a_robot_of_the_catalogue_takes_the_place_of_another(service, bottle):
-    built = service.put_robot(bottle, "panda", IIWA, quiet)
+    built = service.put_robot(bottle, "panda", IIWA, bottle, quiet)
     scene = built.scene
     assert (list(scene.robots), scene.task().arms) == (["iiwa"], tuple(scene.arms))
     assert np.array_equal(scene.profile.points, bottle.profile.points)
@@ -53,9 +53,17 @@ def test_a_robot_of_the_catalogue_takes_the_place_of_another(service, bottle):
     assert np.allclose(*(np.arctan2(*(p - point)[:2]) for p in (old, new)))
 
 
+def test_where_a_robot_stands_does_not_depend_on_which_was_there_before(service, bottle):
+    ur5 = next(robot for robot in CATALOGUE if robot.name == "ur5")
+    changed = service.put_robot(bottle, "panda", ur5, bottle, quiet).scene
+    again = service.put_robot(changed, "ur5", IIWA, bottle, quiet).scene
+    at_once = service.put_robot(bottle, "panda", IIWA, bottle, quiet).scene
+    assert again.file.robots[0].base == at_once.file.robots[0].base
+
+
 def test_the_own_robot_comes_back_as_it_was(service, bottle):
-    changed = service.put_robot(bottle, "panda", IIWA, quiet).scene
-    again = service.put_robot(changed, "iiwa", bottle.file.robots[0], quiet).scene
+    changed = service.put_robot(bottle, "panda", IIWA, bottle, quiet).scene
+    again = service.put_robot(changed, "iiwa", bottle.file.robots[0], bottle, quiet).scene
     assert again.task().arms == ("panda",)
     entry = again.file.robots[0]
     assert entry.model_copy(update={"base": bottle.file.robots[0].base}) == bottle.file.robots[0]
@@ -64,12 +72,14 @@ def test_the_own_robot_comes_back_as_it_was(service, bottle):
 def test_names_that_are_taken_get_a_number(service):
     scene = Scene.load("handover_between_robots")
     first, second = scene.robots
-    changed = service.put_robot(scene, second, replace(IIWA, name=first), quiet)
+    changed = service.put_robot(scene, second, replace(IIWA, name=first), scene, quiet)
     assert list(changed.scene.robots) == [first, f"{first}_2"]
 
 
 def test_an_uploaded_robot_is_the_robot(service, bottle, tmp_path):
-    entry, built = service.read_robot(bottle, "panda", "my panda.zip", panda_archive(), tmp_path, quiet)
+    entry, built = service.read_robot(
+        bottle, "panda", "my panda.zip", panda_archive(), tmp_path, bottle, quiet
+    )
     arm, own = built.scene.arm(), bottle.arm()
     assert arm.joint_names == own.joint_names
     q = np.linspace(-0.5, 0.5, 7)
@@ -82,7 +92,7 @@ def test_an_uploaded_robot_is_the_robot(service, bottle, tmp_path):
 def test_a_saved_archive_opens_again_here_and_on_the_command_line(service, bottle, tmp_path):
     folder = tmp_path / "upload"
     folder.mkdir()
-    scene = service.read_robot(bottle, "panda", "p.zip", panda_archive(), folder, quiet)[1].scene
+    scene = service.read_robot(bottle, "panda", "p.zip", panda_archive(), folder, bottle, quiet)[1].scene
     content = scene_archive(scene, "mine.yaml", [folder])
     there = tmp_path / "there"
     unpack("mine.zip", content, there)
@@ -105,7 +115,9 @@ def test_a_robot_refers_to_no_file_of_the_server(reference, service, bottle, tmp
     urdf = (PANDA / "panda.urdf").read_text(encoding="utf-8")
     urdf = re.sub(r'filename="[^"]*"', f'filename="{reference}"', urdf)
     with pytest.raises(InputError, match="a file of the archive, or of an installed package"):
-        service.read_robot(bottle, "panda", "p.zip", pack([("a.urdf", urdf.encode())]), tmp_path, quiet)
+        service.read_robot(
+            bottle, "panda", "p.zip", pack([("a.urdf", urdf.encode())]), tmp_path, bottle, quiet
+        )
 
 
 @pytest.mark.parametrize(
@@ -122,7 +134,7 @@ def test_a_robot_refers_to_no_file_of_the_server(reference, service, bottle, tmp
 )
 def test_what_is_no_robot_is_refused_in_one_line(files, expected, service, bottle, tmp_path):
     with pytest.raises(SymgraspError, match=expected) as caught:
-        service.read_robot(bottle, "panda", "p.zip", pack(files.items()), tmp_path, quiet)
+        service.read_robot(bottle, "panda", "p.zip", pack(files.items()), tmp_path, bottle, quiet)
     assert "\n" not in str(caught.value)
 
 

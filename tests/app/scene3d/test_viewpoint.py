@@ -79,8 +79,8 @@ def test_a_view_that_begins_with_a_camera_has_the_flat_map_towards_it(server, an
     assert front_towards(view_of(server, (*eye, 0.5, 0.0, 0.1)), eye) > 0.9
 
 
-@pytest.mark.parametrize("name", PLAIN)
-@pytest.mark.parametrize("aspect", [472 / 800, 840 / 800])
+@pytest.mark.parametrize("name", [*PLAIN, "pr2_pour"])
+@pytest.mark.parametrize("aspect", [472 / 800, 840 / 800, 1600 / 800])
 def test_every_robot_and_every_task_is_in_the_picture(name, aspect):
     scene = Scene.load(name)
     pose = scene.task().T_world_object
@@ -90,11 +90,17 @@ def test_every_robot_and_every_task_is_in_the_picture(name, aspect):
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     middle = [0.0, 0.0, (scene.profile.h_min + scene.profile.h_max) / 2, 1.0]
-    points = [robot.T_world_base[:3, 3] for robot in scene.robots.values()]
+    points = [
+        (robot.T_world_base @ pose)[:3, 3]
+        for robot in scene.robots.values()
+        for pose in robot.model.forward(robot.home)
+    ]
     points += [(task.T_world_object @ middle)[:3] for task in scene.tasks.values()]
-    edge = aspect * np.tan(FIELD_OF_VIEW / 2)
+    edge = np.tan(FIELD_OF_VIEW / 2)
     for point in points:
-        assert abs((point - eye) @ right) < edge * ((point - eye) @ forward)
+        depth = (point - eye) @ forward
+        assert abs((point - eye) @ right) < aspect * edge * depth
+        assert abs((point - eye) @ np.cross(right, forward)) < edge * depth
 
 
 @pytest.mark.parametrize("name", PLAIN)
