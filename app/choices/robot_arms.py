@@ -36,12 +36,16 @@ def tool_link(scene: Scene, name: str) -> str:
 
 
 def tool_links(scene: Scene, name: str) -> tuple[str, ...]:
-    """Return the links of an arm that a hand may be on: those that its last joint moves, and no later one."""
-    arm = scene.arms[name]
-    model, last, found = arm.robot.model, arm.joint_names[-1], []
+    """Return the links of an arm that a hand may be on: those that its last joint moves, and no later one.
+
+    They are links of the robot's own URDF.
+    """
+    arm, mount = scene.arms[name], arm_file(scene, name).mount
+    model, last, hand = arm.robot.model, arm.joint_names[-1], arm.hand
+    added = {*hand.links, arm.tool} if mount else {arm.tool} if hand.tool and not hand.tool.is_link else set()
+    used, found = tool_link(scene, name), []
     for link in model.link_names:
         moved_by = [joint.name for joint in model.chain(link) if joint.source >= 0]
-        if moved_by and moved_by[-1] == last and not set(arm.hand.touch_links) & {link}:
+        if moved_by and moved_by[-1] == last and link not in added | set(hand.touch_links):
             found.append(link)
-    used = tool_link(scene, name)
     return tuple(found) if used in found else (used, *found)

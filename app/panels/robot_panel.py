@@ -31,7 +31,7 @@ class RobotPanel(Panel):
             )
             self.on_select(self.robot, actions.choose_robot)
             self.upload = self.upload_button(
-                "Upload a robot (ZIP or URDF)", ARCHIVE_LIMIT, actions.upload_robot,
+                "Upload a robot", ARCHIVE_LIMIT, actions.upload_robot,
                 mime_type=".zip,.urdf",
                 hint=f"A ZIP file of a URDF with its meshes, or a URDF without any; at most "
                 f"{ARCHIVE_LIMIT / 1e6:g} MB",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -26,11 +27,11 @@ MIN_WIDTH = 1.3
 WIDEST = 1.1
 """Ratio of width to height above which a wider view shows no more from bottom to top."""
 
-NARROWEST = 0.35
+NARROWEST = 0.25
 """Ratio of width to height below which a narrower view is not seen from further away."""
 
-AROUND_LINKS = 1.15
-"""How much further away the camera is than it has to be for the origins of links to be in view."""
+AROUND_LINKS = 1.05
+"""How much further away the camera is than it has to be for all links to be in view."""
 
 STEEP = 1e-3
 """A camera nearer (m) than this to the vertical through the point it looks at has no azimuth."""
@@ -111,7 +112,7 @@ def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
         ahead = (bases[-1] - bases[0]) * [1.0, 1.0, 0.0]
     start = np.arctan2(ahead[1], ahead[0]) if np.linalg.norm(ahead) > 1e-6 else 0.0
 
-    in_view = np.concatenate([_link_origins(scene), points, centres])
+    in_view = np.concatenate([_corners(scene), points, centres])
 
     def view(azimuth: float) -> Viewpoint:
         direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -127,10 +128,19 @@ def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     return min((view(start + a) for a in AZIMUTHS), key=cost)
 
 
-def _link_origins(scene: Scene) -> Array:
-    """Return the origins (n, 3) of all links of all robots at home, in the world."""
-    poses = [robot.T_world_base @ robot.model.forward(robot.home) for robot in scene.robots.values()]
-    return np.concatenate([pose[:, :3, 3] for pose in poses])
+def _corners(scene: Scene) -> Array:
+    """Return the corners (n, 3) of boxes around the links of all robots at home, in the world."""
+    corners = []
+    for robot in scene.robots.values():
+        model, poses = robot.model, robot.T_world_base @ robot.model.forward(robot.home)
+        corners.append(poses[:, :3, 3])
+        for link, pose in zip(model.link_names, poses, strict=True):
+            for hull in model.hulls(link):
+                ends = np.array(
+                    list(itertools.product(*np.stack([hull.min(axis=0), hull.max(axis=0)], axis=1)))
+                )
+                corners.append(ends @ pose[:3, :3].T + pose[:3, 3])
+    return np.concatenate(corners)
 
 
 def stand_around(scene: Scene, T_world_object: Array) -> bool:

@@ -22,6 +22,7 @@ from .state import Pick, State
 from .task_list import TaskList
 
 __all__ = [
+    "GIZMO_NOISE",
     "add_task",
     "change_tasks",
     "choose",
@@ -43,6 +44,7 @@ __all__ = [
     "switched",
     "toggled",
     "turn",
+    "without_plan",
 ]
 
 GIZMO_NOISE = 1e-6

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from symgrasp.errors import InputError, one_of
 from symgrasp.poses import Array
 from symgrasp.scene.replacing import with_base
 
 from ..choices.robot_choice import OWN_ROBOT, UploadedRobot
 from ..choices.scene_assets import BuiltScene
-from .changes import without_plan
+from .changes import GIZMO_NOISE, without_plan
 from .object_pose import ObjectPose
 from .state import State
 
@@ -75,6 +77,8 @@ def rearmed(state: State, built: BuiltScene, arm: str) -> State:
 
 def robot_put_at(state: State, name: str, pose: ObjectPose) -> State:
     """Put a robot to a pose of its root link, given as a position, a lean and a turn."""
+    if np.allclose(pose.matrix(), state.scene.robots[name].T_world_base, rtol=0, atol=GIZMO_NOISE):
+        return state
     return replace(without_plan(state), scene=with_base(state.scene, name, pose.matrix()))
 
 

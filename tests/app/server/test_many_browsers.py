@@ -188,7 +188,7 @@ def turns_of(browser: Wire) -> str:
 def test_a_file_that_is_too_large_is_refused_when_it_is_announced(port):
     with Wire(port) as browser:
         browser.wait_for(ready)
-        scenes = {"Open a scene (YAML or ZIP)": 50, "Upload a robot (ZIP or URDF)": 50}
+        scenes = {"Open a scene (YAML or ZIP)": 50, "Upload a robot": 50}
         for label, limit in {"Upload a mesh": 20, "Open a plan": 5, **scenes}.items():
             uuid = next(uuid for uuid, w in browser.widgets.items() if w.get("label") == label)
             browser.send(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.choices.robot_arms import tool_links
 from app.choices.robot_choice import OWN_ROBOT, installed_robots
 from app.choices.scene_assets import BuiltScene, UploadFolder
 from app.files.links import Link
@@ -66,6 +67,23 @@ def test_only_the_robot_of_the_chosen_arm_moves(scene):
         np.allclose(r.T_world_base, after.scene.robots[n].T_world_base) for n, r in again.robots.items()
     )
     assert again.map_sha256 == after.scene.map_sha256
+
+
+def test_a_robot_that_is_let_go_where_it_was_has_not_moved(scene):
+    state = State.of(scene, "handover_between_robots")
+    pose = state.robot.T_world_base.copy()
+    pose[:3, 3] += 1e-8  # browsers send rounded numbers
+    assert robot_changes.robot_dragged(state, pose) is state
+    assert robot_changes.place_robot(state, x=ObjectPose.of(state.robot.T_world_base).x) is state
+
+
+def test_a_hand_is_put_on_links_of_the_robot_alone():
+    """Not on the frame that a hand is given at its tips, nor on a hand that is mounted."""
+    mounted = Scene.load("ur5_bottle")
+    (name,) = mounted.arms
+    assert "tool0" in tool_links(mounted, name)
+    assert not set(tool_links(mounted, name)) & {*mounted.arm().hand.links, mounted.arm().tool}
+    assert tool_links(Scene.load("pr2_pour"), "left")[-1] == "l_gripper_tool_frame"
 
 
 def test_tool_poses_move_with_the_base(scene):
