@@ -13,6 +13,7 @@ from symgrasp.hands.structure import find_hand_structure, jaw_candidates, palm_c
 from symgrasp.references import resolve
 from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
+from symgrasp.robot.groups import ArmGroup, arm_groups, group_links
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
 
@@ -41,6 +42,7 @@ class FoundArm:
         named: whether the hand is a named one with a URDF of its own, to be mounted on the tool.
         mount: where it is mounted: position (m) and roll, pitch and yaw (degrees).
         trouble: what is wrong with the hand or the joints; empty where nothing is.
+        source: the group of an SRDF that says so; empty where the arm is a guess.
     """
 
     name: str
@@ -51,6 +53,7 @@ class FoundArm:
     named: bool = False
     mount: tuple[tuple[float, float, float], tuple[float, float, float]] = ((0, 0, 0), (0, 0, 0))
     trouble: str = ""
+    source: str = ""
 
 
 def in_catalogue(model: RobotModel) -> CatalogueRobot | None:
@@ -63,7 +66,7 @@ def in_catalogue(model: RobotModel) -> CatalogueRobot | None:
 
 
 def find_arms(model: RobotModel) -> list[FoundArm]:
-    """Return the arms of a robot: those of the catalogue, else those with hands, else all long chains.
+    """Return the arms of a robot: of the catalogue, else of the SRDF, else those with hands or long chains.
 
     An arm without a hand that can be measured gets a gripper, the WSG 50, mounted on its last link. The only
     arm of a robot is called what the robot is, where that is a plain word.
@@ -73,12 +76,45 @@ def find_arms(model: RobotModel) -> list[FoundArm]:
         found = [_known_arm(model, arm) for arm in known.arms]
         return found if len(found) != 1 else [_renamed(found[0], known.name)]
     arms = (
-        _with_hands(model, palm_candidates(model))
+        _arms_of_groups(model)
+        or _with_hands(model, palm_candidates(model))
         or _with_hands(model, jaw_candidates(model))
         or [_arm(model, link, mounted=True) for link in _ends(model)]
     )
     name = model.name if re.fullmatch(r"\w{1,50}", model.name) else "arm"
     return arms if len(arms) != 1 else [_renamed(arms[0], name)]
+
+
+def _arms_of_groups(model: RobotModel) -> list[FoundArm]:
+    """Return the arms that the groups of the SRDF are, with the hands that its end effectors are."""
+    groups = [
+        group for group in arm_groups(model) if not (_is_leg(model, group.tip) or _names_leg(group.name))
+    ]
+    return [_arm_of_group(model, group) for group in groups]
+
+
+def _arm_of_group(model: RobotModel, group: ArmGroup) -> FoundArm:
+    """Return the arm that a group is: with its end effector or what is at its tip, or a WSG 50 mounted."""
+    effector, places = group.end_effector, [group.tip]
+    if effector is not None:
+        places = [effector.parent_link, *group_links(model, effector.group), group.tip]
+    tool, hand, named, trouble = group.tip, HANDS["wsg50"], True, ""
+    for place in places:
+        if place not in model.link_names or group.joints[-1] not in [j.name for j in model.chain(place)]:
+            continue  # it is part of the arm
+        try:
+            tool = find_hand_structure(model, place).base
+        except SymgraspError:
+            continue  # there are no fingers
+        found, trouble = _measured(model, tool)
+        hand, named = (hand, True) if found is None else (found, False)
+        break
+    tool = group.tip if named else tool
+    resting = [name for name in revolute_joints(model, tool) if name not in (*group.joints, *hand.joints)]
+    source = f"group {group.name} of {model.srdf.path.name}" if model.srdf else ""
+    return FoundArm(
+        group.name, tool, group.joints, tuple(resting), hand, named, trouble=trouble, source=source
+    )
 
 
 def _with_hands(model: RobotModel, palms: Iterable[str]) -> list[FoundArm]:
@@ -154,5 +190,8 @@ def _ends(model: RobotModel) -> Iterator[str]:
 
 
 def _is_leg(model: RobotModel, link: str) -> bool:
-    names = [link, *(joint.name for joint in model.chain(link)[-1:])]
-    return any(word in name.lower() for word in LEGS for name in names)
+    return any(map(_names_leg, [link, *(joint.name for joint in model.chain(link)[-1:])]))
+
+
+def _names_leg(name: str) -> bool:
+    return any(word in name.lower() for word in LEGS)

@@ -100,7 +100,8 @@ def _write_scene(out: Path, content: dict[str, Any], arm: str) -> None:
 def _say_arm(arm: FoundArm) -> None:
     """Print the joints and the hand of an arm."""
     if arm.joints:
-        say(f"  arm {arm.name}: {len(arm.joints)} joints, {arm.joints[0]} to {arm.joints[-1]}")
+        source = f", {arm.source}" if arm.source else ""
+        say(f"  arm {arm.name}: {len(arm.joints)} joints, {arm.joints[0]} to {arm.joints[-1]}{source}")
     else:
         say(f"  arm {arm.name}")
     if arm.resting:

@@ -1,18 +1,55 @@
-"""What the semantic description of a robot (SRDF) says: links that may touch, and states to park it in."""
+"""What the semantic description of a robot (SRDF) says.
+
+These are links that may touch, states to park it in, and which joints and links are arms and hands.
+"""
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from symgrasp.errors import UrdfError
 from symgrasp.robot.xacro_file import is_xacro
 from symgrasp.robot.xml_file import read_xml
 
-__all__ = ["Srdf", "find_srdf", "read_srdf", "srdf_text"]
+__all__ = ["EndEffector", "Group", "Srdf", "find_srdf", "read_srdf", "srdf_text"]
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of an SRDF.
+
+    Attributes:
+        joints: joints that it names.
+        links: links that it names, each with the joint that it hangs on.
+        chains: first and last link of its chains, whose joints are those between them.
+        groups: groups that it is made of.
+    """
+
+    joints: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+    chains: tuple[tuple[str, str], ...] = ()
+    groups: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class EndEffector:
+    """A hand.
+
+    Attributes:
+        name: its name.
+        parent_link: the link that it is on.
+        group: the group of its links and joints.
+        parent_group: the group of the arm that it is on; empty where none is named.
+    """
+
+    name: str
+    parent_link: str
+    group: str
+    parent_group: str
 
 
 @dataclass(frozen=True)
@@ -23,11 +60,15 @@ class Srdf:
         path: the file.
         disabled: pairs of links whose collisions are not checked.
         states: name → joint → value (rad or m), the groups of one name joined.
+        groups: name → group.
+        end_effectors: the hands.
     """
 
     path: Path
     disabled: frozenset[frozenset[str]]
     states: Mapping[str, Mapping[str, float]]
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    end_effectors: tuple[EndEffector, ...] = ()
 
 
 def find_srdf(urdf: Path) -> Path | None:
@@ -72,11 +113,24 @@ def read_srdf(path: Path) -> Srdf:
             if not math.isfinite(value):
                 raise UrdfError(path, where, numbers[0], "a number")
             values[joint.get("name", "")] = value
-    return Srdf(path, frozenset(disabled), states)
+    groups = {group.get("name", ""): _group(group) for group in root.iterfind("group")}
+    effectors = [
+        EndEffector(*(e.get(key, "") for key in ("name", "parent_link", "group", "parent_group")))
+        for e in root.iterfind("end_effector")
+    ]
+    return Srdf(path, frozenset(disabled), states, groups, tuple(effectors))
+
+
+def _group(group: ET.Element) -> Group:
+    joints, links, groups = (
+        tuple(part.get("name", "") for part in group.iterfind(tag)) for tag in ("joint", "link", "group")
+    )
+    chains = [(chain.get("base_link", ""), chain.get("tip_link", "")) for chain in group.iterfind("chain")]
+    return Group(joints, links, tuple(chains), groups)
 
 
 def srdf_text(srdf: Srdf) -> bytes:
-    """Return an SRDF as the text of a file, which `read_srdf` reads as the same."""
+    """Return links that may touch and states of an SRDF as the text of a file."""
     root = ET.Element("robot", name=srdf.path.stem)
     for pair in sorted(sorted(pair) for pair in srdf.disabled):
         ET.SubElement(root, "disable_collisions", link1=pair[0], link2=pair[-1])

@@ -11,6 +11,7 @@ from symgrasp.poses import Array
 from symgrasp.references import resolve
 from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
 from symgrasp.robot.assembly import Mount
+from symgrasp.robot.groups import arm_group
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
@@ -91,7 +92,10 @@ class RobotBuilder:
             if a.joints is None and resting:
                 ends = (joints[k][0], joints[k][-1])
                 files = (*files[:k], a.model_copy(update={"joints": ends}), *files[k + 1 :])
-                notes.append(f"{a.name}: joints: [{', '.join(ends)}]; {', '.join(resting)} rest at home")
+                group = arm_group(model, joints[k])
+                source = f", group {group.name} of the SRDF" if group else ""
+                rest = f"{', '.join(resting)} rest at home"
+                notes.append(f"{a.name}: joints: [{', '.join(ends)}]{source}; {rest}")
         home = self._home(f"{field}.home", entry, model, [name for names in joints for name in names], hands)
         base = entry.base.matrix()
         support = self._support(field, entry, model, home, base)
@@ -190,7 +194,9 @@ class RobotBuilder:
     ) -> list[str]:
         """Return the names of an arm's joints: as the file names them, or guessed."""
         if arm.joints is None:
-            return guess_arm_joints(model, tool, shared | frozenset(hand.joints))
+            others = shared | frozenset(hand.joints)
+            group = arm_group(model, [name for name in revolute_joints(model, tool) if name not in others])
+            return list(group.joints) if group else guess_arm_joints(model, tool, others)
         field = f"{field}.joints"
         try:
             names = joints_between(model, tool, *arm.joints)
