@@ -7,6 +7,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
 from symgrasp.errors import UrdfError
@@ -79,11 +80,21 @@ class FingerFit(NamedTuple):
 def best_fit(gripper: Gripper, palm: Sequence[str], tool: str | None) -> FingerFit:
     """Return the part of the fingers' motion with which they open and close the most.
 
-    Some joints open fingers until they point away from each other, or close them until they cross.
+    Some joints open fingers until they point away from each other, or close them until they cross. Where they
+    hold nothing at the tool link, the tool frame is where they do.
 
     Raises:
         UrdfError: in no part of it the fingers hold anything.
     """
+    try:
+        return _best_fit(gripper, palm, tool)
+    except UrdfError:
+        if tool is None:
+            raise
+        return _best_fit(gripper, palm, None)
+
+
+def _best_fit(gripper: Gripper, palm: Sequence[str], tool: str | None) -> FingerFit:
     best, found, problem = 0.0, None, None
     for start, end in product(STARTS, ENDS):
         part = gripper._replace(motion=gripper.motion.part(start, end))
@@ -201,13 +212,10 @@ def _finger_depth(gripper: Gripper, T_base_tool: Array, palm: Sequence[Array], f
         )
     depths = np.linspace(deepest, LEAST_DEPTH, SAMPLES)
     sides = [gripper.outline(side, 1.0, T_base_tool) for side in (0, 1)]
-    held = np.array([min(min(held_radius(s, depth), _reach(s, depth)) for s in sides) for depth in depths])
+    held = np.min([np.minimum(held_radius(s, depths), _reach(s, depths)) for s in sides], axis=0)
     if palm:
         behind = outline(palm, 1.0)
-        room = [
-            behind.distance(max(0.0, r - depth)) >= r + PALM_CLEARANCE - ROUNDING
-            for r, depth in zip(held, depths, strict=True)
-        ]
+        room = behind.distance(np.maximum(0.0, held - depths)) >= held + PALM_CLEARANCE - ROUNDING
         held = np.where(room, held, 0.0)
     return float(depths[np.argmax(held >= held.max() - NARROWER / 2)])
 
@@ -230,6 +238,12 @@ def openings_of(fit: FingerFit, samples: int) -> tuple[Array, Array]:
     outlines = [[gripper.outline(side, t, T_base_tool) for t in steps] for side in (0, 1)]
     radii = np.array([[held_radius(outline, depth) for outline in side] for side in outlines])
     reach = np.array([[_reach(outline, depth) for outline in side] for side in outlines])
+    around = reach.min(axis=0)
+    if (radii.min(axis=0) > around).all():
+        expected = f"less: they reach around {2e3 * around.max():.0f}"
+        raise UrdfError(
+            motion.model.path, "hand: room between the fingers (mm)", round(2e3 * radii.min()), expected
+        )
     moved = [motion.moves(links) for links in gripper.sides]
     if not (moved[0] & moved[1]).any():
         ranges = [_growing(steps, *side) for side in zip(radii, reach, strict=True)]
@@ -238,9 +252,11 @@ def openings_of(fit: FingerFit, samples: int) -> tuple[Array, Array]:
         own = [np.interp(held, r, t)[:, None] for t, r in ranges]
         t = np.where(moved[0], *own)
     else:
-        t, held = _growing(steps, radii.min(axis=0), reach.min(axis=0))
+        t, held = _growing(steps, radii.min(axis=0), around)
         within = (steps >= t[0]) & (steps <= t[-1])
-        apart = float(np.abs(radii[0] - radii[1])[within].max(initial=0.0))
+        # What is thicker than they reach around is not held, whatever room one of them leaves for it.
+        room = np.minimum(radii, around)
+        apart = float(np.abs(room[0] - room[1])[within].max(initial=0.0))
         if apart > OFF_CENTRE:
             where, expected = (
                 "hand: how far one finger is ahead of the other (mm)",
@@ -258,12 +274,12 @@ def openings_of(fit: FingerFit, samples: int) -> tuple[Array, Array]:
     return 2 * held, motion.joint_values(t)
 
 
-def _reach(side: Outline, depth: float) -> float:
-    """Return the radius (m) of the thickest object whose axis is no further out than the tips of the fingers.
+def _reach(side: Outline, depth: ArrayLike) -> Array:
+    """Return the radii (...) (m) of the thickest objects with axes no further out than the tips of fingers.
 
     From fingers that end behind its axis an object would slip.
     """
-    return depth + side.reach if side.reach > 0 else 0.0
+    return np.asarray(depth) + side.reach if side.reach > 0 else np.zeros_like(depth)
 
 
 def _growing(steps: Array, radii: Array, reach: Array) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
 from symgrasp.poses import Array
@@ -19,7 +20,7 @@ __all__ = ["Outline", "held_radius", "outline"]
 LARGEST_RADIUS = 1.0
 """Radii up to this (m) are looked for."""
 
-HALVINGS = 40
+HALVINGS = 30
 """Bisections of a radius: its error is `LARGEST_RADIUS` times two to the power of minus this."""
 
 
@@ -44,13 +45,13 @@ class Outline:
         self.reach = float(self.starts[:, 1].max())
         self.covers_origin = any(_left_of_all(polygon) for polygon in corners)
 
-    def distance(self, z: float) -> float:
-        """Return the distance (m) of the edges from the point (0, z)."""
-        along = self.ends - self.starts
-        to_point = np.array([0.0, z]) - self.starts
-        share = np.einsum("ij,ij->i", to_point, along) / np.einsum("ij,ij->i", along, along)
-        foot = self.starts + np.clip(share, 0, 1)[:, None] * along
-        return float(np.hypot(foot[:, 0], foot[:, 1] - z).min())
+    def distance(self, z: ArrayLike) -> Array:
+        """Return the distances (...) (m) of the edges from the points (0, z), z (...)."""
+        z = np.asarray(z, dtype=float)[..., None]
+        (y0, z0), (along_y, along_z) = self.starts.T, (self.ends - self.starts).T
+        share = ((z - z0) * along_z - y0 * along_y) / (along_y**2 + along_z**2)
+        share = np.clip(share, 0, 1)
+        return np.hypot(y0 + share * along_y, z0 + share * along_z - z).min(axis=-1)
 
 
 def outline(hulls: Sequence[Array], outwards: float) -> Outline:
@@ -69,23 +70,22 @@ def _left_of_all(polygon: Array) -> bool:
     return bool((x0 * y1 - x1 * y0 >= 0).all())
 
 
-def held_radius(side: Outline, depth: float) -> float:
-    """Return the radius (m) of the largest object that one side of a hand leaves room for.
+def held_radius(side: Outline, depth: ArrayLike) -> Array:
+    """Return the radii (...) (m) of the largest objects that one side of a hand leaves room for.
 
     Discs with their backs at the same depth lie inside each other, so a disc is free of the outline as long
     as its centre is further than its radius from every edge.
 
     Args:
         side: the outline of the fingers of that side.
-        depth: how far (m) an object may reach behind the tool frame.
+        depth: how far (...) (m) an object may reach behind the tool frame.
     """
-    low, high = 0.0, LARGEST_RADIUS
+    depth = np.asarray(depth, dtype=float)
+    low, high = np.zeros_like(depth), np.full_like(depth, LARGEST_RADIUS)
     if side.covers_origin:
         return low
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if side.distance(max(0.0, middle - depth)) >= middle:
-            low = middle
-        else:
-            high = middle
+        free = side.distance(np.maximum(0.0, middle - depth)) >= middle
+        low, high = np.where(free, middle, low), np.where(free, high, middle)
     return low

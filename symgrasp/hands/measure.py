@@ -13,7 +13,7 @@ from symgrasp.errors import UrdfError, printable
 from symgrasp.hands.finger_fit import SAMPLES, TABLE_ERROR, best_fit, openings_of
 from symgrasp.hands.gripper import FingerMotion, find_gripper
 from symgrasp.hands.jaw import fit_jaw
-from symgrasp.hands.structure import HandStructure, find_hand_structure, links_with_shapes
+from symgrasp.hands.structure import HandStructure, check_fingers, find_hand_structure, links_with_shapes
 from symgrasp.hands.thumb import find_thumb
 from symgrasp.object.measure.outline import simplify
 from symgrasp.poses import Array, inverse, quat_wxyz, rpy
@@ -35,13 +35,15 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
         urdf: the hand's URDF, or that of a robot with the hand on it: loaded, a path, or
             ``package://<package>/<path>``.
         tool: a link fixed to the palm, needed where a robot has several hands or only one jaw turns. Where
-            its origin lies in front of the palm, it becomes that of the tool frame; the axes are measured.
+            its origin lies in front of the palm, and the fingers hold objects there, it becomes that of the
+            tool frame; the axes are measured.
 
     Raises:
         UrdfError: the URDF is unusable, there is no such link, or no part opens and closes like a hand.
     """
     model = urdf if isinstance(urdf, RobotModel) else _load(urdf)
     structure = find_hand_structure(model, tool)
+    check_fingers(model, structure)
     if len(structure.fingers) == 1:
         return _jaw_hand(model, structure, tool)
     gripper = find_thumb(model, structure) or find_gripper(model, structure)

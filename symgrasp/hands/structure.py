@@ -5,10 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from scipy.spatial import ConvexHull
+
 from symgrasp.errors import UrdfError, one_of
+from symgrasp.poses import Array
 from symgrasp.robot.model import RobotModel
 
-__all__ = ["HandStructure", "find_hand_structure", "jaw_candidates", "links_with_shapes", "palm_candidates"]
+__all__ = [
+    "HandStructure",
+    "check_fingers",
+    "find_hand_structure",
+    "jaw_candidates",
+    "links_with_shapes",
+    "palm_candidates",
+]
+
+LARGEST_GAP = 0.015
+"""Largest distance (m) between the shapes of successive links of a finger."""
 
 
 class HandStructure(NamedTuple):
@@ -126,6 +139,41 @@ def _innermost(
 ) -> list[str | None]:
     """Return the groups without those whose "fingers" carry fingers themselves: the torso is no palm."""
     return [m for m, fs in hands.items() if not any(group[link] in hands for f in fs for link in f)]
+
+
+def check_fingers(model: RobotModel, structure: HandStructure) -> None:
+    """Check that every finger is in one piece: shapes that lie elsewhere than their links measure nothing.
+
+    Raises:
+        UrdfError: a link of a finger is far from the one that it hangs on.
+    """
+    poses = model.forward(model.default_values())
+    placed = {
+        link: [points @ poses[k][:3, :3].T + poses[k][:3, 3] for points in model.hulls(link)]
+        for finger in structure.fingers
+        for link in links_with_shapes(model, finger)
+        for k in [model.link_index(link)]
+    }
+    for finger in structure.fingers:
+        for link in finger:
+            before = [name for name in _above(model, link) if name in finger and name in placed]
+            if link not in placed or not before:
+                continue
+            gap = min(max(_apart(a, b), _apart(b, a)) for a in placed[link] for b in placed[before[-1]])
+            if gap > LARGEST_GAP:
+                where = f"hand: gap between the shapes of {before[-1]} and {link} (mm)"
+                raise UrdfError(model.path, where, round(1e3 * gap, 1), "fingers in one piece")
+
+
+def _above(model: RobotModel, link: str) -> list[str]:
+    """Return the links from the root to the one that a link hangs on."""
+    return [model.link_names[joint.parent] for joint in model.chain(link)]
+
+
+def _apart(a: Array, b: Array) -> float:
+    """Return how far (m) the faces of a convex hull of points (n, 3) at least part it from others (m, 3)."""
+    planes = ConvexHull(a).equations
+    return float((b @ planes[:, :3].T + planes[:, 3]).min(axis=0).max())
 
 
 def links_with_shapes(model: RobotModel, *links: Iterable[str]) -> tuple[str, ...]:

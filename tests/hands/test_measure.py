@@ -103,7 +103,7 @@ directions = st.permutations([0, 1, 2]).flatmap(
         }
     ),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=16, deadline=None)
 def test_a_hand_of_boxes_is_measured_as_it_was_built(tmp_path_factory, axes, opens, sizes):
     path = tmp_path_factory.mktemp("hand") / "boxes.urdf"
     path.write_text(box_hand(axes, opens, sizes))
@@ -176,17 +176,25 @@ def test_of_several_hands_one_must_be_named(tmp_path):
     assert hand.urdf is None  # it comes with the robot
     assert hand.tool is not None
     assert hand.tool.position == pytest.approx((0, 0, 0.1))  # the palm's own origin is no place for it
-    with pytest.raises(UrdfError, match="two or more fingers hang on"):
+    with pytest.raises(UrdfError, match="fingers or a jaw hang on"):
         measure_hand(RobotModel(path), "other_one")
+
+
+PIECES = (
+    f"<link name='tip'>{box(np.full(3, 0.01), np.zeros(3))}</link><joint name='off' type='fixed'>"
+    "<parent link='one'/><child link='tip'/><origin xyz='0 0 0.165'/></joint></robot>"
+)
+"""A finger tip that is 50 mm beyond the finger."""
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("type='prismatic'", "type='fixed'"), "a palm with two or more moving fingers"),
+        (("type='prismatic'", "type='fixed'"), "two or more fingers, or --tool"),
         (("lower='0' upper='0.009'", "lower='0' upper='0'"), "joints that part the fingers"),
         ((r"xyz='0 (-?)1 0'", r"xyz='\g<1>1 0 0'"), "fingers that part as their joints move"),
         (("type='prismatic'", "type='continuous'"), "joints, with limits"),
+        (("</robot>", PIECES), "gap between the shapes of one and tip .mm.: 50.0"),
     ],
 )
 def test_what_is_no_parallel_hand(change, message, tmp_path):
