@@ -16,16 +16,15 @@ at some value.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.compiling import njit
+from symgrasp.compiling import ENTRY, njit
+from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
 
 __all__ = ["Problem", "explore"]
-
-PLAIN: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 
 WORD = 64
 """Bits of a word."""
@@ -68,8 +67,33 @@ class _Sets(NamedTuple):
     gaps_made: np.ndarray
 
 
-@njit(**PLAIN)
-def explore(problem, floor, ceiling, improve, cells):
+class _Memory(NamedTuple):
+    """What a search writes to, for n holds, L lines, S stations, T values of a torso, and sets of W words.
+
+    Attributes:
+        sets: the columns above the floor.
+        at: (n,) where in its order a hold is.
+        columns: (n, W) the columns of that line still to be tried.
+        allowed: (n, n, L, W) by depth: the columns that earlier holds allow the later ones.
+        turns: (n + 1, S, T, W) by depth: the turns that they leave each station.
+        left: (W,) scratch.
+        reached: (n + 1,) by depth: what they reach.
+        place: (n, 2) line and column of each hold.
+    """
+
+    sets: _Sets
+    at: np.ndarray
+    columns: np.ndarray
+    allowed: np.ndarray
+    turns: np.ndarray
+    left: np.ndarray
+    reached: Array
+    place: np.ndarray
+
+
+def explore(
+    problem: Problem, floor: float, ceiling: float, improve: bool, cells: np.ndarray
+) -> tuple[int, float]:
     """Find placements whose score is above a floor and below a ceiling.
 
     Args:
@@ -82,23 +106,46 @@ def explore(problem, floor, ceiling, improve, cells):
     Returns:
         How many were found (at most m, or 1 where the best is sought), and the last one's score.
     """
+    return _explore(problem, float(floor), float(ceiling), improve, cells, _new_memory(problem))
+
+
+def _new_memory(problem: Problem) -> _Memory:
+    """Return the memory of a search that has not begun."""
     holds, lines = problem.order.shape
-    angles, stations, torsos = problem.gaps.shape[1], problem.part.shape[1], problem.margins.shape[1]
+    angles, stations = problem.gaps.shape[1], problem.part.shape[1]
+    parts, torsos = problem.margins.shape[:2]
     words = (angles + WORD - 1) // WORD
-    sets, made = _new_sets(problem, words), 0
-    # By depth: where in its order a hold is, and the columns of that line still to be tried; the
-    # columns that earlier holds allow it; the turns that they leave each station; what they reach.
-    at = np.full(holds, -1)
-    columns = np.zeros((holds, words), np.uint64)
-    allowed = np.empty((holds, holds, lines, words), np.uint64)
-    turns = np.empty((holds + 1, stations, torsos, words), np.uint64)
-    left = np.empty(words, np.uint64)
-    reached = np.full(holds + 1, np.inf)
-    place = np.zeros((holds, 2), np.int64)
-    for w in range(words):
-        allowed[0, 0, :, w] = 1 if w == 0 else 0
-        allowed[0, 1:, :, w] = _full(angles, w)
-        turns[0, :, :, w] = _full(angles, w)
+    count, double = parts * torsos * lines, 2 * words + 1
+    all_columns = np.full(words, ~np.uint64(0))
+    all_columns[-1] >>= np.uint64(WORD * words - angles)
+    memory = _Memory(
+        _Sets(
+            np.empty((count, double), np.uint64),
+            np.full(count, -1),
+            np.empty((len(problem.gaps), double), np.uint64),
+            np.full(len(problem.gaps), -1),
+        ),
+        at=np.full(holds, -1),
+        columns=np.zeros((holds, words), np.uint64),
+        allowed=np.empty((holds, holds, lines, words), np.uint64),
+        turns=np.empty((holds + 1, stations, torsos, words), np.uint64),
+        left=np.empty(words, np.uint64),
+        reached=np.full(holds + 1, np.inf),
+        place=np.zeros((holds, 2), np.int64),
+    )
+    # Turning all of them changes nothing, so the first has column 0.
+    memory.allowed[0, 0] = np.arange(words) == 0
+    memory.allowed[0, 1:] = all_columns
+    memory.turns[0] = all_columns
+    return memory
+
+
+@njit(**ENTRY)
+def _explore(problem, floor, ceiling, improve, cells, memory):
+    """Do what `explore` does, in memory that `_new_memory` returned."""
+    holds, lines = problem.order.shape
+    sets, at, columns, allowed, turns, left, reached, place = memory
+    made = 0
     count, score, depth = 0, floor, 0
     while depth >= 0:
         column = _take_first(columns[depth])
@@ -109,7 +156,7 @@ def explore(problem, floor, ceiling, improve, cells):
                 at[depth] = -1  # the lines that follow are no better
                 depth -= 1
             else:
-                columns[depth] = allowed[depth, depth, line]
+                _copy(allowed[depth, depth, line], columns[depth])
             continue
         line = problem.order[depth, at[depth]]
         place[depth, 0], place[depth, 1] = line, column
@@ -125,7 +172,8 @@ def explore(problem, floor, ceiling, improve, cells):
         if not floor < here < ceiling:
             continue
         score = here
-        cells[count] = place
+        for d in range(holds):
+            cells[count, d, 0], cells[count, d, 1] = place[d, 0], place[d, 1]
         if improve:
             floor = here
             made += 1
@@ -138,7 +186,7 @@ def explore(problem, floor, ceiling, improve, cells):
     return max(count, min(made, 1)), score
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _gap(problem, place, depth):
     """Return the smallest gap from a hold to those before it."""
     smallest = np.inf
@@ -150,19 +198,20 @@ def _gap(problem, place, depth):
     return smallest
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _turn(problem, sets, made, floor, place, depth, turns, left):
     """Leave each station the turns at which the hold is above the floor as well.
 
     Returns:
         Whether all groups have a turn left; ``left`` (words,) is scratch.
     """
-    line, column = place[depth]
+    line, column = place[depth, 0], place[depth, 1]
     _, torsos, lines, _ = problem.margins.shape
     for s in range(len(problem.group)):
         part = problem.part[depth, s]
         if part < 0:
-            turns[depth + 1, s] = turns[depth, s]
+            for t in range(torsos):
+                _copy(turns[depth, s, t], turns[depth + 1, s, t])
             continue
         any_left = False
         for t in range(torsos):
@@ -180,7 +229,7 @@ def _turn(problem, sets, made, floor, place, depth, turns, left):
     return True
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _turns_left(problem, turns, group, left):
     """Write the turns that each station of a group has at some value; tell whether there are any."""
     anything = False
@@ -196,7 +245,7 @@ def _turns_left(problem, turns, group, left):
     return anything
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _narrow(problem, sets, made, floor, place, depth, allowed):
     """Leave each later hold the columns that the hold allows; tell whether all have one."""
     holds, lines = problem.order.shape
@@ -209,7 +258,7 @@ def _narrow(problem, sets, made, floor, place, depth, allowed):
                 break
             before, after = allowed[depth, other, line], allowed[depth + 1, other, line]
             if table < 0:
-                after[:] = before
+                _copy(before, after)
                 any_left = True
                 continue
             i = problem.row[table, place[depth, 0], line]
@@ -222,7 +271,7 @@ def _narrow(problem, sets, made, floor, place, depth, allowed):
     return True
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _together(problem, place, turns, left):
     """Return the margin of the worst group at its best turn; ``left`` (words,) is scratch."""
     worst = np.inf
@@ -243,7 +292,7 @@ def _together(problem, place, turns, left):
     return worst
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _station_margin(problem, place, station, turn):
     """Return the smallest margin of a station's holds at a turn, at the best value of the torso."""
     best = -np.inf
@@ -258,28 +307,18 @@ def _station_margin(problem, place, station, turn):
     return best
 
 
-@njit(**PLAIN)
-def _new_sets(problem, words):
-    parts, torsos, lines, _ = problem.margins.shape
-    count, double = parts * torsos * lines, 2 * words + 1
-    return _Sets(
-        np.empty((count, double), np.uint64),
-        np.full(count, -1),
-        np.empty((len(problem.gaps), double), np.uint64),
-        np.full(len(problem.gaps), -1),
-    )
+@njit(**STRICT)
+def _copy(bits, out):
+    """Copy a set."""
+    for w in range(len(bits)):
+        out[w] = bits[w]
 
 
-@njit(**PLAIN)
-def _full(angles, word):
-    """Return a word of the set of all columns."""
-    return ~np.uint64(0) >> np.uint64(max(0, WORD * (word + 1) - angles))
-
-
-@njit(**PLAIN)
+@njit(**STRICT)
 def _fill(bits, values, floor):
     """Write the set of columns whose value is above the floor, twice in a row."""
-    bits[:] = 0
+    for w in range(len(bits)):
+        bits[w] = 0
     angles = len(values)
     for j in range(angles):
         if values[j] > floor:
@@ -287,7 +326,7 @@ def _fill(bits, values, floor):
                 bits[k // WORD] |= np.uint64(1) << np.uint64(k % WORD)
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _meet(own, other, first, both):
     """Write what a set shares with another one read from column ``first``; tell whether it is anything."""
     i, shift = first // WORD, np.uint64(first % WORD)
@@ -301,7 +340,7 @@ def _meet(own, other, first, both):
     return anything
 
 
-@njit(**PLAIN)
+@njit(**STRICT)
 def _take_first(bits):
     """Take the first column out of a set and return it, or -1 if the set is empty."""
     for w in range(len(bits)):
