@@ -14,6 +14,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
 import numba
 from llvmlite.binding import Linkage
 from numba.core import config, event
@@ -34,8 +39,11 @@ SOURCES = (
 )
 """Files of this package that hold compiled functions, or constants that are compiled into them."""
 
-COMPILING_MESSAGE = "compiling what this needs, once on this machine; it takes up to a minute"
+COMPILING_MESSAGE = "compiling what this needs, once on this machine; it takes about half a minute"
 """Shown to the user while something is compiled."""
+
+LOCK = "lock"
+"""The file in the folder of the cache that a process locks while it writes there."""
 
 ENTRY: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "_nrt": False}
 """Options of `njit` for functions that are called from Python and call inner ones. numba translates an inner
@@ -180,11 +188,18 @@ def _is_writable(folder: str) -> bool:
 
 
 def _saving(save: Callable[..., None], folder: str) -> Callable[..., None]:
-    """Return numba's function that writes what was compiled, which may fail now: disks may be full."""
+    """Return numba's function that writes what was compiled, for one process at a time.
+
+    Two that save different versions of a function would give both the same file, and run the wrong one later.
+    Writing may fail now: disks may be full.
+    """
 
     def save_if_possible(*overload: Any) -> None:
         try:
-            save(*overload)
+            with Path(folder, LOCK).open("w") as lock:
+                if fcntl:
+                    fcntl.flock(lock, fcntl.LOCK_EX)  # until the file is closed
+                save(*overload)
         except OSError as error:
             _warn_uncached(folder, error.strerror)
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import ast
+import fcntl
 import os
 import shutil
 import subprocess
@@ -12,7 +13,7 @@ from numba import njit
 
 import symgrasp
 from symgrasp.cli.main import main
-from symgrasp.compiling import COMPILING_MESSAGE, SOURCES, notify_on_compile
+from symgrasp.compiling import COMPILING_MESSAGE, LOCK, SOURCES, _saving, notify_on_compile
 
 PROGRAM = """
 from numba import njit
@@ -105,6 +106,44 @@ def test_changed_sources_are_compiled_anew(tmp_path):
         done = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": ""}, capture_output=True, check=True)
         outputs.append(done.stdout.decode())
     assert outputs == ["compiling\n14\n", "14\n", "compiling\n21\n"]
+
+
+def test_only_one_process_at_a_time_writes_what_is_compiled(tmp_path):
+    """numba itself reads which files there are, and writes the next one, with nothing to keep others out."""
+    refused = []
+
+    def save():
+        with (tmp_path / LOCK).open() as other, pytest.raises(BlockingIOError) as error:
+            fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        refused.append(error)
+
+    _saving(save, str(tmp_path))()
+    assert len(refused) == 1
+    with (tmp_path / LOCK).open() as other:
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)  # afterwards others may
+
+
+def test_inner_functions_are_interpreted_by_python_and_compiled_as_a_part(tmp_path):
+    """They are in no file of their own, and run interpreted from Python."""
+    program = (
+        "import os\n"
+        "from symgrasp.compiling import ENTRY, notify_on_compile, njit\n"
+        "@njit(inner=True, error_model='numpy', _nrt=False)\n"
+        "def half(x): return x / 2\n"
+        "@njit(**ENTRY)\n"
+        "def quarter(x): return half(half(x))\n"
+        "assert half(8.0) == 4.0\n"
+        "with notify_on_compile(lambda: print('compiling')): print(quarter(8.0))\n"
+    )
+    (tmp_path / "program.py").write_text(program)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, str(tmp_path / "program.py")]
+    outputs = [
+        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert outputs == ["compiling\n2.0\n", "2.0\n"]
+    assert [path.name.split(".")[1].split("-")[0] for path in tmp_path.glob("cache/**/*.nbc")] == ["quarter"]
 
 
 @pytest.mark.parametrize("full", [False, True])

@@ -82,7 +82,7 @@ def status_html(state: State) -> str:
     if state.busy and state.is_waiting:
         doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %"
         if state.busy.compiling:
-            doing = "Compiling, once on this machine: a minute …"
+            doing = "Compiling, once on this machine: half a minute …"
         elif state.busy.waiting:
             doing = f"{state.busy.label} … when other browsers have had their turn"
     elif state.is_stopped:

@@ -433,7 +433,7 @@ def test_the_page_says_that_it_waits_for_code_to_be_compiled(server, monkeypatch
         visitor.wait_for(ready)
         visitor.set("x (cm)", 54.5)
         visitor.wait_for(lambda _: any(w.get("value") == 50.0 for w in visitor.widgets.values()))
-        assert "Compiling, once on this machine: a minute …" in visitor.wait_for_quiet()
+        assert "Compiling, once on this machine: half a minute …" in visitor.wait_for_quiet()
         visitor.set("Cancel", True)
         assert "Compiling" not in visitor.wait_for("Stopped: no map for this pose yet.")
 
