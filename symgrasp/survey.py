@@ -73,8 +73,7 @@ def find_arms(model: RobotModel) -> list[FoundArm]:
     """
     known = in_catalogue(model)
     if known is not None:
-        found = [_known_arm(model, arm) for arm in known.arms]
-        return found if len(found) != 1 else [_renamed(found[0], known.name)]
+        return [_known_arm(model, arm) for arm in known.arms]
     arms = (
         _arms_of_groups(model)
         or _with_hands(model, palm_candidates(model))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 __all__ = ["CATALOGUE", "CatalogueArm", "CatalogueRobot"]
 
@@ -40,7 +40,7 @@ class CatalogueRobot:
         title: what people call it.
         package: the package on PyPI that ships it.
         urdf: its URDF, as scene files refer to it.
-        arms: its arms, the one to look at first coming first.
+        arms: its arms, the one to look at first coming first; an only one is called what the robot is.
     """
 
     name: str
@@ -51,15 +51,21 @@ class CatalogueRobot:
 
 
 def _pybullet(name: str, title: str, urdf: str, *arms: CatalogueArm) -> CatalogueRobot:
-    return CatalogueRobot(name, title, "pybullet", f"{PYBULLET}/{urdf}", arms)
+    return _robot(name, title, "pybullet", f"{PYBULLET}/{urdf}", arms)
 
 
 def _example(name: str, title: str, urdf: str, *arms: CatalogueArm) -> CatalogueRobot:
-    return CatalogueRobot(name, title, "example-robot-data", f"{EXAMPLES}/{urdf}", arms)
+    return _robot(name, title, "example-robot-data", f"{EXAMPLES}/{urdf}", arms)
+
+
+def _robot(name: str, title: str, package: str, urdf: str, arms: tuple[CatalogueArm, ...]) -> CatalogueRobot:
+    if len(arms) == 1:
+        arms = (replace(arms[0], name=name),)
+    return CatalogueRobot(name, title, package, urdf, arms)
 
 
 def _arm(
-    first: str, last: str, tool: str, hand: str | None = None, *, name: str = "arm", rpy_deg=(0, 0, 0), z=0.0
+    first: str, last: str, tool: str, hand: str | None = None, *, name: str = "", rpy_deg=(0, 0, 0), z=0.0
 ) -> CatalogueArm:
     return CatalogueArm(name, (first, last), tool, hand, ((0, 0, z), rpy_deg))
 

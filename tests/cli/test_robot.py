@@ -65,6 +65,11 @@ def test_the_list_names_every_robot_and_what_to_install(capsys, monkeypatch):
     assert main(["robots"]) == 0
     printed = capsys.readouterr().out
     assert all(robot.title in printed and robot.urdf in printed for robot in CATALOGUE)
+    assert "ur5: 6 joints, shoulder_pan_joint to wrist_3_joint; closed form, three parallel axes" in printed
+    assert "hand wsg50, mounted on tool0, opens from 0 to 110 mm" in printed
+    assert "hand at gripperStator opens from 1 to 73 mm" in printed
+    assert "hand at r_gripper opens from 0 to 50 mm" in printed
+    assert "for none of its own can be used: hand: gap between the shapes of" in printed
     monkeypatch.setattr("symgrasp.references.resolve", lambda *_: None)
     assert main(["robots"]) == 0
     assert capsys.readouterr().out.count("not installed; pip install example-robot-data") == sum(
