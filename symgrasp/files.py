@@ -23,6 +23,7 @@ except ImportError:
 __all__ = [
     "LARGEST_YAML",
     "SCENES_DIR",
+    "TEMPORARY",
     "check_size",
     "file_sha256",
     "parse_yaml",

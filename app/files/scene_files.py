@@ -18,7 +18,7 @@ import yaml
 from pydantic import ValidationError
 
 from symgrasp.errors import InputError, SceneError
-from symgrasp.files import LARGEST_YAML, SCENES_DIR, parse_yaml, read_file
+from symgrasp.files import LARGEST_YAML, SCENES_DIR, TEMPORARY, parse_yaml, read_file
 from symgrasp.references import package_dirs, portable, resolve
 from symgrasp.robot.srdf import find_srdf
 from symgrasp.scene.format import SceneFile, describe_error, xacro_texts
@@ -224,11 +224,16 @@ def _allowed(source: str, field: str, reference: str, roots: list[Path]) -> str:
 
 
 def _inside(path: Path | None, roots: list[Path]) -> Path | None:
-    """Return the path with links and ``..`` resolved, if it is inside one of the folders, else None."""
+    """Return the path with links and ``..`` resolved, if it is inside one of the folders, else None.
+
+    What lies in a temporary folder in there, such as what others uploaded, is not.
+    """
     if path is None:
         return None
     path = path.resolve()
-    return path if any(path.is_relative_to(root) for root in roots) else None
+    inner = [path.relative_to(root).parts for root in roots if path.is_relative_to(root)]
+    own = [parts for parts in inner if not any(part.startswith(TEMPORARY) for part in parts)]
+    return path if own else None
 
 
 def _references(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], str]]:

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from app.files.scene_files import SCENE_LIMIT, read_scene, scene_yaml
 from app.state import changes
 from app.state.state import State
-from symgrasp.errors import SymgraspError
-from symgrasp.files import SCENES_DIR
+from symgrasp.errors import SceneError, SymgraspError, UrdfError
+from symgrasp.files import SCENES_DIR, TEMPORARY
 from symgrasp.scene.scene import Scene
 from tests.conftest import SHIPPED, load_small, write_scene
 
@@ -42,6 +42,19 @@ def test_no_pose_is_lost_on_the_way(x, y, lean, towards):
     state = changes.moved(State.of(load_small("bottle_on_table"), ""), x=x, y=y, lean=lean, towards=towards)
     read = read_scene("a.yaml", scene_yaml(state.moved_scene()).encode(), FOLDERS).scene
     assert np.allclose(read.task().T_world_object, state.request.T_world_object, atol=1e-12)
+
+
+def test_what_others_uploaded_is_not_among_the_servers_files(content, tmp_path):
+    """Their folders may lie in that of the scene that the server was started with, such as /tmp."""
+    folder = tmp_path / f"{TEMPORARY}abc"
+    folder.mkdir()
+    (folder / "robot.urdf").write_bytes(b"<robot/>")
+    content["robots"][0]["urdf"] = str(folder / "robot.urdf")
+    text = yaml.safe_dump(content).encode()
+    with pytest.raises(SceneError, match=r"robots\[0\].urdf"):
+        read_scene("mine.yaml", text, (tmp_path,))
+    with pytest.raises(UrdfError, match="without links"):
+        read_scene("mine.yaml", text, (folder,))
 
 
 def test_files_beside_the_servers_scene_may_be_used_and_are_named_in_the_saved_one(content, tmp_path):
