@@ -142,7 +142,7 @@ def test_an_uploaded_xacro_file_is_expanded_once_and_saved_as_a_urdf(service, bo
     folder = tmp_path / "upload"
     folder.mkdir()
     files = {f"ws/arm_description/{k}": v for k, v in arm_files().items()}
-    entry, built = service.read_robot(bottle, "panda", "arm.zip", pack(files.items()), folder, quiet)
+    entry, built = service.read_robot(bottle, "panda", "arm.zip", pack(files.items()), folder, bottle, quiet)
     assert Path(entry.urdf) == folder.resolve() / "ws/arm_description/urdf/arm.urdf"
     assert entry.xacro_args is None
     model = built.scene.arm().robot.model
@@ -157,7 +157,7 @@ def test_an_uploaded_mjcf_file_is_converted_once_and_saved_as_urdf_and_srdf(serv
     folder = tmp_path / "upload"
     folder.mkdir()
     files = {name: content for name, content in arm_files().items() if name.startswith("mjcf")}
-    entry, built = service.read_robot(bottle, "panda", "arm.zip", pack(files.items()), folder, quiet)
+    entry, built = service.read_robot(bottle, "panda", "arm.zip", pack(files.items()), folder, bottle, quiet)
     assert Path(entry.urdf) == folder.resolve() / "mjcf/arm.urdf"
     model = built.scene.arm().robot.model
     assert model.allowed_pairs() == {frozenset(("link1", "link3"))}
@@ -195,7 +195,9 @@ def test_a_xacro_file_reads_no_file_of_the_server(text, name, service, bottle, t
         f'<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">{text}<xacro:if value="0"/></robot>'
     )
     with pytest.raises(InputError, match=r"its own parts|a file of the archive|a package that can be found"):
-        service.read_robot(bottle, "panda", "p.zip", pack([(name, content.encode())]), tmp_path, quiet)
+        service.read_robot(
+            bottle, "panda", "p.zip", pack([(name, content.encode())]), tmp_path, bottle, quiet
+        )
 
 
 def test_a_scene_alone_gives_no_paths_to_xacro_files_of_the_server(service, bottle):
