@@ -170,3 +170,29 @@ def test_without_a_place_for_the_cache_it_compiles_without_and_says_so_once(full
     assert str(place) in line
     assert "cannot be kept" in line
     assert ("No space left" in line) == full
+
+
+INNER = ("njit(**STRICT)", "njit(**FAST)")
+
+
+def test_python_calls_no_inner_function():
+    """It would be interpreted, a thousand times slower. The number of branches takes no time."""
+    trees = {path: ast.parse(path.read_text()) for path in ROOT.rglob("*.py")}
+    inner = {
+        (path, node.name)
+        for path, tree in trees.items()
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and {*map(ast.unparse, node.decorator_list)} & {*INNER}
+    }
+    assert len(inner) > 50
+    for path, tree in trees.items():
+        known = {name: (path, name) for where, name in inner if where == path}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom):
+                source = (ROOT.parent / str(node.module).replace(".", "/")).with_suffix(".py")
+                known |= {alias.asname or alias.name: (source, alias.name) for alias in node.names}
+        for node in tree.body:
+            if not any("njit" in ast.unparse(d) for d in getattr(node, "decorator_list", [])):
+                called = {ast.unparse(call.func) for call in ast.walk(node) if isinstance(call, ast.Call)}
+                bad = {name for name in called if known.get(name) in inner} - {"branch_count"}
+                assert not bad, f"{path}: {bad}"
