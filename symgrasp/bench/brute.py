@@ -16,7 +16,7 @@ from symgrasp.ik import Solver
 from symgrasp.poses import Array, axis_frame
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.robot import Arm
-from symgrasp.world import BulletWorld, Shape, checked_self_pairs
+from symgrasp.world import BulletWorld, Shape, own_pairs
 from symgrasp.world.urdf import collision_urdf
 
 __all__ = ["BruteForce"]
@@ -47,7 +47,7 @@ class BruteForce:
         self._geometry = pinocchio.GeometryModel()
         own = self._add_robot(world)
         static = self._add_static(world, T_world_object)
-        self._add_pairs(own, static)
+        self._add_pairs(world, own, static)
         self._geometry_data = self._geometry.createData()
         for request in self._geometry_data.collisionRequests:
             request.security_margin = 0.0
@@ -122,9 +122,10 @@ class BruteForce:
                 ]
         return static
 
-    def _add_pairs(self, own: dict[str, list[int]], static: dict[str, list[int]]) -> None:
+    def _add_pairs(self, world: BulletWorld, own: dict[str, list[int]], static: dict[str, list[int]]) -> None:
         arm, scene_links = self.arm, set(own) - set(self.arm.robot.model.mount_links())
-        pairs = [(a, b) for x, y in checked_self_pairs(arm.robot.model) for a in own[x] for b in own[y]]
+        links = own_pairs(world.scene, arm.robot.name)
+        pairs = [(a, b) for x, y in links for a in own[x] for b in own[y]]
         pairs += [
             (a, b)
             for link in own

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BodyName, BulletWorld, Shape, checked_self_pairs
+from symgrasp.world import BodyName, BulletWorld, Shape, own_pairs
 
 __all__ = ["ArmGeometry", "arm_geometry", "supports"]
 
@@ -115,7 +115,7 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
     local = [inverse(frames[last_joint[p.name.link]]) @ p.pose for p in own[:moving_count]]
     pieces = pack([p.piece for p in placed])
     pose = pose_rows(np.array([p.pose for p in placed]))
-    pairs = _own_pairs(model, links, moving_count)
+    pairs = _own_pairs(own_pairs(world.scene, arm.robot.name), links, moving_count)
     together = (pairs < tool_count).all(axis=1)
     base = (pairs[:, 0] < tool_count) & (pairs[:, 1] >= moving_count)
     arm_pairs, start = _sort_by_arm_piece(pairs[~(together | base)], tool_count, moving_count)
@@ -167,11 +167,11 @@ def _hand_poses(arm: Arm, links: list[str], openings: Array) -> Array:
     return pose_rows(T_tool_base[:, None] @ poses[:, index]).reshape(len(openings), len(links), 12)
 
 
-def _own_pairs(model: RobotModel, links: list[str], count: int) -> np.ndarray:
+def _own_pairs(checked: Sequence[tuple[str, str]], links: list[str], count: int) -> np.ndarray:
     """Return the pairs (., 2) of the robot's own pieces that can collide and of which at least one moves.
 
     Args:
-        model: the robot's model.
+        checked: the pairs of links that must not collide.
         links: link of each of the robot's pieces; those fixed to the tool first, then the other moving ones.
         count: number of moving pieces.
 
@@ -182,7 +182,7 @@ def _own_pairs(model: RobotModel, links: list[str], count: int) -> np.ndarray:
     for k, link in enumerate(links):
         by_link.setdefault(link, []).append(k)
     found = []
-    for first, second in checked_self_pairs(model):
+    for first, second in checked:
         for a in by_link.get(first, []):
             for b in by_link.get(second, []):
                 found.append((min(a, b), max(a, b)))

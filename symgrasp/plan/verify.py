@@ -241,7 +241,7 @@ def _check_holds(task: PlanTask, where: str, scene: Scene, world: BulletWorld, r
     for c in world.collisions(arms):
         report.expect(False, f"{where}: {c.a} and {c.b} are {1e3 * c.depth:.2f} mm too close")
     for hold, arm in zip(task.holds, arms, strict=True):
-        real = world.clearance(arm, CLEARANCE_LIMIT)
+        real = world.clearance(arm, CLEARANCE_LIMIT, arms)
         text = f"{where}: {arm.name}: clearance is {1e3 * real:.3f} mm, not {1e3 * hold.clearance:.3f} mm"
         report.expect(hold.clearance <= real + CLEARANCE_TOLERANCE, text)
 

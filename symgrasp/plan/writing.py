@@ -64,7 +64,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
                 joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
                 hand_joints=arm.hand.joint_values(opening),
                 opening=opening,
-                clearance=world.clearance(arm, CLEARANCE_LIMIT),
+                clearance=world.clearance(arm, CLEARANCE_LIMIT, [h.configuration.arm for h in held]),
                 margin_along=margin.along,
                 margin_around=margin.around,
             )

@@ -9,7 +9,7 @@ from symgrasp.references import package_dirs
 
 __all__ = ["extra_of", "list_scenes", "missing_extra", "shipped_scenes"]
 
-EXTRAS = {"example-robot-data": "robots"}
+EXTRAS = {"example-robot-data": "robots", "fourier_robot_descriptions": "robots"}
 """Package that some shipped scenes take files from → extra of this package that installs it."""
 
 
@@ -25,15 +25,18 @@ def list_scenes() -> dict[str, str]:
 
 def extra_of(path: Path) -> str | None:
     """Return the extra of this package that installs the robots of a shipped scene, None if it needs none."""
-    text = path.read_text(encoding="utf-8")
-    return next((extra for package, extra in EXTRAS.items() if f"package://{package}/" in text), None)
+    return next((EXTRAS[package] for package in _packages(path)), None)
 
 
 def missing_extra(path: Path) -> str | None:
     """Return the extra that a shipped scene needs and that is not installed, None if there is none."""
-    extra = extra_of(path)
-    packages = [package for package, other in EXTRAS.items() if other == extra]
-    return None if all(package_dirs(f"package://{package}/") for package in packages) else extra
+    return next((EXTRAS[name] for name in _packages(path) if not package_dirs(f"package://{name}/")), None)
+
+
+def _packages(path: Path) -> list[str]:
+    """Return the packages of extras that a shipped scene takes files from."""
+    text = path.read_text(encoding="utf-8")
+    return [package for package in EXTRAS if f"package://{package}/" in text]
 
 
 def _description(path: Path) -> str:

@@ -7,6 +7,7 @@ themselves, but for a millimetre that PyBullet keeps around the hulls of links.
 
 from symgrasp.world.bullet import BulletWorld
 from symgrasp.world.collision import BodyName, Collision, NearBodies
+from symgrasp.world.hand_pairs import own_pairs
 from symgrasp.world.home import check_homes, with_free_homes
 from symgrasp.world.opening import open_world
 from symgrasp.world.placing import placed
@@ -16,5 +17,5 @@ from symgrasp.world.tasks import RESTING_DEPTH, check_tasks, prepared
 
 __all__ = [
     "RESTING_DEPTH", "BodyName", "BulletWorld", "Collision", "NearBodies", "Shape", "check_homes",
-    "check_tasks", "checked_self_pairs", "open_world", "placed", "prepared", "with_free_homes",
+    "check_tasks", "checked_self_pairs", "open_world", "own_pairs", "placed", "prepared", "with_free_homes",
 ]  # fmt: skip

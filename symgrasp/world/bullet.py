@@ -62,7 +62,7 @@ class BulletWorld:
         try:
             self.bodies = SceneBodies(self._client, scene)
             self._values: dict[str, Array] = {}  # joint values of each robot, as set last
-            self._queries = {arm.name: arm_queries(self.bodies, arm) for arm in scene.arms.values()}
+            self._queries = {arm.name: arm_queries(self.bodies, scene, arm) for arm in scene.arms.values()}
             self._parked_queries = {name: parked_queries(self.bodies, name) for name in scene.robots}
             self.set_object(scene.task().T_world_object)
             for name in scene.robots:
@@ -195,13 +195,13 @@ class BulletWorld:
         The touch links of all these arms may touch the object, also where a robot has several. Robots with
         none of these arms are checked as parked: against the object and other robots.
         """
-        touch = {(a.robot.name, link) for a in arms for link in a.hand.touch_links}
+        touch = _touch_links(arms)
         found = [
             c
             for arm in arms
             for query in self._queries[arm.name]
             for c in self._collisions(query)
-            if not (c.reason == Reason.OBJECT_COLLISION and c.a in touch)
+            if not _touches(c, touch)
         ]
         grasping = {arm.robot.name for arm in arms}
         for name, queries in self._parked_queries.items():
@@ -259,9 +259,17 @@ class BulletWorld:
         self.set_object(T_world_object)
         return after > before + SUPPORTED_DEPTH
 
-    def clearance(self, arm: Arm, limit: float) -> float:
-        """Return the smallest distance (m) of the pairs checked for an arm, at most ``limit`` (m)."""
-        return min((limit - c.depth for c in self.pairs_within(arm, limit)), default=limit)
+    def clearance(self, arm: Arm, limit: float, holders: Sequence[Arm] = ()) -> float:
+        """Return the smallest distance (m) of the pairs checked for an arm.
+
+        Args:
+            arm: the arm.
+            limit: the largest distance (m) that is returned.
+            holders: the arms that hold the object, whose touch links may touch it.
+        """
+        touch = _touch_links(holders)
+        pairs = (c for c in self.pairs_within(arm, limit) if not _touches(c, touch))
+        return min((limit - c.depth for c in pairs), default=limit)
 
     def pairs_within(self, arm: Arm, distance: float, among: NearBodies | None = None) -> list[Collision]:
         """Return the pairs checked for an arm that are closer than a distance.
@@ -295,6 +303,16 @@ class BulletWorld:
             for p in points or ()
             if p[8] < margin and p[3] not in query.skip_a
         ]
+
+
+def _touch_links(arms: Iterable[Arm]) -> set[tuple[str, str]]:
+    """Return the links of arms that may touch the object, with their robots."""
+    return {(arm.robot.name, link) for arm in arms for link in arm.hand.touch_links}
+
+
+def _touches(c: Collision, touch: set[tuple[str, str]]) -> bool:
+    """Whether a collision is that of a link that may touch the object with the object."""
+    return c.reason == Reason.OBJECT_COLLISION and c.a in touch
 
 
 def _deepest(found: Iterable[Collision]) -> list[Collision]:

@@ -24,6 +24,7 @@ from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.scene import Scene
 from symgrasp.world.bullet import BulletWorld
 from symgrasp.world.collision import Collision
+from symgrasp.world.hand_pairs import always_in_hands
 from symgrasp.world.opening import open_world
 
 __all__ = ["check_homes", "with_free_homes"]
@@ -74,7 +75,8 @@ def check_homes(scene: Scene) -> tuple[str, ...]:
     """Check that no arm of a scene is barred from every grasp by what collides at home.
 
     Returns:
-        The collisions at home that bar no arm, because each moves away from them, in words.
+        In words, the collisions at home that bar no arm, because each moves away from them, and the links of
+        hands that may touch, because they overlap at every opening.
 
     Raises:
         SceneError: a pair of bodies collides whatever an arm does; the text names both, and what helps.
@@ -84,6 +86,9 @@ def check_homes(scene: Scene) -> tuple[str, ...]:
     with open_world(scene) as world:
         for i, robot in enumerate(scene.robots.values()):
             arms = [arm for arm in scene.arms.values() if arm.robot is robot]
+            for (a, b), hand in always_in_hands(scene, robot.name):
+                text = f"{a} and {b} overlap at every opening of hand {hand}, and may touch"
+                notes.append(f"{robot.name}: {text}")
             for c in _at_home(world.arm_collisions(arms[0])):
                 text = f"{c.a} and {c.b} are too close by {1e3 * c.depth:.1f} mm"
                 for arm in arms:

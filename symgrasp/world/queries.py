@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
+from symgrasp.scene.scene import Scene
 from symgrasp.world.bodies import SceneBodies
-from symgrasp.world.self_pairs import checked_self_pairs
+from symgrasp.world.hand_pairs import own_pairs
 
 __all__ = ["Query", "arm_queries", "body_query", "parked_queries"]
 
@@ -41,7 +42,7 @@ def body_query(
     return Query(reason, bodies.names[b], a, b, skip_a=skip_a)
 
 
-def arm_queries(bodies: SceneBodies, arm: Arm) -> list[Query]:
+def arm_queries(bodies: SceneBodies, scene: Scene, arm: Arm) -> list[Query]:
     """Return what is checked for an arm, in the order of the reasons.
 
     Its robot against itself, the object, the obstacles and the other robots. Touch links may touch the
@@ -54,7 +55,7 @@ def arm_queries(bodies: SceneBodies, arm: Arm) -> list[Query]:
     touch = frozenset(index[link] for link in arm.hand.touch_links if link in index)
     queries = [
         Query(Reason.SELF_COLLISION, frozenset((a, b)), body, body, index[a], index[b])
-        for a, b in checked_self_pairs(robot.model)
+        for a, b in own_pairs(scene, robot.name)
     ]
     queries += [
         body_query(bodies, Reason.OBJECT_COLLISION, body, piece, skip_a=touch) for piece in bodies.object

@@ -74,3 +74,25 @@ def test_the_torso_lifts_where_it_must():
     plan = plan_sequential(scene, "left")
     assert set(TORSO) < set(plan.tasks[0].holds[0].joints)
     assert verify(plan)
+
+
+def test_hands_of_one_body_that_hold_the_object_are_clear_of_it():
+    """The clearance of an arm leaves out the object in the other hand's fingers."""
+    plan = bimanual()
+    scene = Scene.from_content(plan.scene.content)
+    (task,) = plan.tasks
+    with open_world(scene) as world:
+        world.set_object(task.object_pose_turned.array())
+        arms = [scene.arm(hold.arm) for hold in task.holds]
+        world.set_arms(
+            (arm, [hold.joints[name] for name in arm.joint_names], hold.opening)
+            for arm, hold in zip(arms, task.holds, strict=True)
+        )
+        for arm, hold in zip(arms, task.holds, strict=True):
+            fingers = {link for other in arms for link in other.hand.touch_links}
+            pairs = [
+                c for c in world.pairs_within(arm, 0.1)
+                if not (c.reason.name == "OBJECT_COLLISION" and c.a.link in fingers)
+            ]  # fmt: skip
+            assert hold.clearance == pytest.approx(min([0.1, *(0.1 - c.depth for c in pairs)]))
+            assert hold.clearance > world.clearance(arm, 0.1)
