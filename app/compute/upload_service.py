@@ -127,7 +127,7 @@ class UploadService:
         Args:
             scene: the scene.
             robot: name of the robot to replace.
-            name: of the file: an archive, or a URDF alone.
+            name: of the file: an archive, or a robot's file alone.
             content: of the file.
             folder: an empty one to unpack it into.
             opened: see `put_robot`.
@@ -141,7 +141,7 @@ class UploadService:
             SceneError, UrdfError, MeshError: the robot is unusable, or its home is not free there.
         """
         progress(0.0)
-        if not name.lower().endswith(".zip"):  # a URDF alone is like an archive of one file
+        if not name.lower().endswith(".zip"):  # a robot's file alone is like an archive of one file
             content = pack([(name, content)])
         entry = read_robot_entry(name, content, folder)
         progress(0.3)

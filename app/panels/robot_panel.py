@@ -32,9 +32,9 @@ class RobotPanel(Panel):
             self.on_select(self.robot, actions.choose_robot)
             self.upload = self.upload_button(
                 "Upload a robot", ARCHIVE_LIMIT, actions.upload_robot,
-                mime_type=".zip,.urdf",
-                hint=f"A ZIP file of a URDF with its meshes, or a URDF without any; at most "
-                f"{ARCHIVE_LIMIT / 1e6:g} MB",
+                mime_type=".zip,.urdf,.xacro,.xml",
+                hint=f"A ZIP file of a URDF, xacro or MJCF file with its meshes, or such a file alone; "
+                f"at most {ARCHIVE_LIMIT / 1e6:g} MB",
             )  # fmt: skip
             self.arm = self.dropdown("Its arm", hint="Which arm of it does what the chosen one does.")
             self.on(self.arm, lambda s, v: robot_changes.use_arm(s, v))

@@ -19,6 +19,8 @@ from symgrasp.robot.catalogue import CATALOGUE
 from symgrasp.scene.scene import Scene
 from tests.app.robot_archives import PANDA, panda_archive
 
+DATA = Path(__file__).parents[2] / "data"
+
 IIWA = next(robot for robot in CATALOGUE if robot.name == "iiwa")
 
 
@@ -212,6 +214,13 @@ def arm_files() -> dict[str, bytes]:
     folder = Path(__file__).parents[2] / "data/arm_description"
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_a_urdf_alone_is_a_robot(service, bottle, tmp_path):
+    content = (DATA / "three_parallel.urdf").read_bytes()
+    built = service.read_robot(bottle, "panda", "my arm.URDF", content, tmp_path, bottle, quiet)[1]
+    assert list(built.scene.robots) == ["my_arm"]
+    assert len(built.scene.arm().joint_names) == 6
 
 
 def test_obstacles_of_an_archive_are_refused(service, bottle, tmp_path):
