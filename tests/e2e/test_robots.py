@@ -37,6 +37,7 @@ def test_a_robot_from_the_list_and_back(open_page):
     page.choose("Robot", "KUKA LBR iiwa 7")
     page.expect_title("iiwa")
     assert not page.alerts.all()
+    open_page().expect_title("panda")  # another browser sees nothing of it
     page.number("Base x (cm)", 12.5)
     expect(page.page.get_by_label("Base x (cm)")).to_have_value("12.5")
     page.expect_title("iiwa")
@@ -44,6 +45,19 @@ def test_a_robot_from_the_list_and_back(open_page):
     page.button("Undo").click()
     page.expect_title("panda")
     assert not page.complaints
+
+
+@pytest.mark.parametrize("size", [(820, 1000), (390, 844)])
+def test_nothing_of_the_panel_is_cut_off(open_page, size):
+    page = open_page(size=size, wait_for_map=False)
+    expect(page.text("Ready.")).to_be_visible()
+    open_robot_folder(page)
+    for label in ("Robot", "Tool link", "Hand", "Base x (cm)", "Base turn (°)", "Base handles"):
+        box = page.page.get_by_label(label, exact=True).filter(visible=True).bounding_box()
+        assert box
+        assert 0 < box["x"] < box["x"] + box["width"] < size[0]
+    text = page.button("Upload a robot").locator("span", has_text="Upload a robot").last
+    assert text.evaluate("span => span.scrollWidth <= span.clientWidth")
 
 
 def test_the_base_is_dragged_saved_and_put_back(open_page, tmp_path):
