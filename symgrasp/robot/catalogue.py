@@ -71,12 +71,25 @@ def _arm(
 
 
 def _arms(
-    first: str, last: str, tool: str, sides: tuple[str, str] = ("left", "right"), hand: str = ""
+    first: str,
+    last: str,
+    tool: str,
+    sides: tuple[str, str] = ("left", "right"),
+    hand: str = "",
+    *,
+    rpy_deg=(0, 0, 0),
+    z=0.0,
 ) -> list[CatalogueArm]:
     """Return two arms that differ in a word of their names, or in an initial, and in that of their hands."""
     return [
-        CatalogueArm(
-            name, (first.format(side), last.format(side)), tool.format(side), hand.format(name) or None
+        _arm(
+            first.format(side),
+            last.format(side),
+            tool.format(side),
+            hand.format(name) or None,
+            name=name,
+            rpy_deg=rpy_deg,
+            z=z,
         )
         for name, side in zip(("left", "right"), sides, strict=True)
     ]
@@ -151,8 +164,12 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
         *_arms("{}_shoulder_pitch_joint", "{}_wrist_yaw_joint", "{}_hand_palm_link", hand="dex3_{}"),
     ),
     _example(
-        "alex", "IHMC Alex", "alex_description/urdf/alex_sake_hands.urdf",
-        *_arms("{}ShoulderPitch", "{}GripperYaw", "{}SakePalmLink", ("Left", "Right")),
+        # Of its URDFs the one without hands: in the others, hands are in pieces or lack joints.
+        "alex", "IHMC Alex", "alex_description/urdf/alex_nub_hands.urdf",
+        *_arms(
+            "{}ShoulderPitch", "{}GripperYaw", "{}GripperYawLink", ("Left", "Right"), "wsg50",
+            rpy_deg=(180, 0, 0), z=-0.021,
+        ),
     ),
 )  # fmt: skip
 """The robots, single arms first."""

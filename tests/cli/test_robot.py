@@ -69,7 +69,7 @@ def test_the_list_names_every_robot_and_what_to_install(capsys, monkeypatch):
     assert "hand wsg50, mounted on tool0, opens from 0 to 110 mm" in printed
     assert "hand at gripperStator opens from 1 to 73 mm" in printed
     assert "hand at r_gripper opens from 0 to 50 mm" in printed
-    assert "for none of its own can be used: hand: gap between the shapes of" in printed
+    assert "for none of its own can be used: tool: 'j2s6s200_end_effector'" in printed
     monkeypatch.setattr("symgrasp.references.resolve", lambda *_: None)
     assert main(["robots"]) == 0
     assert capsys.readouterr().out.count("not installed; pip install example-robot-data") == sum(
