@@ -67,7 +67,12 @@ def grasp_html(state: State) -> str:
     margin = state.map.margin(state.cell)
     holds = state.shown_task.holds if state.shown_task else ()
     q = next((list(hold.joints.values()) for hold in holds if hold.arm == state.arm), witness.q)
-    joints = ", ".join(f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(q)))
+    arm = state.scene.arm(state.arm)
+    degrees = [f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(q))]
+    count = len(arm.joint_names)
+    joints = ", ".join(degrees[:count])
+    if arm.pitched:
+        joints += f"; hand pitched by {degrees[count]}"
     return (
         f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} holds it: {why}; '
         f"room for {100 * margin.along:.1f} cm along and {np.rad2deg(margin.around):.1f}° around"

@@ -48,7 +48,8 @@ def shown_prints(state: State) -> list[np.ndarray]:
         ]
     if state.plan and state.step is not None and state.shown_task and len(state.shown_task.holds) > 1:
         return list(state.plan.prints[state.step].values())
-    if state.map_view.handprint and state.pick and state.cell:
+    pitched = state.scene.arm(state.arm).pitched  # where its hand is, is known only once the arm is solved
+    if state.map_view.handprint and state.pick and state.cell and not pitched:
         row, column = grid.cell(state.pick.h, state.pick.theta)
         return [hand_print(state.scene, state.arm, row, state.cell.roll).on(grid, column)]
     return []

@@ -10,7 +10,7 @@ from time import process_time
 import numpy as np
 
 from symgrasp.errors import InputError, SymgraspError
-from symgrasp.ik import ArmIK, solver_for
+from symgrasp.ik import ArmIK, PitchedIK, Solver, solver_for
 from symgrasp.poses import Array, inverse
 from symgrasp.references import resolve
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
@@ -18,7 +18,7 @@ from symgrasp.robot.hand import Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 
-__all__ = ["IkRow", "bare_arm", "measure", "recall", "run"]
+__all__ = ["IkRow", "bare_arm", "measure", "random_configurations", "recall", "run", "sampled_solver"]
 
 SAMPLES = 16
 """Redundancy samples of a pose that is timed."""
@@ -84,10 +84,9 @@ def measure(robot: CatalogueRobot, which: CatalogueArm, poses: int) -> IkRow:
     name = robot.name if len(robot.arms) == 1 else f"{robot.name} {which.name}"
     try:
         arm = bare_arm(robot, which)
-        ik = solver_for(arm, SAMPLES)
+        ik = sampled_solver(solver_for(arm, SAMPLES))
     except SymgraspError as error:
         return IkRow(name, problem=error.expected if isinstance(error, InputError) else str(error))
-    assert isinstance(ik, ArmIK)
     q = random_configurations(arm, poses, 0)
     T = arm.tool_pose(q[:TIMED])
     for pose in T[:3]:
@@ -99,7 +98,7 @@ def measure(robot: CatalogueRobot, which: CatalogueArm, poses: int) -> IkRow:
     return IkRow(
         name=name,
         family=ik.family,
-        locked=None if ik.locked is None else arm.joint_names[ik.locked],
+        locked=None if ik.locked is None else arm.value_names[ik.locked],
         poses=poses,
         found=recall(ik, q),
         ssik=_against_ssik(ik, which),
@@ -112,7 +111,7 @@ def bare_arm(robot: CatalogueRobot, which: CatalogueArm) -> Arm:
 
     Raises:
         InputError: the package of the robot is not installed.
-        UrdfError: its URDF is not one, or the arm has neither six nor seven revolute joints.
+        UrdfError: its URDF is not one, or the arm has not five to seven revolute joints.
     """
     path = resolve(robot.urdf, Path())
     if path is None:
@@ -144,13 +143,25 @@ def recall(ik: ArmIK, q: Array) -> int:
     return found
 
 
+def sampled_solver(ik: Solver) -> ArmIK:
+    """Return the solver at samples of one value: of a pitched arm a part of its own; without a torso."""
+    own = ik.parts[-1][0] if isinstance(ik, PitchedIK) else ik
+    assert isinstance(own, ArmIK)
+    return own
+
+
 def _against_ssik(ik: ArmIK, which: CatalogueArm) -> tuple[int, int] | None:
-    """Return how many of ssik's solutions of some poses are found, and of how many; None without ssik."""
+    """Return how many of ssik's solutions of some poses are found, and of how many.
+
+    None without ssik, and for pitched arms, which it does not know.
+    """
     try:
         import ssik
     except ImportError:
         return None
     arm = ik.arm
+    if arm.pitched:
+        return None
     model = arm.robot.model
     first = next(joint for joint in model.chain(which.tool) if joint.name == which.joints[0])
     base = model.link_names[first.parent]

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from symgrasp.bench.ik import bare_arm, random_configurations, recall
+from symgrasp.bench.ik import bare_arm, random_configurations, recall, sampled_solver
 from symgrasp.bench.numerical import reach
 from symgrasp.errors import InputError, SymgraspError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.starter import starter_scene
-from symgrasp.ik import ArmIK, solver_for
+from symgrasp.ik import ArmIK, GridSolvers, PitchedIK, solver_for
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.references import resolve
@@ -163,8 +163,8 @@ def _without_map(robot: CatalogueRobot, name: str, problem: str, poses: int) -> 
         ik = solver_for(arm, GRID["redundancy"])
     except SymgraspError:
         return RobotRow(name, problem)
-    assert isinstance(ik, ArmIK)
-    found = recall(ik, random_configurations(arm, poses, 0))
+    assert isinstance(ik, ArmIK | PitchedIK)
+    found = recall(sampled_solver(ik), random_configurations(arm, poses, 0))
     return RobotRow(name, problem, family=ik.family, poses=poses, found=found)
 
 
@@ -173,7 +173,7 @@ def _measured(name: str, content: dict[str, Any], poses: int) -> RobotRow:
     scene = Scene.from_content(content)
     arm = scene.arm()
     ik = solver_for(arm, scene.settings.redundancy)
-    assert isinstance(ik, ArmIK)  # a scene to start from has no torso that moves
+    assert isinstance(ik, ArmIK | PitchedIK)  # a scene to start from has no torso that moves
     with open_world(scene) as world:
         maker = MapMaker(world)
         maker.map()  # builds the engine
@@ -189,10 +189,10 @@ def _measured(name: str, content: dict[str, Any], poses: int) -> RobotRow:
         milliseconds=1e3 * seconds,
         feasible=float(the_map.feasible.mean()),
         poses=poses,
-        found=recall(ik, random_configurations(arm, poses, 0)),
-        unreached=check(scene, ik, maps, KINDS[0]),
-        limits=check(scene, ik, maps, KINDS[1]),
-        control=check(scene, ik, maps, (Reason.FEASIBLE,)),
+        found=recall(sampled_solver(ik), random_configurations(arm, poses, 0)),
+        unreached=check(scene, maps, KINDS[0]),
+        limits=check(scene, maps, KINDS[1]),
+        control=check(scene, maps, (Reason.FEASIBLE,)),
         content=content,
     )
 
@@ -213,24 +213,27 @@ def _cells(maps: Sequence[FeasibilityMap], reasons: Sequence[Reason]) -> np.ndar
     return np.argwhere(np.isin([each.reason for each in maps], reasons))
 
 
-def check(scene: Scene, ik: ArmIK, maps: Sequence[FeasibilityMap], reasons: Sequence[Reason]) -> Check:
+def check(scene: Scene, maps: Sequence[FeasibilityMap], reasons: Sequence[Reason]) -> Check:
     """Try to reach random cells that have one of some reasons, with a search that knows no closed form.
 
     Args:
         scene: the scene.
-        ik: the solver of its arm.
-        maps: maps of that arm.
+        maps: maps of its first arm.
         reasons: of the cells.
     """
-    arm, rng = ik.arm, np.random.default_rng(0)
+    arm, rng = scene.arm(), np.random.default_rng(0)
+    samples = scene.settings.redundancy
+    solvers = GridSolvers(arm, scene.manifold, lambda own: solver_for(own, samples))
     cells = rng.permutation(_cells(maps, reasons))[:CHECKED]
     found = []
     for which, *cell in cells.tolist():
         the_map = maps[which]
         tools = arm.hand.tool_poses(scene.manifold, the_map.T_world_object)
         T = inverse(arm.robot.T_world_base) @ tools[tuple(cell)]
-        q = reach(arm, T, rng)
+        solver = solvers.at(cell[1], cell[0])
+        q = reach(solver.arm, T, rng)
         if q is not None:
+            ik = sampled_solver(solver)
             at = ik if ik.locked is None else ik.at(q[[ik.locked]])
             missed = not at.solve(T).inside.any()
             pose = tuple(map(tuple, the_map.T_world_object.tolist()))

@@ -131,7 +131,7 @@ def _say_missing(model: RobotModel) -> None:
 def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     """Print how the configurations of an arm are found; return whether they can be."""
     from symgrasp.feasibility.starter import scene_content
-    from symgrasp.ik import ArmIK, solver_for
+    from symgrasp.ik import ArmIK, PitchedIK, solver_for
     from symgrasp.scene.scene import Scene
 
     one = {**entry, "arms": [a for a in entry["arms"] if a["name"] == arm.name]}
@@ -141,7 +141,11 @@ def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     except SymgraspError as error:
         say(f"    no solver: {error}")
         return False
-    assert isinstance(solver, ArmIK)  # a scene to start from has no torso that moves
+    assert isinstance(solver, ArmIK | PitchedIK)  # a scene to start from has no torso that moves
+    if isinstance(solver, PitchedIK):
+        say(f"    solver: {solver.family}" + ("" if solver.complete else "; it may miss some"))
+        say("    the pitch of its hand is left free: maps without approach, and no plans")
+        return True
     locked = "" if solver.locked is None else f"; {arm.joints[solver.locked]} locked"
     say(f"    solver: {solver.family}" + locked + ("" if solver.complete else "; it may miss some"))
     return True

@@ -43,7 +43,7 @@ def _place(moving, pieces, scratch, T_world_base, T, row, q):
 @njit(**FAST)
 def _mark(moving, size, tree, scratch, reach, near, near_pairs):
     """Mark what is near the moving pieces where they are; see `mark_near`."""
-    box, hands = scratch.box, moving.hand.shape[1]
+    box = scratch.box
     for k in range(len(moving.frame)):
         node = 0
         while node < len(tree.skip):
@@ -54,7 +54,7 @@ def _mark(moving, size, tree, scratch, reach, near, near_pairs):
             if piece >= 0 and not near[piece]:
                 near[piece] = not oriented_boxes_apart(size, scratch.pose, k, piece, reach)
             node += 1
-        if k >= hands or not moving.touch[k]:
+        if not moving.touch[k]:
             for i in moving.objects:
                 near[i] |= not boxes_apart(box, k, i, box, reach)
     first = _mark_pairs(box, moving.hand_pairs, reach, near_pairs, 0)

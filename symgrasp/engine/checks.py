@@ -44,7 +44,7 @@ def check_row(moving, pieces, scratch, gap):
 
     The object is round and the opening depends on the row alone, so the angle θ does not matter.
     """
-    for g in range(len(moving.touch)):
+    for g in range(moving.hand.shape[1]):
         if not moving.touch[g]:
             gap = _against_object(moving, pieces, scratch, g, gap, -math.inf)
             if gap == -math.inf:
@@ -55,7 +55,7 @@ def check_row(moving, pieces, scratch, gap):
 @njit(**FAST)
 def check_hand(moving, pieces, tree, scratch, margin, gap):
     """Check the pieces fixed to the tool against the static pieces and against the robot's base."""
-    for g in range(len(moving.touch)):
+    for g in range(moving.hand.shape[1]):
         gap = _against_static(pieces, tree, scratch, g, margin, gap, -math.inf)
         if gap == -math.inf:
             return gap
@@ -85,7 +85,9 @@ def check_arm(moving, pieces, tree, scratch, margin, gap, best):
         if after == -math.inf:
             _remember(scratch, margin)
             return after
-        gap = _against_object(moving, pieces, scratch, k, after, best)
+        gap = after
+        if not moving.touch[k]:
+            gap = _against_object(moving, pieces, scratch, k, after, best)
         if gap > -math.inf:
             start = moving.arm_pair_start
             gap = _pairs(pieces, scratch, moving.arm_pairs, start[k], start[k + 1], gap, best)

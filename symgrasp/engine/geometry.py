@@ -40,6 +40,8 @@ class ArmGeometry(NamedTuple):
         moving_links: names of the links that the arm moves.
         tool_links: those of them that are fixed to the tool, fingers included.
         balance: what decides whether the robot stands.
+        local: (rows, M, 12) pose of each moving piece in its joint's frame, at the opening of each row: of a
+            pitched arm, whose joints place its hand; of others (0, M, 12).
     """
 
     names: list[BodyName]
@@ -51,6 +53,11 @@ class ArmGeometry(NamedTuple):
     moving_links: frozenset[str]
     tool_links: frozenset[str]
     balance: Balance
+    local: Array
+
+    def moving_in(self, row: int) -> MovingPieces:
+        """Return the moving pieces for grasps of a row: the same for all, but of a pitched arm."""
+        return self.moving._replace(local=self.local[row]) if len(self.local) else self.moving
 
 
 class _Placed(NamedTuple):
@@ -94,8 +101,9 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
     shapes = world.shapes(arm.robot.name)
     joints = [next(j for j in model.joints if j.name == name) for name in arm.joint_names]
     last_joint = {link: _last_joint(model, joints, link) for link in shapes}
-    tool = [link for link in shapes if last_joint[link] == arm.dof - 1]
-    between = [link for link in shapes if 0 <= last_joint[link] < arm.dof - 1]
+    placed_by_joints = len(joints) - (0 if arm.pitched else 1)
+    tool = [link for link in shapes if last_joint[link] >= placed_by_joints]
+    between = [link for link in shapes if 0 <= last_joint[link] < placed_by_joints]
     between.sort(key=lambda link: last_joint[link])
     fixed = [link for link in shapes if last_joint[link] < 0]
     order = [(link, shape) for links in (tool, between, fixed) for link in links for shape in shapes[link]]
@@ -112,7 +120,13 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
     others = [*_obstacles(scene), *_other_robots(world, arm)]
     placed = [*own, *objects, *others]
 
-    local = [inverse(frames[last_joint[p.name.link]]) @ p.pose for p in own[:moving_count]]
+    moving_links = links[:moving_count]
+    into_frames = inverse(np.array([frames[last_joint[link]] for link in moving_links]).reshape(-1, 4, 4))
+    local = _poses(arm, moving_links, into_frames, [None])[0]
+    of_rows = _poses(arm, moving_links, into_frames, openings.tolist() if arm.pitched else [])
+    origins, axes = [frames[0], *(inverse(a) @ b for a, b in pairwise(frames))], [j.axis for j in joints]
+    if arm.pitched:
+        origins, axes = [*origins, np.eye(4)], [*axes, np.array([0.0, 0.0, 1.0])]
     pieces = pack([p.piece for p in placed])
     pose = pose_rows(np.array([p.pose for p in placed]))
     pairs = _own_pairs(own_pairs(world.scene, arm.robot.name), links, moving_count)
@@ -124,12 +138,12 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
         pieces=pieces,
         pose=pose,
         moving=MovingPieces(
-            joint_origin=pose_rows(np.array([frames[0], *(inverse(a) @ b for a, b in pairwise(frames))])),
-            joint_axis=np.array([j.axis for j in joints]),
-            frame=np.array([last_joint[link] for link in links[:moving_count]], dtype=np.int64),
-            local=pose_rows(np.array(local).reshape(-1, 4, 4)),
+            joint_origin=pose_rows(np.array(origins)),
+            joint_axis=np.array(axes),
+            frame=np.array([last_joint[link] for link in moving_links], dtype=np.int64),
+            local=local,
             hand=_hand_poses(arm, links[:tool_count], openings),
-            touch=np.array([link in arm.hand.touch_links for link in links[:tool_count]], dtype=bool),
+            touch=np.array([link in arm.hand.touch_links for link in moving_links], dtype=bool),
             hand_pairs=pairs[together],
             base_pairs=pairs[base],
             arm_pairs=arm_pairs,
@@ -141,10 +155,29 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
             frozenset((links[a], links[b]))
             for a, b in np.concatenate([pairs[together], pairs[base], arm_pairs]).tolist()
         ],
-        moving_links=frozenset(links[:moving_count]),
+        moving_links=frozenset(moving_links),
         tool_links=frozenset(links[:tool_count]),
         balance=balance_of(arm, joints, openings),
+        local=of_rows,
     )
+
+
+def _poses(arm: Arm, links: list[str], into_frames: Array, openings: Sequence[float | None]) -> Array:
+    """Return the poses (., M, 12) of M links in the frames of their joints, at some openings of the hand.
+
+    Args:
+        arm: the arm.
+        links: the links.
+        into_frames: (M, 4, 4) from the world into these frames, with the joints of the arm at zero.
+        openings: None for the hand at home.
+    """
+    model = arm.robot.model
+    index = [model.link_index(link) for link in links]
+    found = np.empty((len(openings), len(links), 12))
+    for k, opening in enumerate(openings):
+        poses = arm.robot.T_world_base @ model.forward(arm.robot_values(np.zeros(arm.dof), opening))
+        found[k] = pose_rows(into_frames @ poses[index])
+    return found
 
 
 def _last_joint(model: RobotModel, joints: list[Joint], link: str) -> int:

@@ -18,18 +18,20 @@ __all__ = ["MovingPieces", "Scratch", "copied", "new_scratch", "place_arm", "pla
 class MovingPieces(NamedTuple):
     """The pieces that an arm moves, and the pairs of pieces that must not collide.
 
-    M pieces move; the first G of them are fixed to the tool (the hand, the last link of the arm). n
-    joints, P pieces in all.
+    M pieces move; the first G of them are fixed to the tool (the hand, the last link of the arm): those that
+    the grasp places. Of a pitched arm it places none, and the hand's move with the last joint. n joints, P
+    pieces in all.
 
     Attributes:
         joint_origin: (n, 12) frame of each joint at zero in that of the joint before; the first in the
-            world.
+            world. Pieces are placed by those before the last: after five, a pitched arm has another one
+            for this.
         joint_axis: (n, 3) unit axes in the joint frames.
         frame: (M,) index of the joint that moves each piece; unused for the first G.
         local: (M, 12) pose of each piece in its joint's frame; unused for the first G.
         hand: (rows, G, 12) pose of each of the first G pieces in the tool frame, at the opening of
             each row.
-        touch: (G,) whether the piece may touch the object.
+        touch: (M,) whether the piece may touch the object.
         hand_pairs: (., 2) pairs of two of the first G pieces.
         base_pairs: (., 2) pairs of one of the first G pieces and a piece of the robot that does not move.
         arm_pairs: (., 2) all other pairs of the robot's pieces, sorted by their first piece, which moves.
@@ -137,7 +139,7 @@ def place_hand(moving, pieces, scratch, T_world_base, T, row):
 def place_arm(moving, pieces, scratch, q):
     """Write poses and boxes of the pieces between base and tool, at joint values q (n,)."""
     frames = scratch.frames
-    for j in range(len(q) - 1):
+    for j in range(len(moving.joint_origin) - 1):
         if j == 0:
             for i in range(12):
                 frames[0, i] = moving.joint_origin[0, i]

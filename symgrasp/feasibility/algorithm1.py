@@ -11,7 +11,7 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
-from symgrasp.ik import solver_for
+from symgrasp.ik import GridSolvers, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.poses import inverse
 from symgrasp.progress import Progress
@@ -43,22 +43,24 @@ def create_map_reference(
         UrdfError: the arm has no closed-form inverse kinematics.
     """
     settings = world.scene.settings
-    ik = solver_for(arm, settings.redundancy)
+    solvers = GridSolvers(arm, manifold, lambda own: solver_for(own, settings.redundancy))
     radii = manifold.profile.radius(manifold.h)
-    draft = MapDraft(arm, manifold, np.array([arm.hand.opening(float(r)) for r in radii]), ik)
+    draft = MapDraft(arm, manifold, np.array([arm.hand.opening(float(r)) for r in radii]), solvers.at(0, 0))
     T_base_tool = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(manifold, task.T_world_object)
     world.margin = settings.margin
     world.set_arms(())  # a map that was cancelled in this world may have left an arm elsewhere
     world.set_object(task.T_world_object)
-    checker = CandidateChecker(world, arm, ik, settings.approach, holders=task.arms)
     for row, h in enumerate(manifold.h):
         misfit = fit(arm.hand, manifold.profile, float(h))
         if misfit is not None:
             draft.reason[:, row] = misfit
         else:
-            for roll, column in np.ndindex(len(ROLLS), manifold.angles):
-                cell = Cell(roll, row, column)
-                _decide(draft, cell, checker.candidates(T_base_tool[cell], draft.opening[row]))
+            for roll in range(len(ROLLS)):
+                ik = solvers.at(row, roll)
+                checker = CandidateChecker(world, ik.arm, ik, settings.approach, holders=task.arms)
+                for column in range(manifold.angles):
+                    cell = Cell(roll, row, column)
+                    _decide(draft, cell, checker.candidates(T_base_tool[cell], draft.opening[row]))
         if progress:
             progress((row + 1) / manifold.heights)
     world.set_arms(())

@@ -111,10 +111,12 @@ class MapMaker:
             progress: called with the finished share; may raise `Cancelled`.
         """
         the_arm, the_task = self._chosen(arm, task)
-        if the_arm.name not in self._solvers:
-            self._solvers[the_arm.name] = solver_for(the_arm, self.scene.settings.redundancy)
-        ik, grid = self._solvers[the_arm.name], manifold or self.scene.manifold
-        return explain_cell(self.world, the_arm, ik, the_task, grid, Cell(*cell), progress)
+        grid, where = manifold or self.scene.manifold, Cell(*cell)
+        ik = self._solvers.get(the_arm.name)
+        if ik is None or the_arm.pitched:
+            own = the_arm.grasping(grid, where.row, where.roll)
+            self._solvers[the_arm.name] = ik = solver_for(own, self.scene.settings.redundancy)
+        return explain_cell(self.world, ik, the_task, grid, where, progress)
 
     def _chosen(self, arm: str | None, task: Task | str | None) -> tuple[Arm, Task]:
         """Return an arm and a task: the scene's first task, and the task's first arm, where none is named."""

@@ -21,17 +21,19 @@ from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import new_scratch
 from symgrasp.engine.pieces import pose_rows
 from symgrasp.engine.threads import core_count
+from symgrasp.feasibility.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.search_recording import FixedBodies, PieceBodies, record_search
-from symgrasp.ik import CompiledIK, solver_for
+from symgrasp.feasibility.torso_maps import merged
+from symgrasp.ik import GridSolvers, solver_for
 from symgrasp.ik.retreat import retreat_distances
-from symgrasp.object.manifold import ROLLS, Manifold
+from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import load_of_hand
@@ -65,14 +67,12 @@ class ExactEngine:
     def __init__(self, world: BulletWorld, arm: Arm, manifold: Manifold) -> None:
         self.world, self.arm, self.manifold = world, arm, manifold
         self._settings = world.scene.settings
-        ik = solver_for(arm, self._settings.redundancy)
-        if not isinstance(ik, CompiledIK) or not supports(arm):
+        self._solvers, self._angles = self._new_solvers(manifold), manifold.angles
+        if compiled_parts(self._solvers.at(0, 0)) is None or not supports(arm):
             raise NotImplementedError(f"arm {arm.name}: not of a kind that the exact engine knows")
-        self.ik = ik
         radii = manifold.profile.radius(manifold.h)
         self._opening = np.array([arm.hand.opening(float(r)) for r in radii])
         self._misfit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
-        self._order = _spread(len(ik.phi))
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
@@ -81,7 +81,9 @@ class ExactEngine:
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.pairs_within(arm, self._reach)
         geometry, limits = self._geometry, np.array([arm.lower, arm.upper])
-        self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, CLEARANCE_LIMIT)
+        self._most = CLEARANCE_LIMIT
+        if not arm.pitched:  # whose hand has other poses in every row
+            self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, self._most)
         self._balance, self._holders = self._geometry.balance, (arm.name,)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
@@ -92,7 +94,10 @@ class ExactEngine:
         Raises:
             UrdfError: the arm has no closed-form inverse kinematics.
         """
-        return isinstance(solver_for(arm, 1), CompiledIK) and supports(arm)
+        return compiled_parts(solver_for(arm, 1)) is not None and supports(arm)
+
+    def _new_solvers(self, grid: Manifold) -> GridSolvers:
+        return GridSolvers(self.arm, grid, lambda own: solver_for(own, self._settings.redundancy))
 
     def map(
         self, task: Task, manifold: Manifold | None = None, progress: Progress | None = None
@@ -116,16 +121,22 @@ class ExactEngine:
             load_of_hand(self.world.scene, self.arm, task.arms, task.T_world_object, float(h)) for h in grid.h
         ]
         self._balance = loaded(self._geometry.balance, loads)
-        draft = MapDraft(self.arm, grid, self._opening, self.ik)
-        for row, misfit in enumerate(self._misfit):
-            if misfit is not None:
-                draft.reason[:, row] = misfit
+        if self._angles != grid.angles:
+            self._solvers, self._angles = self._new_solvers(grid), grid.angles
         T_base_tool = inverse(self.arm.robot.T_world_base) @ self.arm.hand.tool_poses(
             grid, task.T_world_object
         )
-        self._search_rows(draft, T_base_tool, progress)
+        drafts = []
+        for part in range(2 if self.arm.pitched else 1):
+            draft = MapDraft(self.arm, grid, self._opening, self._solvers.at(0, 0))
+            for row, misfit in enumerate(self._misfit):
+                if misfit is not None:
+                    draft.reason[:, row] = misfit
+            tell = part_of(progress, part, 2) if self.arm.pitched else progress
+            self._search_rows(draft, part, T_base_tool, tell)
+            drafts.append(draft.finish(self.world.scene.name, task))
         self.world.set_arms(())
-        return draft.finish(self.world.scene.name, task)
+        return merged(drafts) if len(drafts) > 1 else drafts[0]
 
     def _place_object(self, T_world_object: Array) -> None:
         """Put the object at a pose (4, 4) in both worlds, PyBullet's and the engine's; the arm at home."""
@@ -137,22 +148,30 @@ class ExactEngine:
         scratch.pose[objects] = pose_rows(axis_frame(T_world_object))
         scratch.box[objects] = boxes_of(geometry.pieces.size[objects], scratch.pose[objects])
 
-    def _search_rows(self, draft: MapDraft, T_base_tool: Array, progress: Progress | None) -> None:
-        """Fill the rows at which the hand fits, some at a time so that progress is told often enough."""
+    def _search_rows(self, draft: MapDraft, part: int, T_base_tool: Array, progress: Progress | None) -> None:
+        """Fill the rows at which the hand fits, some at a time so that progress is told often enough.
+
+        Args:
+            draft: the map.
+            part: which of the solvers of a pitched arm is used, see `PitchedIK.parts`; 0 for other arms.
+            T_base_tool: (R, H, A, 4, 4) tool poses of all cells.
+            progress: called with the finished share; may raise `Cancelled`.
+        """
         fixed, bodies = self._fixed_bodies(), self._bodies(draft)
         rows = np.array([row for row, misfit in enumerate(self._misfit) if misfit is None], dtype=np.int64)
         first, count = 0, 1
         while first < len(rows):
             start = perf_counter()
-            part = rows[first : first + count]
-            for _ in self._search(draft, bodies, part, T_base_tool, fixed):
-                if progress and perf_counter() - start > TELL:
-                    progress(first / len(rows))  # PyBullet takes its time: here one may cancel, too
-            first += len(part)
+            some = rows[first : first + count]
+            for batch in batches(self._solvers, self._geometry, some, part):
+                for _ in self._search(draft, bodies, batch, T_base_tool, fixed):
+                    if progress and perf_counter() - start > TELL:
+                        progress(first / len(rows))  # PyBullet takes its time: here one may cancel, too
+            first += len(some)
             if progress:
                 progress(first / len(rows))
             # Rows differ in cost, so parts at most double; what is found does not depend on their size.
-            count = max(1, min(2 * count, int(len(part) * TELL / (perf_counter() - start))))
+            count = max(1, min(2 * count, int(len(some) * TELL / (perf_counter() - start))))
         if progress and not len(rows):
             progress(1.0)
 
@@ -195,16 +214,17 @@ class ExactEngine:
         self,
         draft: MapDraft,
         bodies: PieceBodies,
-        rows: np.ndarray,
+        batch: Batch,
         T_base_tool: Array,
         fixed: FixedBodies,
     ) -> Iterator[None]:
-        """Search some rows of the map; pause after every cell that PyBullet decided."""
+        """Search some cells of the map; pause after every one that PyBullet decided."""
+        rows, rolls = batch.rows, batch.rolls
         inputs = search.SearchInput(
-            sample_order=self._order,
+            sample_order=batch.order,
             T_world_base=self._T_world_base,
-            T_base_tool=np.ascontiguousarray(T_base_tool[:, rows].reshape(-1, 4, 4)),
-            row=np.tile(rows, len(ROLLS)),
+            T_base_tool=np.ascontiguousarray(T_base_tool[np.ix_(rolls, rows)].reshape(-1, 4, 4)),
+            row=np.tile(rows, len(rolls)),
             retreat=-retreat_distances(self._settings.approach),
             margin=float(self._settings.margin),
             clearance=fixed.gap,
@@ -212,8 +232,8 @@ class ExactEngine:
             parts=PARTS * core_count(),
         )
         found = search.search(
-            self.ik.chain,
-            self._geometry.moving,
+            batch.compiled.chain,
+            batch.moving,
             self._geometry.pieces,
             self._geometry.tree,
             self._scratch,
@@ -221,34 +241,40 @@ class ExactEngine:
             self._balance,
             self.arm.dof,
         )
-        roll, row, column = np.indices((len(ROLLS), len(rows), draft.manifold.angles)).reshape(3, -1)
-        cells = (roll, rows[row], column)
+        roll, row, column = np.indices((len(rolls), len(rows), draft.manifold.angles)).reshape(3, -1)
+        cells = (rolls[roll], rows[row], column)
+        found.solution[:, 0] = batch.samples[found.solution[:, 0]]  # of cells without one it is not used
         record_search(draft, bodies, found, cells, fixed)
         for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.undecided_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
-            self._decide(
-                draft, cell, inputs.T_base_tool[i], self._undecided(found, int(i), inputs.T_base_tool[i])
-            )
+            T = inputs.T_base_tool[i]
+            self._decide(draft, cell, T, batch, self._undecided(found, int(i), T, batch))
             yield
 
     def _undecided(
-        self, found: search.SearchResult, i: int, T_base_tool: Array
+        self, found: search.SearchResult, i: int, T_base_tool: Array, batch: Batch
     ) -> list[tuple[Array, int, int]]:
         """Return the undecided candidates of an open cell, or all inside the limits where they are many."""
         count = int(found.undecided_count[i])
         if count <= search.UNDECIDED_KEPT:
-            picks = found.undecided_solution[i]
-            return [(found.undecided_q[i, j], int(picks[j, 0]), int(picks[j, 1])) for j in range(count)]
-        s = self.ik.solve(T_base_tool)
+            sample, branch = found.undecided_solution[i].T
+            sample = batch.samples[sample[:count]]
+            return [(found.undecided_q[i, j], int(sample[j]), int(branch[j])) for j in range(count)]
+        s = batch.ik.solve(T_base_tool)
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
 
     def _decide(
-        self, draft: MapDraft, cell: tuple[int, ...], T_base_tool: Array, listed: list[tuple[Array, int, int]]
+        self,
+        draft: MapDraft,
+        cell: tuple[int, ...],
+        T_base_tool: Array,
+        batch: Batch,
+        listed: list[tuple[Array, int, int]],
     ) -> None:
         """Let PyBullet check the candidates of an open cell, against the bodies near enough to collide."""
         near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
         checker = CandidateChecker(
-            self.world, self.arm, self.ik, self._settings.approach, near, self._holders
+            self.world, batch.ik.arm, batch.ik, self._settings.approach, near, self._holders
         )
         before: Collision | None = None
         for q, sample, branch in listed:
@@ -270,8 +296,8 @@ class ExactEngine:
         pairs = np.zeros(len(geometry.pairs), dtype=bool)
         reach = self.world.margin + FREE_BAND
         mark_near(
-            geometry.moving, geometry.pieces, geometry.tree, scratch, self._T_world_base, T_base_tool,
-            row, q, reach, near, pairs,
+            geometry.moving_in(row), geometry.pieces, geometry.tree, scratch, self._T_world_base,
+            T_base_tool, row, q, reach, near, pairs,
         )  # fmt: skip
         bodies = {geometry.names[k].body for k in np.flatnonzero(near)}
         return bodies | {geometry.pairs[k] for k in np.flatnonzero(pairs)}
@@ -287,20 +313,3 @@ class ExactEngine:
 
 def _same(a: Collision, b: Collision) -> bool:
     return (a.a, a.b) == (b.a, b.b) and min(a.depth, b.depth) > 1e-6 and abs(a.depth - b.depth) < 1e-7
-
-
-def _spread(count: int) -> np.ndarray:
-    """Return the indices below ``count``, each far from those before it (van der Corput's sequence).
-
-    Neighbouring redundancy values mostly fail for the same reason, so the next try should be elsewhere.
-    """
-    order: dict[int, None] = {}
-    k = 0
-    while len(order) < count:
-        k += 1
-        value, base, rest = 0.0, 0.5, k
-        while rest:
-            value += base * (rest % 2)
-            base, rest = 0.5 * base, rest // 2
-        order.setdefault(int(value * count))
-    return np.array(list(order), dtype=np.int64)

@@ -170,7 +170,6 @@ class Explanation:
 
 def explain_cell(
     world: BulletWorld,
-    arm: Arm,
     ik: Solver,
     task: Task,
     manifold: Manifold,
@@ -181,13 +180,13 @@ def explain_cell(
 
     Args:
         world: a world of the scene's robots, obstacles and object; it stays as it is.
-        arm: the arm.
-        ik: its inverse kinematics.
+        ik: the inverse kinematics of the arm, for the grasps of the cell's row and roll.
         task: the task.
         manifold: the grid.
         cell: the cell.
         progress: called with the finished share; may raise `Cancelled`.
     """
+    arm = ik.arm
     tools = arm.hand.tool_poses(manifold, task.T_world_object)
     h = float(manifold.h[cell.row])
     opening = arm.hand.opening(float(manifold.profile.radius(h)))
@@ -272,7 +271,7 @@ def _violations(arm: Arm, q: Array) -> tuple[LimitViolation, ...]:
     """Return the joints of a configuration (n,) that are outside their limits, furthest first."""
     limits = np.where(q < arm.lower, arm.lower, arm.upper)
     outside = np.flatnonzero((q < arm.lower) | (q > arm.upper))
-    found = [LimitViolation(arm.joint_names[j], float(q[j]), float(limits[j])) for j in outside]
+    found = [LimitViolation(arm.value_names[j], float(q[j]), float(limits[j])) for j in outside]
     return tuple(sorted(found, key=lambda joint: -joint.excess))
 
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from symgrasp.ik.arm_ik import ArmIK, Solutions
+from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions
 from symgrasp.ik.closed_form import ClosedFormIK
 from symgrasp.ik.compiled import CompiledIK
+from symgrasp.ik.pitched import GridSolvers, PitchedIK
 from symgrasp.ik.torso import Solver, TorsoIK, over_torso
 from symgrasp.robot.robot import Arm
 
@@ -12,6 +13,8 @@ __all__ = [
     "ArmIK",
     "ClosedFormIK",
     "CompiledIK",
+    "GridSolvers",
+    "PitchedIK",
     "Solutions",
     "Solver",
     "TorsoIK",
@@ -25,13 +28,15 @@ def solver_for(arm: Arm, samples: int, torso: Sequence[int] | None = None) -> So
     """Return the fastest solver of an arm: compiled where its axes allow, EAIK otherwise.
 
     Args:
-        arm: the arm.
+        arm: the arm; a pitched one for the grasps of a row, see `Arm.grasping`.
         samples: number of redundancy samples; a 6-joint arm always has one.
         torso: the samples of the robot's torso to try; all of them if None.
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
     """
+    if arm.pitched:
+        return PitchedIK(arm, samples, _compiled)
     return over_torso(arm, lambda alone: _solver(alone, samples), torso)
 
 
@@ -40,7 +45,18 @@ def _solver(arm: Arm, samples: int) -> ArmIK:
     return CompiledIK(arm, samples) if CompiledIK.fits(general) else general
 
 
-def independent_solver(arm: Arm, samples: int) -> ArmIK:
-    """Return the solver to check the others with, for an arm without a torso: EAIK's where it has one."""
-    general = ClosedFormIK(arm, samples)
-    return general if general.knows_arm else CompiledIK(arm, samples)
+def _compiled(arm: Arm, lock: Lock) -> CompiledIK | None:
+    fits = CompiledIK.fits(ClosedFormIK(arm, len(lock.phi), lock=lock))
+    return CompiledIK(arm, len(lock.phi), lock=lock) if fits else None
+
+
+def independent_solver(arm: Arm, samples: int, torso: Sequence[int] | None = None) -> Solver:
+    """Return the solver to check the others with: EAIK's where it has one; see `solver_for` for the rest."""
+    if arm.pitched:
+        return PitchedIK(arm, samples, lambda own, lock: _independent(own, len(lock.phi), lock))
+    return over_torso(arm, lambda alone: _independent(alone, samples), torso)
+
+
+def _independent(arm: Arm, samples: int, lock: Lock | None = None) -> ArmIK:
+    general = ClosedFormIK(arm, samples, lock=lock)
+    return general if general.knows_arm else CompiledIK(arm, samples, lock=lock)

@@ -16,7 +16,7 @@ from symgrasp.ik.locking import joint_to_lock
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm
 
-__all__ = ["ArmIK", "Solutions", "Tolerance"]
+__all__ = ["ArmIK", "Lock", "Solutions", "Tolerance", "centres"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,18 @@ class Tolerance:
 
     position: float = 1e-6
     rotation: float = 1e-6
+
+
+class Lock(NamedTuple):
+    """A joint that is locked at samples.
+
+    Attributes:
+        joint: its index.
+        phi: (samples,) its values (rad).
+    """
+
+    joint: int
+    phi: Array
 
 
 class Solutions(NamedTuple):
@@ -55,6 +67,7 @@ class ArmIK(ABC):
         arm: the arm.
         samples: number of redundancy samples; a 6-joint arm always has one.
         tolerance: largest error of a solution.
+        lock: the joint to lock, and where; the one that suits the arm best if None, over all its range.
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
@@ -64,17 +77,18 @@ class ArmIK(ABC):
         phi: (samples,) values of the locked joint: centres of equal parts of its range.
     """
 
-    def __init__(self, arm: Arm, samples: int, tolerance: Tolerance | None = None) -> None:
+    def __init__(
+        self, arm: Arm, samples: int, tolerance: Tolerance | None = None, lock: Lock | None = None
+    ) -> None:
         self.arm = arm
         self.tolerance = tolerance or Tolerance()
-        self.locked = joint_to_lock(arm)
-        if self.locked is None:
+        self.locked = lock.joint if lock else joint_to_lock(arm)
+        if lock:
+            self.phi = lock.phi
+        elif self.locked is None:
             self.phi = np.zeros(1)
         else:
-            lower, upper = arm.lower[self.locked], arm.upper[self.locked]
-            if not np.isfinite(upper - lower):
-                lower, upper = -np.pi, np.pi
-            self.phi = lower + (np.arange(samples) + 0.5) * (upper - lower) / samples
+            self.phi = centres(arm.lower[self.locked], arm.upper[self.locked], samples)
 
     def at(self, phi: Array) -> Self:
         """Return the solver of the same arm at other samples (K,) of its redundancy (rad)."""
@@ -103,3 +117,10 @@ class ArmIK(ABC):
     @abstractmethod
     def solve_sample(self, T_base_tool: Array, sample: int) -> Solutions:
         """Return every configuration that reaches a pose (4, 4) at one redundancy sample."""
+
+
+def centres(lower: float, upper: float, samples: int) -> Array:
+    """Return the centres (samples,) of equal parts of a joint's range (rad); of a turn without limits."""
+    if not np.isfinite(upper - lower):
+        lower, upper = -np.pi, np.pi
+    return lower + (np.arange(samples) + 0.5) * (upper - lower) / samples

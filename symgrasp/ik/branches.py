@@ -85,7 +85,12 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         exists[b] = False
         inside[b] = False
     if joint[8] == MEETING_PAIR:
-        return pair_branches(g, joint, limits, chain.forward, chain.fixed, T, q, exists, inside, memory)
+        pair_branches(g, joint, limits, chain.forward, chain.fixed, T, q, exists, inside, memory)
+        solvable = False
+        for b in range(exists.shape[0]):
+            exists[b] = exists[b] and _in_cell(chain, q[b])
+            solvable |= exists[b]
+        return solvable
     if joint[8] == THREE_PARALLEL:
         solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside)
     else:
@@ -98,4 +103,12 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         elif exists[b]:
             exists[b] = not misses(chain.forward, q[b], T)
         inside[b] = inside[b] and exists[b]
+        exists[b] = exists[b] and _in_cell(chain, q[b])
     return solvable
+
+
+@njit(**STRICT)
+def _in_cell(chain, q):
+    """Whether the azimuth of a pitched arm, if it is one, is within the cell that is to be reached."""
+    j = chain.joint[10]
+    return j < 0 or chain.limits[0, j] <= q[j] <= chain.limits[1, j]

@@ -64,9 +64,10 @@ class Chain(NamedTuple):
 
     Attributes:
         geometry: (K, m) a geometry of one of the families in each row.
-        joint: (10,) index of each free joint in the arm, of the locked one (or -1), whether the arm is
-            read backwards, its family, and whether it is rounded: then its geometry is not quite its own,
-            and what the closed form finds has to be polished.
+        joint: (11,) index of each free joint in the arm, of the locked one (or -1), whether the arm is
+            read backwards, its family, whether it is rounded: then its geometry is not quite its own,
+            and what the closed form finds has to be polished; and the index of a pitched arm's azimuth (or
+            -1), outside of whose limits the grasp is that of another cell.
         limits: (6, n) lower limit, upper limit, middle of the range, cosine and sine of the middle, and
             the cosine of half the range, less `COSINE_TOLERANCE`.
         leeway: (6, n) the same limits for the closed form: of a rounded arm they are wider.

@@ -93,4 +93,5 @@ class ClosedFormIK(ArmIK):
         position, rotation = pose_error(self.arm.tool_pose(q), T_base_tool)
         exact = (position <= self.tolerance.position) & (rotation <= self.tolerance.rotation)
         q, inside = self.arm.within_limits(q[exact])
-        return Solutions(q, sample[exact], branch[exact], inside)
+        here = self.arm.in_cell(q)
+        return Solutions(q[here], sample[exact][here], branch[exact][here], inside[here])

@@ -6,12 +6,12 @@ from typing import Self
 
 import numpy as np
 
-from symgrasp.ik.arm_ik import ArmIK, Solutions, Tolerance
+from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions, Tolerance
 from symgrasp.ik.branches import branch_count, new_memory, solve_range
 from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries, is_rounded
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.poses import Array
-from symgrasp.robot.robot import Arm
+from symgrasp.robot.robot import AZIMUTH, Arm
 
 __all__ = ["CompiledIK"]
 
@@ -30,6 +30,7 @@ class CompiledIK(ArmIK):
         arm: the arm.
         samples: number of redundancy samples; a 6-joint arm always has one.
         tolerance: largest error of a solution.
+        lock: the joint to lock, and where; the one that suits the arm best if None, over all its range.
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
@@ -39,8 +40,10 @@ class CompiledIK(ArmIK):
         chain: the arm's geometry at every redundancy sample, for compiled code.
     """
 
-    def __init__(self, arm: Arm, samples: int, tolerance: Tolerance | None = None) -> None:
-        super().__init__(arm, samples, tolerance)
+    def __init__(
+        self, arm: Arm, samples: int, tolerance: Tolerance | None = None, lock: Lock | None = None
+    ) -> None:
+        super().__init__(arm, samples, tolerance, lock)
         self.chain = self._pack_chain()
 
     @property
@@ -97,7 +100,14 @@ class CompiledIK(ArmIK):
         return Chain(
             geometry=np.array([row.packed() for row in rows]),
             joint=np.array(
-                [*(free[::-1] if backwards else free), locked, backwards, rows[0].family, rounded]
+                [
+                    *(free[::-1] if backwards else free),
+                    locked,
+                    backwards,
+                    rows[0].family,
+                    rounded,
+                    AZIMUTH if arm.pitched else -1,
+                ]
             ),
             limits=_limits(arm, 0.0),
             leeway=_limits(arm, LEEWAY if rounded else 0.0),

@@ -8,13 +8,18 @@ from eaik.IK_HP import HPRobot
 from symgrasp.errors import UrdfError
 from symgrasp.ik.chain import chain_geometries, has_exact_pair, is_rounded
 from symgrasp.ik.pair_geometry import MEETING_PAIR
-from symgrasp.robot.robot import Arm
+from symgrasp.robot.robot import PITCH, Arm
 
 __all__ = ["joint_to_lock"]
 
 LOCK_PREFERENCE = (6, 2, 0, 4, 1, 5, 3)
 """Which of seven joints to lock, first choice first among those that leave an arm of the same kind. Locking
 the last one keeps the arm's whole reach; locking the elbow (index 3) would fix its distance."""
+
+PITCHED_PREFERENCE = (PITCH, 3, 2, 1)
+"""The same for a pitched arm: the values that change along the one-parameter families of configurations that
+hold an object at a height. Its first joint and its last, which rolls the hand, are constant along those that
+matter most: at an upright object they set azimuth and roll."""
 
 GENERIC_ANGLE = 0.3
 """Value (rad) at which locks are tried: the answer is the same at almost any value, but at zero axes may
@@ -33,7 +38,7 @@ def joint_to_lock(arm: Arm) -> int | None:
     Raises:
         UrdfError: no inverse kinematics is known, whichever joint is locked.
     """
-    choices = [None] if arm.dof == 6 else list(LOCK_PREFERENCE)
+    choices = [None] if arm.dof == 6 else list(PITCHED_PREFERENCE if arm.pitched else LOCK_PREFERENCE)
     kinds = [_kind(arm, joint) for joint in choices]
     if min(kinds) == UNKNOWN:
         raise UrdfError(

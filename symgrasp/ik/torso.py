@@ -18,9 +18,11 @@ class Solver(Protocol):
     """What finds the configurations of an arm that reach a tool pose.
 
     Attributes:
+        arm: the arm.
         phi: (K,) redundancy samples.
     """
 
+    arm: Arm
     phi: Array
 
     @property

@@ -242,6 +242,11 @@ def _visits(
     world: BulletWorld, tasks: Sequence[Task], known: MapsByKey | None, progress: Progress | None
 ) -> list[TaskVisit]:
     """Visit every task once, with the maps of all its arms; those that are not known are computed."""
+    for task in tasks:
+        pitched = [name for name in task.arms if world.scene.arm(name).pitched]
+        if pitched:
+            expected = "arms of 6 or 7 joints: the pitch of an arm of five differs from task to task"
+            raise SceneError(world.scene.source, f"task {task.name}: arms", pitched, expected)
     total = sum(len(task.arms) for task in tasks)
     maker = MapMaker(world)
     visits: list[TaskVisit] = []

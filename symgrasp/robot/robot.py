@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -16,9 +17,13 @@ from symgrasp.robot.hand import Hand
 from symgrasp.robot.handprint import Handprint, handprint
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.model import RobotModel
+from symgrasp.robot.pitch import STEEPEST, pitch_range
 from symgrasp.robot.torso import Torso
 
-__all__ = ["Arm", "Robot"]
+__all__ = ["AZIMUTH", "PITCH", "Arm", "Robot"]
+
+PITCH, AZIMUTH = 5, 6
+"""Where pitch and azimuth are among the values of a pitched arm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +63,13 @@ class Arm:
     ``T_base_tool(q) = Trans(P0)·Rot(H0, q0)·Trans(P1)· … ·Rot(Hn-1, qn-1)·Trans(Pn)·R0``.
     Where the robot has a torso, its joints come first among the arm's, and `at` is the arm alone.
 
+    Five joints cannot set all of a tool pose. Such an arm is `pitched`: two more values, as of joints
+    beyond the tool, turn the *grasp frame*, which the grasp sets, against the tool. Their axes go through the
+    point of the object's axis that the hand is at: the pitch turns about the tangent, which is the closing
+    direction (y), so that the fingers stay at the same two points of the object; the azimuth about the axis
+    of the object (x), within a cell of the map. `tool_pose` is then the pose of the grasp frame, and
+    `grasping` is the arm with the axes and the limits that a grasp gives these two.
+
     Args:
         name: its name in the scene.
         robot: the robot that it belongs to.
@@ -66,14 +78,15 @@ class Arm:
         shared: joints of the chain that are not the arm's: shared with another arm, or of the torso.
 
     Raises:
-        UrdfError: the tool, a hand link or a hand joint is not in the URDF, the chain has neither 6 nor
-            7 revolute joints, or a joint has no limits.
+        UrdfError: the tool, a hand link or a hand joint is not in the URDF, the chain has not 5, 6 or
+            7 revolute joints, or a joint has no limits; the robot of an arm of five has a torso or a support.
 
     Attributes:
-        joint_names: its n joints, from base to tool, those of the torso included.
-        indices: (n,) their indices into the robot's joint values.
-        lower: joint limits (n,), -inf for a continuous joint.
-        upper: joint limits (n,), inf for a continuous joint.
+        joint_names: its joints, from base to tool, those of the torso included.
+        indices: (.,) their indices into the robot's joint values.
+        pitched: whether it has five joints, and its n values are theirs, pitch and azimuth.
+        lower: limits (n,) of its values, -inf for a continuous joint.
+        upper: limits (n,), inf for a continuous joint.
         H: unit axes (., 3) in the base frame at zero, of the joints after the torso, which is at home.
         P: offsets (. + 1, 3) between points on successive axes, at zero.
         R0: orientation (3, 3) of the tool at zero.
@@ -103,10 +116,12 @@ class Arm:
             for j in model.chain(tool)
             if j.name in model.joint_names and j.kind != "prismatic" and j.name not in resting
         ]
-        if len(joints) not in (6, 7):
-            names, expected = [j.name for j in joints], f"6 or 7 revolute joints, not {len(joints)}"
-            if len(joints) < 6:
-                expected += "; a grasp sets position and orientation of the hand in full, which takes six"
+        names = [j.name for j in joints]
+        if len(joints) not in (5, 6, 7):
+            raise UrdfError(model.path, f"arm {name}", names, _joints_expected(len(joints)))
+        self.pitched = len(joints) == 5
+        if self.pitched and (torso or robot.support is not None):
+            expected = f"6 or 7 revolute joints on a robot with a {'torso' if torso else 'support'}"
             raise UrdfError(model.path, f"arm {name}", names, expected)
         self.joint_names = (*torso, *(j.name for j in joints))
         model.check_limits((*self.joint_names, *hand.joints))
@@ -119,6 +134,11 @@ class Arm:
                 )
         self.lower, self.upper = model.lower[self.indices], model.upper[self.indices]
         self.H, self.P, self.R0 = self._screws(joints)
+        if self.pitched:
+            self.H = np.concatenate([self.H, self.R0[:, [1, 0]].T])
+            self.P = np.concatenate([self.P, np.zeros((2, 3))])
+            self.lower = np.append(self.lower, [-STEEPEST, -np.pi])
+            self.upper = np.append(self.upper, [STEEPEST, np.pi])
 
     def _screws(self, joints: list[Joint]) -> tuple[Array, Array, Array]:
         """Return H, P and R0, with the joints of the arm at zero and all others at home."""
@@ -144,13 +164,54 @@ class Arm:
 
     @property
     def dof(self) -> int:
-        """Number of joints."""
-        return len(self.joint_names)
+        """Number n of the values of a configuration: joints, and for a pitched arm pitch and azimuth."""
+        return len(self.lower)
+
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """What these values are called."""
+        return (*self.joint_names, "pitch", "azimuth") if self.pitched else self.joint_names
 
     @property
     def home(self) -> Array:
-        """Parked joint values (n,) of the arm."""
-        return self.robot.home[self.indices]
+        """Parked values (n,) of the arm."""
+        return np.append(self.robot.home[self.indices], np.zeros(self.dof - len(self.indices)))
+
+    def grasping(self, manifold: Manifold, row: int, roll: int) -> Arm:
+        """Return the arm for the grasps of a row and roll of a grid: itself unless it is pitched.
+
+        Args:
+            manifold: the grid.
+            row: height index.
+            roll: index into `ROLLS`.
+        """
+        if not self.pitched:
+            return self
+        h = float(manifold.h[row])
+        radius = float(manifold.profile.radius(h))
+        low, high = pitch_range(self.hand, manifold.profile, h)
+        return self.pitching(
+            (float(self.hand.shift_at(radius)), self.hand.standoff(radius)),
+            (low, high) if roll == 0 else (-high, -low),
+            0.5 * manifold.dtheta,
+        )
+
+    def pitching(self, axis: tuple[float, float], pitch: tuple[float, float], azimuth: float) -> Arm:
+        """Return a pitched arm with other axes and limits of pitch and azimuth.
+
+        Args:
+            axis: y and z (m) of the tool frame where the axis of the object is.
+            pitch: limits (rad) of the pitch about the tool's y.
+            azimuth: largest azimuth (rad) to either side.
+        """
+        assert self.pitched
+        other = copy(self)
+        to_axis = self.R0[:, 1:] @ axis
+        other.P = self.P.copy()
+        other.P[5], other.P[7] = self.P[5:].sum(axis=0) + to_axis, -to_axis
+        other.lower = np.append(self.lower[:5], [pitch[0], -azimuth])
+        other.upper = np.append(self.upper[:5], [pitch[1], azimuth])
+        return other
 
     def at(self, sample: int) -> Arm:
         """Return the arm alone, with the torso at a sample: its joints are those after the torso's."""
@@ -167,7 +228,7 @@ class Arm:
         return np.concatenate([np.broadcast_to(torso, (*q.shape[:-1], len(torso))), q], axis=-1)
 
     def tool_pose(self, q: ArrayLike) -> Array:
-        """Return ``T_base_tool`` (..., 4, 4) for joint values (..., n)."""
+        """Return ``T_base_tool`` (..., 4, 4) for values (..., n): of the grasp frame if pitched."""
         q = np.asarray(q, dtype=float)
         if self.robot.torso is not None:
             values = np.broadcast_to(self.robot.home, (*q.shape[:-1], len(self.robot.home))).copy()
@@ -201,15 +262,21 @@ class Arm:
         q = q + 2 * np.pi * np.round((middle - q) / (2 * np.pi))
         return q, np.all((q >= self.lower) & (q <= self.upper), axis=-1)
 
+    def in_cell(self, q: Array) -> np.ndarray:
+        """Whether values (..., n) grasp in the cell that is meant: not with an azimuth beyond its edge."""
+        if not self.pitched:
+            return np.ones(q.shape[:-1], dtype=bool)
+        return (q[..., AZIMUTH] >= self.lower[AZIMUTH]) & (q[..., AZIMUTH] <= self.upper[AZIMUTH])
+
     def robot_values(self, q: ArrayLike, opening: float | None = None) -> Array:
         """Return values (N,) of all the robot's joints: this arm at ``q`` (n,), the rest at home.
 
         Args:
-            q: joint values of the arm.
+            q: values of the arm; pitch and azimuth move no joint.
             opening: opening (m) of the hand; None leaves the hand at home.
         """
         values = self.robot.home.copy()
-        values[self.indices] = q
+        values[self.indices] = np.asarray(q, dtype=float)[: len(self.indices)]
         if opening is not None:
             for joint, value in self.hand.joint_values(opening).items():
                 values[self.robot.model.joint_names.index(joint)] = value
@@ -244,3 +311,11 @@ class Arm:
         hulls = self.hand_hulls(self.hand.opening(radius))
         T_object_tool = self.hand.tool_pose(np.eye(4), manifold.h[row], 0.0, ROLLS[roll], radius)
         return handprint(hulls, manifold, T_object_tool)
+
+
+def _joints_expected(count: int) -> str:
+    """Return what is expected of an arm, and what it lacks that has not so many joints."""
+    expected = f"5 to 7 revolute joints, not {count}"
+    if count >= 5:
+        return expected
+    return f"{expected}; fewer set the position of the hand, but not the direction of its approach"

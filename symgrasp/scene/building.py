@@ -15,6 +15,7 @@ from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.format import (
     SHAPES,
     HandFile,
+    MapSettings,
     ObjectFile,
     ObstacleFile,
     RobotFile,
@@ -24,7 +25,20 @@ from symgrasp.scene.format import (
 from symgrasp.scene.parts import Obstacle, SceneParts, Task
 from symgrasp.scene.robots import RobotBuilder
 
-__all__ = ["SceneBuilder"]
+__all__ = ["SceneBuilder", "check_approach"]
+
+
+def check_approach(source: str, arms: Iterable[Arm], settings: MapSettings) -> None:
+    """Check that every arm can follow the approach that maps ask for.
+
+    Raises:
+        SceneError: an arm has five joints, which do not keep the direction of its hand along a line.
+    """
+    for arm in arms:
+        if arm.pitched and settings.approach:
+            raise SceneError(
+                source, "map.approach", settings.approach, f"0 with an arm of five joints, {arm.name}"
+            )
 
 
 class SceneBuilder:
@@ -66,6 +80,7 @@ class SceneBuilder:
             arms |= {arm.name: arm for arm in built.arms}
             entries.append(built.file)
             notes += built.notes
+        check_approach(self.source, arms.values(), file.map)
         return SceneParts(
             file.model_copy(update={"robots": tuple(entries)}),
             robots,

@@ -9,7 +9,7 @@ import numpy as np
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import independent_solver, over_torso
+from symgrasp.ik import GridSolvers, independent_solver
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
@@ -41,31 +41,34 @@ def assert_true(
         m: the map.
         cells: the cells to check; all of them if None.
     """
-    ik = over_torso(arm, lambda alone: independent_solver(alone, scene.settings.redundancy))
+    samples = scene.settings.redundancy
+    solvers = GridSolvers(arm, m.manifold, lambda own: independent_solver(own, samples))
     (holders,) = [task.arms for task in scene.tasks.values() if task.name == m.task]
-    checker = CandidateChecker(world, arm, ik, scene.settings.approach, holders=holders)
-    tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
+    tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, m.T_world_object)
     world.margin = scene.settings.margin
     world.set_arms(())
     world.set_object(m.T_world_object)
     for index in np.argwhere(m.reason >= Reason.SELF_COLLISION) if cells is None else cells:
         cell = Cell(*index)
+        ik = solvers.at(cell.row, cell.roll)
+        checker = CandidateChecker(world, ik.arm, ik, scene.settings.approach, holders=holders)
         if m.feasible[cell]:
-            _check_witness(world, arm, checker, m, cell, tools[cell])
+            _check_witness(world, checker, m, cell, tools[cell])
         else:
-            _check_collision(world, arm, checker, m, cell, tools[cell])
+            _check_collision(world, checker, m, cell, tools[cell])
 
 
 def _check_witness(
     world: BulletWorld,
-    arm: Arm,
     checker: CandidateChecker,
     m: FeasibilityMap,
     cell: Cell,
     T_base_tool: np.ndarray,
 ) -> None:
-    witness = m.witness(cell)
+    arm, witness = checker.arm, m.witness(cell)
     assert witness is not None
+    assert (arm.lower <= witness.q).all()
+    assert (witness.q <= arm.upper).all()
     assert np.allclose(arm.tool_pose(witness.q), T_base_tool, atol=TOLERANCE)
     result = checker.check(T_base_tool, witness.q, witness.sample, witness.opening)
     assert result.reason == Reason.FEASIBLE
@@ -75,13 +78,13 @@ def _check_witness(
 
 def _check_collision(
     world: BulletWorld,
-    arm: Arm,
     checker: CandidateChecker,
     m: FeasibilityMap,
     cell: Cell,
     T_base_tool: np.ndarray,
 ) -> None:
     """Some candidate comes to the collision that the map names."""
+    arm = checker.arm
     reason, opening = Reason(int(m.reason[cell])), float(m.opening[cell.row])
     solutions = checker.ik.solve(T_base_tool)
     inside = np.flatnonzero(solutions.inside)

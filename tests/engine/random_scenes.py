@@ -23,6 +23,7 @@ ARMS = {
     "offset_shoulder": [0.0, 0.0, 0.0, 0.9, 0.0, 0.6, 0.0],
     "offset_arm": [0.0, -0.6, 0.0, 1.2, 0.0, 0.6, 0.0],
     "offset_wrist": [0.0, -0.5, -1.0, 0.0, 1.0, 0.0],
+    "five_joints": [0.0, -0.6, -0.9, 0.3, 0.0],
 }
 """URDF in tests/data → a home in which the arm is free."""
 
@@ -63,6 +64,25 @@ def random_scene(seed: int, arm: str = "") -> dict[str, Any]:
         "margin": float(rng.choice([0.0, 0.0, 0.005, 0.02])),
         "approach": float(rng.choice([0.0, 0.0, 0.03, 0.1])),
     }
+    return content
+
+
+def random_pitched_scene(seed: int) -> dict[str, Any]:
+    """Return a scene like those of `random_scene` with an arm of five joints.
+
+    Args:
+        seed: of everything in it. Of three hands, one is on the axis of the last joint, one beside it in the
+            direction that the fingers close in, one across.
+    """
+    content = random_scene(seed, "five_joints")
+    rng = np.random.default_rng(seed)
+    (robot,) = content["robots"]
+    off = [[0.0, 0.0, 0.0], [0.0, 0.008, 0.0], [0.008, 0.0, 0.0]][seed % 3]
+    robot["mount"]["pose"] = {"position": off}
+    robot["base"]["position"] = rng.normal([0.05, 0.0, 0.0], 0.05).round(4).tolist()
+    del content["map"]["approach"]
+    if rng.choice([0, 1]):  # lying, or anyhow
+        content["tasks"][0]["pose"]["rpy_deg"] = rng.uniform([60, -30, -180], [120, 30, 180]).tolist()
     return content
 
 

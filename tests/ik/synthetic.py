@@ -24,6 +24,7 @@ def synthetic(H: ArrayLike, P: ArrayLike, R0: Array | None = None) -> Arm:
         P=np.array(P, dtype=float),
         R0=np.eye(3) if R0 is None else R0,
         joint_names=tuple(f"j{k}" for k in range(n)),
+        pitched=False,
         lower=np.full(n, -2.9),
         upper=np.full(n, 2.9),
         robot=SimpleNamespace(model=SimpleNamespace(path="synthetic"), torso=None),

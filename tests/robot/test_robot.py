@@ -94,10 +94,10 @@ def test_a_shared_model_does_not_share_state(panda):
     np.testing.assert_array_equal(a.robot.home, home)
 
 
-def test_six_and_seven_joint_arms_only(panda):
+def test_arms_of_five_to_seven_joints_only(panda):
     robot = Robot("panda", panda, np.eye(4), panda.default_values())
-    with pytest.raises(UrdfError, match=r"6 or 7 revolute joints, not 5; .* takes six"):
-        Arm("short", robot, "panda_link5", HANDS["franka"])
+    with pytest.raises(UrdfError, match=r"5 to 7 revolute joints, not 4; fewer set the position"):
+        Arm("short", robot, "panda_link4", HANDS["franka"])
 
 
 @pytest.mark.parametrize(
