@@ -74,7 +74,7 @@ class ArmIK(ABC):
 
     Attributes:
         locked: index of the locked joint, or None for a 6-joint arm.
-        phi: (samples,) values of the locked joint: centres of equal parts of its range.
+        phi: (samples,) values of the locked joint: centres of equal parts of its range, of one turn at most.
     """
 
     def __init__(
@@ -123,4 +123,7 @@ def centres(lower: float, upper: float, samples: int) -> Array:
     """Return the centres (samples,) of equal parts of a joint's range (rad); of a turn without limits."""
     if not np.isfinite(upper - lower):
         lower, upper = -np.pi, np.pi
+    elif upper - lower > 2 * np.pi:  # what is a full turn apart is the same to the other joints
+        middle = 0.5 * (lower + upper)
+        lower, upper = middle - np.pi, middle + np.pi
     return lower + (np.arange(samples) + 0.5) * (upper - lower) / samples

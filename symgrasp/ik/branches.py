@@ -11,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.compiling import ENTRY, njit
+from symgrasp.ik.arcs import ARCS, HALVINGS
 from symgrasp.ik.chain import THREE_PARALLEL
 from symgrasp.ik.joints import misses, settle
 from symgrasp.ik.newton import polish_in
-from symgrasp.ik.pair import NUMBERS, PAIR_BRANCHES, pair_branches
+from symgrasp.ik.pair import PAIR_BRANCHES, STARTS, VIEWS, pair_branches
 from symgrasp.ik.pair_geometry import MEETING_PAIR
+from symgrasp.ik.pair_polynomial import POLYNOMIAL_NUMBERS
 from symgrasp.ik.parallel import parallel_branches
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
@@ -31,20 +33,43 @@ class Memory(NamedTuple):
     """Arrays that the inverse kinematics of one thread writes to.
 
     Attributes:
-        numbers: (NUMBERS,) complex numbers of `pair_branches`.
         J: (n, 6) for `polish_in`.
         A: (n, n + 1) for `polish_in`.
+        numbers: (POLYNOMIAL_NUMBERS,) complex numbers, for the polynomial of `pair_branches`.
+        values: (ARCS,) its values.
+        coefficients: (HALVINGS + 2, ARCS) its coefficients on parts of an arc.
+        spans: (HALVINGS + 2, 2) where these parts begin and end.
+        views: (VIEWS, 2) centres (rad) and stretches of the parts of a turn from which it is computed.
+        starts: (2, STARTS, n) joint values, inside the limits and outside, from which Newton's method starts.
+        counts: (2,) how many.
+        row: (n,) joint values.
     """
 
-    numbers: np.ndarray
     J: Array
     A: Array
+    numbers: np.ndarray
+    values: Array
+    coefficients: Array
+    spans: Array
+    views: Array
+    starts: Array
+    counts: np.ndarray
+    row: Array
 
 
 def new_memory(joints: int) -> Memory:
     """Return memory for an arm of that many joints."""
     return Memory(
-        np.empty(NUMBERS, dtype=np.complex128), np.empty((joints, 6)), np.empty((joints, joints + 1))
+        np.empty((joints, 6)),
+        np.empty((joints, joints + 1)),
+        np.empty(POLYNOMIAL_NUMBERS, dtype=np.complex128),
+        np.empty(ARCS),
+        np.empty((HALVINGS + 2, ARCS)),
+        np.empty((HALVINGS + 2, 2)),
+        np.empty((VIEWS, 2)),
+        np.empty((2, STARTS, joints)),
+        np.empty(2, dtype=np.int64),
+        np.empty(joints),
     )
 
 
@@ -85,12 +110,12 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         exists[b] = False
         inside[b] = False
     if joint[8] == MEETING_PAIR:
-        pair_branches(g, joint, limits, chain.forward, chain.fixed, T, q, exists, inside, memory)
-        solvable = False
+        solvable = pair_branches(chain, k, T, inside_only, q, exists, inside, memory)
+        some = inside_only
         for b in range(exists.shape[0]):
             exists[b] = exists[b] and _in_cell(chain, q[b])
-            solvable |= exists[b]
-        return solvable
+            some |= exists[b]
+        return solvable and some
     if joint[8] == THREE_PARALLEL:
         solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside)
     else:

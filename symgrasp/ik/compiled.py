@@ -110,7 +110,7 @@ class CompiledIK(ArmIK):
                 ]
             ),
             limits=_limits(arm, 0.0),
-            leeway=_limits(arm, LEEWAY if rounded else 0.0),
+            leeway=_limits(arm, LEEWAY if rounded or rows[0].family == MEETING_PAIR else 0.0),
             forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
             fixed=np.arange(arm.dof) == locked,
         )

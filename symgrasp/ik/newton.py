@@ -23,7 +23,7 @@ __all__ = ["POLISHED", "polish", "polish_in"]
 POLISHED = 1e-9
 """Largest error (m and rad) of the tool at a configuration that counts as polished."""
 
-NO_BETTER = 1e-12
+NO_BETTER = 1e-14
 """Error (m and rad) that no further step is made for; rounding leaves about 1e-15."""
 
 STEPS = 12
@@ -65,7 +65,10 @@ def polish_in(forward, fixed, q, T, J, A):
             if not fixed[j]:
                 q[j] += A[k, free]
                 k += 1
+        before = max(move, turn)
         free, move, turn, twist = _linearise(forward, fixed, q, T, J)
+        if before <= POLISHED and max(move, turn) > 0.5 * before:
+            break  # all that rounding of the pose allows
     return move <= POLISHED and turn <= POLISHED
 
 

@@ -54,6 +54,35 @@ def test_the_solver_at_other_samples():
     assert len(solver.phi) == 4
 
 
+@pytest.mark.parametrize(
+    ("name", "seed", "which", "count"),
+    [("tiago_pro", 0, 463, 20000), ("tiago_pro", 0, 17693, 20000)],
+)
+def test_beside_singular_poses(name, seed, which, count):
+    """Of many random configurations, those beside which others of the same pose all but coincide."""
+    arm = ik.bare_arm(ROBOTS[name], ROBOTS[name].arms[0])
+    q = ik.random_configurations(arm, count, seed)[[which]]
+    assert ik.recall(CompiledIK(arm, 1), q) == 1
+
+
+def test_redundancy_samples_are_distinct():
+    """Joints of xArm7 turn twice around: values a full turn apart would be the same to all others."""
+    arm = ik.bare_arm(ROBOTS["xarm7"], ROBOTS["xarm7"].arms[0])
+    solver = CompiledIK(arm, 16)
+    assert arm.upper[solver.locked] - arm.lower[solver.locked] > 4 * np.pi - 1e-3
+    steps = np.diff(np.append(solver.phi, solver.phi[0] + 2 * np.pi))
+    np.testing.assert_allclose(steps, np.pi / 8)
+    q = ik.random_configurations(arm, 1, 0)[0]
+    q[solver.locked] = solver.phi[3]
+    q[[0, 2]] = 4.0, -4.5  # more than half a turn
+    assert ((q > arm.lower) & (q < arm.upper)).all()
+    found = solver.solve_sample(arm.tool_pose(q), 3)
+    apart = (found.q - q + np.pi) % (2 * np.pi) - np.pi
+    same = np.abs(apart).max(axis=1) < 1e-6
+    assert found.inside[same].all()
+    assert np.abs(found.q[same][0]).max() <= np.pi + 1e-9  # where the limits are furthest away
+
+
 def test_problems_are_rows():
     robot = ROBOTS["panda"]
     absent = replace(robot, urdf="package://no_such_package/robot.urdf")

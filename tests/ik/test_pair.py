@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 
 from symgrasp.errors import UrdfError
 from symgrasp.ik import CompiledIK, solver_for
+from symgrasp.ik.branches import branch_count, branches_at, new_memory
 from symgrasp.poses import pose_error
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
@@ -103,6 +104,43 @@ def test_an_answer_does_not_depend_on_what_else_is_asked(name, arms):
             part, own = solver.solve_sample(poses[k], sample), every[k].sample == sample
             np.testing.assert_array_equal(part.q, every[k].q[own])
             np.testing.assert_array_equal(part.branch, every[k].branch[own])
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_an_answer_does_not_depend_on_what_is_left_out(name, arms):
+    """What is outside the limits is left out early; what remains is the same, bit for bit."""
+    arm = arms[name]
+    solver = CompiledIK(arm, 1)
+    shape = (branch_count(solver.chain), arm.dof)
+    some = 0
+    for T in arm.tool_pose(samples(arm, 150, 5)):
+        answers = []
+        for inside_only in (False, True):
+            q, exists, inside = (
+                np.empty(shape),
+                np.empty(shape[0], dtype=bool),
+                np.empty(shape[0], dtype=bool),
+            )
+            branches_at(solver.chain, 0, T, inside_only, q, exists, inside, new_memory(arm.dof))
+            answers.append((q[inside], inside))
+        np.testing.assert_array_equal(answers[0][1], answers[1][1])
+        np.testing.assert_array_equal(answers[0][0], answers[1][0])
+        some += len(answers[0][0])
+    assert some > 20
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_out_of_reach(name, arms):
+    """A pose further away than the arm is long is known to be out of reach, and no other is called so."""
+    arm = arms[name]
+    solver = CompiledIK(arm, 1)
+    shape, length = (branch_count(solver.chain), arm.dof), np.linalg.norm(arm.P, axis=1).sum()
+    q, exists, inside = np.empty(shape), np.empty(shape[0], dtype=bool), np.empty(shape[0], dtype=bool)
+    for row, T in zip(samples(arm, 50, 6), arm.tool_pose(samples(arm, 50, 6)), strict=True):
+        at = solver if solver.locked is None else solver.at(row[[solver.locked]])
+        assert branches_at(at.chain, 0, T, True, q, exists, inside, new_memory(arm.dof))
+        T[:3, 3] *= 100.0 * length / np.linalg.norm(T[:3, 3])  # the two axes may meet far from the arm
+        assert not branches_at(at.chain, 0, T, True, q, exists, inside, new_memory(arm.dof))
 
 
 def by_brute_force(arm: Arm, T: np.ndarray, starts: int, seed: int) -> list[np.ndarray]:

@@ -1,0 +1,151 @@
+"""Zeros of a real trigonometric polynomial from its values, compiled: arc by arc, in Bernstein's basis.
+
+On an arc about θ' the polynomial of degree d is ``p(y) / (1 + t² y²)^d`` of ``y = tan((θ − θ') / 2) / t``,
+and p a polynomial of degree 2d. Its Bernstein coefficients bound it: where all have one sign it has no zero
+there, and where the sign changes once it has one (J. Lane and R. Riesenfeld, Bounds on a polynomial, 1981).
+Other arcs are halved.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from symgrasp.compiling import njit
+from symgrasp.ik.vectors import STRICT
+from symgrasp.poses import Array
+
+__all__ = [
+    "ARCS", "HALVINGS", "MORE", "NO_ZERO", "ONE_ZERO", "angle_in_arc", "bernstein", "double_zero",
+    "halve", "largest_of", "single_zero", "zeros_within",
+]  # fmt: skip
+
+DEGREE = 8
+"""Degree of the trigonometric polynomials."""
+
+ARCS = 2 * DEGREE + 1
+"""Values that determine one, at equal steps of a turn; each is the middle of an arc."""
+
+HALVINGS = 14
+"""Halvings of an arc after which two zeros that are still together are taken for a double one."""
+
+NO_ZERO, ONE_ZERO, MORE = 0, 1, 2
+"""How many zeros there are, as far as signs tell."""
+
+TANGENT = math.tan(0.5 * math.pi / ARCS)
+"""The t of an arc."""
+
+APART = 0.05
+"""Least distance of two zeros that are taken for a double one, as a share of half the part of an arc."""
+
+STEPS, CLOSE = 30, 1e-9
+"""Steps, and width (of the arc), at which the search for a single zero ends."""
+
+
+def _from_values() -> Array:
+    """Return the matrix (ARCS, ARCS) from values, those of an arc's middle first, to its coefficients."""
+    n = ARCS - 1
+    y = np.cos((np.arange(ARCS) + 0.5) * np.pi / ARCS)
+    theta = 2.0 * np.arctan(TANGENT * y)
+    apart = (theta[:, None] - 2.0 * np.pi * np.arange(ARCS) / ARCS + np.pi) % (2.0 * np.pi) - np.pi
+    dirichlet = np.sinc(ARCS * apart / (2.0 * np.pi)) / np.sinc(apart / (2.0 * np.pi))
+    u = 0.5 * (1.0 + y)
+    basis = np.array([math.comb(n, k) * u**k * (1.0 - u) ** (n - k) for k in range(ARCS)]).T
+    weight = (1.0 + (TANGENT * y[:, None]) ** 2) ** DEGREE
+    return np.linalg.inv(basis).astype(np.float64) @ (weight * dirichlet)
+
+
+FROM_VALUES = _from_values()
+
+
+@njit(**STRICT)
+def bernstein(values, arc, c):
+    """Write the coefficients (ARCS,) of the polynomial on an arc into c, from all of its values (ARCS,)."""
+    for j in range(ARCS):
+        total = 0.0
+        for i in range(ARCS):
+            total += FROM_VALUES[j, i] * values[(arc + i) % ARCS]
+        c[j] = total
+
+
+@njit(**STRICT)
+def angle_in_arc(arc, u):
+    """Return the angle (rad) at a place in an arc, where its ends are at 0 and 1."""
+    return 2.0 * math.pi * arc / ARCS + 2.0 * math.atan(TANGENT * (2.0 * u - 1.0))
+
+
+@njit(**STRICT)
+def zeros_within(c, noise):
+    """Return `NO_ZERO`, `ONE_ZERO` or more, for coefficients that are known up to some noise."""
+    least, most, changes = c[0], c[0], 0
+    for j in range(1, ARCS):
+        least, most = min(least, c[j]), max(most, c[j])
+        if (c[j] < 0.0) != (c[j - 1] < 0.0):
+            changes += 1
+    if least > noise or most < -noise:
+        return NO_ZERO
+    return ONE_ZERO if changes == 1 else MORE
+
+
+@njit(**STRICT)
+def largest_of(c):
+    """Return the largest size of some coefficients."""
+    largest = 0.0
+    for j in range(ARCS):
+        largest = max(largest, abs(c[j]))
+    return largest
+
+
+@njit(**STRICT)
+def halve(c, left, right):
+    """Write the coefficients of both halves (de Casteljau)."""
+    for j in range(ARCS):
+        right[j] = c[j]
+    for k in range(ARCS):
+        left[k] = right[0]
+        for j in range(ARCS - 1 - k):
+            right[j] = 0.5 * (right[j] + right[j + 1])
+
+
+@njit(**STRICT)
+def _value(c, u):
+    """Return the polynomial at a place from 0 to 1 (W. Boehm and A. Müller, On de Casteljau's algorithm)."""
+    power, choose, total = 1.0, 1.0, c[0] * (1.0 - u)
+    for j in range(1, ARCS - 1):
+        power *= u
+        choose *= (ARCS - j) / j
+        total = (total + power * choose * c[j]) * (1.0 - u)
+    return total + power * u * c[ARCS - 1]
+
+
+@njit(**STRICT)
+def single_zero(c):
+    """Return the place, from 0 to 1, of the only zero (the Illinois method)."""
+    a, b, fa, fb = 0.0, 1.0, c[0], c[ARCS - 1]
+    u, side = 0.5, 0
+    for _ in range(STEPS):
+        before, u = u, (a * fb - b * fa) / (fb - fa)
+        f = _value(c, u)
+        if f == 0.0 or abs(u - before) < CLOSE:
+            break
+        if (f < 0.0) == (fb < 0.0):
+            b, fb = u, f
+            fa *= 0.5 if side > 0 else 1.0
+            side = 1
+        else:
+            a, fa = u, f
+            fb *= 0.5 if side < 0 else 1.0
+            side = -1
+    return u
+
+
+@njit(**STRICT)
+def double_zero(c):
+    """Return two places near two zeros that all but coincide, or where there almost are some."""
+    middle = _value(c, 0.5)
+    slope, bend = 0.5 * (c[ARCS - 1] - c[0]), 0.5 * (c[ARCS - 1] + c[0]) - middle
+    top = min(max(-0.5 * slope / bend, -1.0), 1.0) if bend != 0.0 else 0.0
+    rest = -(middle + top * (slope + top * bend)) / bend if bend != 0.0 else 0.0
+    apart = math.sqrt(min(max(rest, APART * APART), 1.0))
+    return 0.5 + 0.5 * (top - apart), 0.5 + 0.5 * (top + apart)

@@ -1,0 +1,91 @@
+"""Zeros of trigonometric polynomials from 17 values, against the zeros that they were made of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from symgrasp.ik import arcs
+from symgrasp.poses import Array
+
+
+def polynomial(roots: np.ndarray, angle: Array) -> Array:
+    """Return the trigonometric polynomial of degree 8 with 16 zeros, complex ones in conjugate pairs."""
+    return np.prod(np.sin((np.asarray(angle)[..., None] - roots) / 2), axis=-1).real
+
+
+def zeros(values: Array, noise: float) -> list[float]:
+    """Return all zeros; of those that all but coincide, at most two places near them."""
+    found = []
+    for arc in range(arcs.ARCS):
+        c = np.empty(arcs.ARCS)
+        arcs.bernstein(values, arc, c)
+        parts = [(c, 0.0, 1.0)]
+        while parts:
+            c, first, last = parts.pop()
+            many = arcs.zeros_within(c, noise)
+            if many == arcs.ONE_ZERO:
+                places = [arcs.single_zero(c)]
+            elif many == arcs.NO_ZERO:
+                continue
+            elif last - first < 1e-4 or arcs.largest_of(c) < 10 * noise:
+                places = list(arcs.double_zero(c))
+            else:
+                left, right = np.empty(arcs.ARCS), np.empty(arcs.ARCS)
+                arcs.halve(c, left, right)
+                middle = 0.5 * (first + last)
+                parts += [(left, first, middle), (right, middle, last)]
+                continue
+            found += [arcs.angle_in_arc(arc, first + (last - first) * u) for u in places]
+    return found
+
+
+def apart(a: float, others: list[float]) -> float:
+    return float(np.abs((np.array(others) - a + np.pi) % (2 * np.pi) - np.pi).min(initial=np.inf))
+
+
+TURN = 2 * np.pi * np.arange(arcs.ARCS) / arcs.ARCS
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 8))
+def test_all_real_zeros(seed, pairs):
+    rng = np.random.default_rng(seed)
+    real = rng.uniform(-np.pi, np.pi, 16 - 2 * pairs)
+    complex_ = rng.uniform(-np.pi, np.pi, pairs) + 1j * rng.uniform(0.2, 1.0, pairs)
+    roots = np.concatenate([real, complex_, complex_.conj()])
+    values = polynomial(roots, TURN)
+    values /= np.abs(values).max()
+    found = zeros(values, 1e-14)
+    # Where others are near, rounding moves a zero.
+    for zero in real:
+        alone = np.prod(np.abs(np.sin((zero - roots[roots != zero]) / 2)))
+        assert apart(zero, found) < 1e-9 + 1e-12 / max(alone, 1e-12)
+    if len(real) == 0:
+        assert not found
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-6, 1e-3, 1e-9j, 1e-7j])
+def test_zeros_that_all_but_coincide(gap):
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        others = rng.uniform(-np.pi, np.pi, 7) + 1j * rng.uniform(0.3, 1.0, 7)
+        zero = float(rng.uniform(-np.pi, np.pi))
+        roots = np.concatenate([[zero + gap / 2, zero - gap / 2], others, others.conj()])
+        values = polynomial(roots, TURN)
+        found = zeros(values / np.abs(values).max(), 1e-14)
+        assert apart(zero + np.real(gap) / 2, found) < 1e-4
+        assert apart(zero - np.real(gap) / 2, found) < 1e-4
+
+
+def test_a_polynomial_on_an_arc():
+    """The first coefficient and the last are its values at the ends, up to a positive factor."""
+    roots = np.random.default_rng(1).uniform(-np.pi, np.pi, 16)
+    values, c = polynomial(roots, TURN), np.empty(arcs.ARCS)
+    for arc in range(arcs.ARCS):
+        arcs.bernstein(values, arc, c)
+        for u, end in ((0.0, c[0]), (1.0, c[-1])):
+            expected = polynomial(roots, np.array(arcs.angle_in_arc(arc, u)))
+            assert end == pytest.approx(expected / np.cos(np.pi / 34) ** 16, rel=1e-6, abs=1e-14)
