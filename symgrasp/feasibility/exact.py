@@ -60,7 +60,7 @@ class ExactEngine:
         manifold: the grid; maps may be asked for others with the same heights.
 
     Raises:
-        UrdfError: the arm has no closed-form inverse kinematics.
+        UrdfError: no inverse kinematics is known for the arm.
         NotImplementedError: the arm is not of the kinds the engine knows; see `knows`.
     """
 

@@ -117,7 +117,7 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
             some |= exists[b]
         return solvable and some
     if joint[8] == THREE_PARALLEL:
-        solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside)
+        solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, memory.numbers)
     else:
         solvable = spherical_branches(g, joint, limits, T, inside_only, q, exists, inside)
     for b in range(exists.shape[0]):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import product
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -13,27 +12,43 @@ from symgrasp.poses import Array, rotation_about
 from symgrasp.robot.robot import Arm
 
 __all__ = [
-    "AXES", "BASE", "BEND", "CENTRE", "CENTRE_SEEN", "COSINE_TOLERANCE", "ELBOW", "FOREARM", "HAND",
-    "MEETING", "MIDDLE", "P0", "PARALLEL_PHI", "PARALLEL_SLACK", "PHI", "R0", "SHOULDER", "SLACK",
-    "THREE_PARALLEL", "TRIPLE", "TURN", "WRIST", "WRIST_SEEN", "Chain", "ChainGeometry",
-    "ParallelGeometry", "SphericalGeometry",
-    "chain_geometries", "has_exact_pair", "is_rounded",
+    "AXES", "BASE", "BEND", "CENTRE", "CENTRE_SEEN", "COARSE", "COSINE_TOLERANCE", "ELBOW", "EXACT",
+    "FOREARM", "HAND", "MEETING", "MIDDLE", "OFFSET", "P0", "PARALLEL_PHI", "PARALLEL_SLACK", "PHI", "R0",
+    "SHOULDER", "SKEW", "SLACK", "THREE_PARALLEL", "TRIPLE", "TURN", "WRIST", "WRIST_SEEN", "Chain",
+    "ChainGeometry", "ParallelGeometry", "Precision", "SphericalGeometry", "chain_geometries",
+    "has_exact_pair",
 ]  # fmt: skip
 
-MEETING_DISTANCE = 1e-8
-"""Axes whose distance is below this (m) meet in a point, up to the rounding of numbers."""
 
-EXACTLY_PARALLEL = 1e-8
-"""Unit axes whose cross product is shorter than this are parallel, up to the rounding of numbers."""
+class Precision(NamedTuple):
+    """How far off axes may be that are taken to meet, or to be parallel.
+
+    Attributes:
+        distance: of axes that meet in a point (m).
+        sine: length of the cross product of unit axes that are parallel.
+    """
+
+    distance: float
+    sine: float
+
+
+EXACT = Precision(1e-8, 1e-8)
+"""Up to the rounding of numbers."""
+
+ROUNDED = Precision(2e-5, 1e-4)
+"""As rounding to four decimals leaves them: an angle is off by up to 5e-5 rad, which with the length of a
+link is 2e-5 m. What is more may be an offset that the arm was built with, and the closed form of axes without
+it would lose solutions beside singular poses."""
+
+COARSE = Precision(5e-4, 1e-3)
+"""As an angle of 1.57 leaves them, which is off by 8e-4 rad; for arms of which nothing else is known. The
+closed form of axes where they are meant to be only says where Newton's method starts on the true ones."""
 
 PARALLEL = 1e-6
 """Unit axes whose cross product is shorter than this do not meet in a point that can be computed."""
 
-ROUNDED_DISTANCE, ROUNDED_PARALLEL = 5e-4, 1e-3
-"""The same (m, and length of the cross product) for axes that are meant to meet or to be parallel in a URDF
-that rounds its angles. One of 1.57 for a quarter turn is off by 8e-4 rad, which with the length of a link is
-3e-4 m; offsets that arms are built with are greater, and a smaller one does no harm either: the closed form
-of the axes where they are meant to be only says where Newton's method starts on the true ones."""
+LEAST_SKEW = 1e-3
+"""Least determinant (m) of the equations of joint 5 where its axis and that of joint 6 do not meet."""
 
 SLACK_RATIO = 30.0
 """Slack of the roots of a closed form (see `symgrasp.ik.joints.sine`) for each m or rad that axes are moved
@@ -49,7 +64,7 @@ CENTRE, WRIST, CENTRE_SEEN, WRIST_SEEN, MIDDLE, TRIPLE, PHI, SLACK = 30, 33, 36,
 """Where the other parts of a `SphericalGeometry` begin."""
 
 BASE, MEETING, SHOULDER, ELBOW, FOREARM, HAND, BEND, TURN = 30, 33, 36, 39, 42, 45, 48, 53
-PARALLEL_PHI, PARALLEL_SLACK = 58, 59
+OFFSET, SKEW, PARALLEL_PHI, PARALLEL_SLACK = 58, 61, 68, 69
 """Where the other parts of a `ParallelGeometry` begin."""
 
 SPHERICAL, THREE_PARALLEL = 0, 1
@@ -139,13 +154,16 @@ class ParallelGeometry(NamedTuple):
         R0: (3, 3) orientation of the tool.
         p0: (3,) position of the tool.
         base: (3,) a point on the axis of joint 1.
-        W: (3,) point where the axes of joints 5 and 6 meet.
+        W: (3,) point where the axes of joints 5 and 6 meet, or that of joint 6 is nearest to that of joint 5.
         shoulder: (3,) O2.
         elbow: (3,) O3.
         forearm: (3,) O4 − O3.
-        hand: (3,) W − O4.
+        hand: (3,) O5 − O4, for the point O5 on the axis of joint 5 that is nearest to W.
         bend: (5,) constants of subproblem 3 for joint 3, see `_cosine_constants`.
         turn: (5,) constants of subproblem 4 for joint 5, see `_cosine_constants`.
+        offset: (3,) W − O5; zero where they meet.
+        skew: (7,) whether they do not, the parts of W and h6 along h2 that joint 5 does not change, and the
+            inverse of the matrix by which it changes them.
         phi: the value φ (rad).
         slack: slack of the roots, which an arm has whose axes had to be moved; 0 for others.
     """
@@ -162,6 +180,8 @@ class ParallelGeometry(NamedTuple):
     hand: Array
     bend: Array
     turn: Array
+    offset: Array
+    skew: Array
     phi: float
     slack: float
 
@@ -171,7 +191,7 @@ class ParallelGeometry(NamedTuple):
         return THREE_PARALLEL
 
     def packed(self) -> Array:
-        """Return all parts but the first in one row (60,)."""
+        """Return all parts but the first in one row (70,)."""
         return np.concatenate([np.ravel(part) for part in self[1:]])
 
 
@@ -198,10 +218,12 @@ class _Joints(NamedTuple):
     phi: float
 
 
-def chain_geometries(arm: Arm, locked: int | None, phi: Array) -> Sequence[ChainGeometry] | None:
+def chain_geometries(
+    arm: Arm, locked: int | None, phi: Array
+) -> tuple[Precision, Sequence[ChainGeometry]] | None:
     """Return the arm's geometry at every redundancy value, or None where it is of no compiled family.
 
-    Exact closed forms go before rounded ones, and these before the search.
+    Exact closed forms go before rounded ones, these before the search, and coarse ones come last.
 
     Args:
         arm: the arm.
@@ -209,31 +231,25 @@ def chain_geometries(arm: Arm, locked: int | None, phi: Array) -> Sequence[Chain
         phi: (K,) values of the locked joint (rad).
 
     Returns:
-        K geometries of one family.
+        Up to what its axes meet or are parallel, and K geometries of one family.
     """
-    closed_forms = product((False, True), (_spherical, _three_parallel))
-    for (rounded, find), backwards in product(
-        [*closed_forms, (False, _meeting_pair), (True, _meeting_pair)], (False, True)
-    ):
-        rows = [find(_joints(arm, locked, float(value), backwards), rounded) for value in phi]
-        known = [row for row in rows if row is not None]
-        if find is _meeting_pair and known:
-            # At single values the axes of a pair may be parallel: nothing is found there.
-            nowhere = known[0]._replace(W=np.full(3, np.nan))
-            return [row or nowhere._replace(phi=float(value)) for row, value in zip(rows, phi, strict=True)]
-        if len(known) == len(rows):
-            return known
+    for precision, find in _FAMILIES:
+        for backwards in (False, True):
+            rows = [find(_joints(arm, locked, float(value), backwards), precision) for value in phi]
+            known = [row for row in rows if row is not None]
+            if find is _meeting_pair and known:
+                # At single values the axes of a pair may be parallel: nothing is found there.
+                nowhere = known[0]._replace(W=np.full(3, np.nan))
+                filled = zip(rows, phi, strict=True)
+                return precision, [row or nowhere._replace(phi=float(value)) for row, value in filled]
+            if len(known) == len(rows):
+                return precision, known
     return None
 
 
 def has_exact_pair(arm: Arm, locked: int | None, phi: float) -> bool:
     """Whether two axes at one end of an arm meet without being moved, with a joint locked at φ."""
-    return any(_meeting_pair(_joints(arm, locked, phi, end), False) is not None for end in (False, True))
-
-
-def is_rounded(geometries: Sequence[ChainGeometry]) -> bool:
-    """Whether axes of an arm had to be moved for its closed form."""
-    return any(not isinstance(row, PairGeometry) and row.slack > 0.0 for row in geometries)
+    return any(_meeting_pair(_joints(arm, locked, phi, end), EXACT) is not None for end in (False, True))
 
 
 def _joints(arm: Arm, locked: int | None, phi: float, backwards: bool) -> _Joints:
@@ -252,50 +268,100 @@ def _joints(arm: Arm, locked: int | None, phi: float, backwards: bool) -> _Joint
     return _Joints(backwards, h, o, R0, p0, phi)
 
 
-def _spherical(joints: _Joints, rounded: bool) -> SphericalGeometry | None:
+def _spherical(joints: _Joints, precision: Precision) -> SphericalGeometry | None:
     """Return the geometry of joints with a spherical triple and a pair that meet, else None."""
     backwards, h, o, R0, p0, phi = joints
-    triple, pair = _common_point(h[:3], o[:3], rounded), _common_point(h[4:], o[4:], rounded)
+    triple, pair = _common_point(h[:3], o[:3], precision), _common_point(h[4:], o[4:], precision)
     if triple is None or pair is None:
         return None
     (S, off_S), (W, off_W) = triple, pair
-    slack = SLACK_RATIO * max(off_S, off_W) if rounded else 0.0
+    slack = SLACK_RATIO * max(off_S, off_W) if precision is not EXACT else 0.0
     a, b = S - o[3], W - o[3]
     # h1ᵀ R2 h3 = h1ᵀ M h3
     middle, turns = _distance_constants(h[3], a, b), _cosine_constants(h[1], h[2], h[0])
-    if middle[1] <= PARALLEL * MEETING_DISTANCE or turns[1] <= PARALLEL:
+    if middle[1] <= PARALLEL * EXACT.distance or turns[1] <= PARALLEL:
         return None
     return SphericalGeometry(backwards, h, R0, p0, S, W, a, b, middle, turns, phi, slack)
 
 
-def _three_parallel(joints: _Joints, rounded: bool) -> ParallelGeometry | None:
+def _three_parallel(joints: _Joints, precision: Precision) -> ParallelGeometry | None:
     """Return the geometry of joints of which 2, 3, 4 are parallel and 5, 6 meet, else None."""
-    backwards, h, o, R0, p0, phi = joints
-    pair = _common_point(h[4:], o[4:], rounded)
-    aslant = np.linalg.norm(np.cross(h[1], h), axis=1)
-    parallel = ROUNDED_PARALLEL if rounded else EXACTLY_PARALLEL
-    if pair is None or max(aslant[2:4]) > parallel or aslant[0] < max(parallel, PARALLEL):
+    pair = _common_point(joints.h[4:], joints.o[4:], precision)
+    return None if pair is None else _parallel_geometry(joints, precision, pair[0], pair[0], pair[1])
+
+
+def _three_parallel_skew(joints: _Joints, precision: Precision) -> ParallelGeometry | None:
+    """Return the geometry of joints of which 2, 3, 4 are parallel and 5, 6 do not meet, else None."""
+    h, o = joints.h, joints.o
+    normal = np.cross(h[4], h[5])
+    if np.linalg.norm(normal) < PARALLEL:
         return None
-    W, off_W = pair
+    x, y, _ = np.linalg.solve(np.array([h[4], -h[5], normal]).T, o[5] - o[4])
+    return _parallel_geometry(joints, precision, o[4] + x * h[4], o[5] + y * h[5], 0.0)
+
+
+def _parallel_geometry(
+    joints: _Joints, precision: Precision, O5: Array, W: Array, off: float
+) -> ParallelGeometry | None:
+    """Return the geometry of joints of which 2, 3, 4 are parallel, else None.
+
+    Args:
+        joints: the joints.
+        precision: up to what they are.
+        O5: point (3,) on the axis of joint 5 that is nearest to that of joint 6.
+        W: the point on that axis; the same where they are taken to meet.
+        off: how far off they are then (m).
+    """
+    backwards, h, o, R0, p0, phi = joints
+    aslant = np.linalg.norm(np.cross(h[1], h), axis=1)
+    if max(aslant[2:4]) > precision.sine or aslant[0] < max(precision.sine, PARALLEL):
+        return None
     slack = 0.0
-    if rounded:
-        slack = SLACK_RATIO * max(off_W, *aslant[2:4])
+    if precision is not EXACT:
+        slack = SLACK_RATIO * max(off, *aslant[2:4])
         ways = np.sign(h[1:4] @ h[1])
         mean = ways @ h[1:4]
         h = h.copy()
         h[1:4] = np.outer(ways, mean / np.linalg.norm(mean))
     O2, O3, O4 = o[1:4] + np.outer((W - o[1:4]) @ h[1], h[1])
     bend, turn = _distance_constants(h[2], O4 - O3, O2 - O3), _cosine_constants(h[4], h[5], h[1])
-    if bend[1] <= PARALLEL * MEETING_DISTANCE or turn[1] <= PARALLEL:
+    if bend[1] <= PARALLEL * EXACT.distance or turn[1] <= PARALLEL:
         return None
-    return ParallelGeometry(backwards, h, R0, p0, o[0], W, O2, O3, O4 - O3, W - O4, bend, turn, phi, slack)
+    skew = np.zeros(7)
+    if O5 is not W:
+        along, matrix = np.zeros(2), np.zeros((2, 2))
+        for i, v in enumerate((W - O5, h[5])):
+            along[i] = (h[4] @ v) * (h[1] @ h[4])
+            matrix[i] = h[1] @ v - along[i], h[1] @ np.cross(h[4], v)
+        if abs(np.linalg.det(matrix)) < LEAST_SKEW:
+            return None
+        skew = np.concatenate([[1.0], along, np.linalg.inv(matrix).ravel()])
+    return ParallelGeometry(
+        backwards, h, R0, p0, o[0], W, O2, O3, O4 - O3, O5 - O4, bend, turn, W - O5, skew, phi, slack
+    )
 
 
-def _meeting_pair(joints: _Joints, rounded: bool) -> PairGeometry | None:
+def _meeting_pair(joints: _Joints, precision: Precision) -> PairGeometry | None:
     """Return the geometry of joints of which 5 and 6 meet, else None."""
     backwards, h, o, R0, p0, phi = joints
-    pair = _common_point(h[4:], o[4:], rounded)
+    pair = _common_point(h[4:], o[4:], precision)
     return None if pair is None else pair_geometry(backwards, h, o, R0, p0, pair[0], phi)
+
+
+_FAMILIES: tuple[tuple[Precision, Callable[[_Joints, Precision], ChainGeometry | None]], ...] = (
+    (EXACT, _spherical),
+    (EXACT, _three_parallel),
+    (EXACT, _three_parallel_skew),
+    (ROUNDED, _spherical),
+    (ROUNDED, _three_parallel),
+    (ROUNDED, _three_parallel_skew),
+    (EXACT, _meeting_pair),
+    (COARSE, _spherical),
+    (COARSE, _three_parallel),
+    (COARSE, _three_parallel_skew),
+    (COARSE, _meeting_pair),
+)
+"""What is tried, best first."""
 
 
 def _distance_constants(k: Array, a: Array, b: Array) -> Array:
@@ -323,21 +389,21 @@ def _cosine_constants(k: Array, a: Array, b: Array) -> Array:
     return np.array([middle, np.hypot(sine, cosine), part, np.sin(middle), np.cos(middle)])
 
 
-def _common_point(h: Array, o: Array, rounded: bool) -> tuple[Array, float] | None:
+def _common_point(h: Array, o: Array, precision: Precision) -> tuple[Array, float] | None:
     """Return the point (3,) where lines meet, and how far off it they are at most (m).
 
     Args:
         h: (m, 3) unit directions of the lines.
         o: (m, 3) a point on each line.
-        rounded: whether they only have to be meant to meet.
+        precision: up to what they have to meet.
 
     Returns:
         None where they do not meet, or two successive ones are parallel.
     """
-    parallel = ROUNDED_PARALLEL if rounded else PARALLEL
+    parallel = PARALLEL if precision is EXACT else COARSE.sine
     if (np.linalg.norm(np.cross(h[:-1], h[1:]), axis=1) < parallel).any():
         return None
     across = np.eye(3) - h[:, :, None] * h[:, None, :]
     point = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, o))
     off = float(np.linalg.norm(np.einsum("kij,kj->ki", across, point - o), axis=1).max())
-    return (point, off) if off < (ROUNDED_DISTANCE if rounded else MEETING_DISTANCE) else None
+    return (point, off) if off < precision.distance else None

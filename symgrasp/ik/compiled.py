@@ -8,7 +8,7 @@ import numpy as np
 
 from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions, Tolerance
 from symgrasp.ik.branches import branch_count, new_memory, solve_range
-from symgrasp.ik.chain import COSINE_TOLERANCE, Chain, chain_geometries, is_rounded
+from symgrasp.ik.chain import COSINE_TOLERANCE, EXACT, Chain, chain_geometries
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.poses import Array
 from symgrasp.robot.robot import AZIMUTH, Arm
@@ -19,7 +19,7 @@ FAMILIES = ("closed form, spherical triple", "closed form, three parallel axes",
 """What the families of `Chain` are called."""
 
 LEEWAY = 0.3
-"""How far (rad) outside its limits a joint of a rounded arm may be in the closed form: near singular poses
+"""How far (rad) outside its limits a joint may be where Newton's method starts: near singular poses
 Newton's method moves joints that far."""
 
 
@@ -34,7 +34,6 @@ class CompiledIK(ArmIK):
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
-        ValueError: one is known, but the arm is of no compiled family; see `fits`.
 
     Attributes:
         chain: the arm's geometry at every redundancy sample, for compiled code.
@@ -55,11 +54,6 @@ class CompiledIK(ArmIK):
     def complete(self) -> bool:
         """Whether every configuration at the samples is found: by a closed form of the true axes."""
         return bool(self.chain.joint[8] != MEETING_PAIR and not self.chain.joint[9])
-
-    @staticmethod
-    def fits(ik: ArmIK) -> bool:
-        """Whether an arm is of one of the compiled families, with the joint locked that its solver locks."""
-        return chain_geometries(ik.arm, ik.locked, ik.phi) is not None
 
     def at(self, phi: Array) -> Self:
         """Return the solver of the same arm at other samples (K,) of its redundancy (rad)."""
@@ -89,13 +83,14 @@ class CompiledIK(ArmIK):
     def _pack_chain(self) -> Chain:
         """Pack the arm's geometry at every redundancy sample into arrays."""
         arm = self.arm
-        rows = chain_geometries(arm, self.locked, self.phi)
-        if rows is None:
-            raise ValueError(f"{arm.name}: no axes meet in a point at either end of the arm")
+        found = chain_geometries(arm, self.locked, self.phi)
+        assert found is not None  # or there would be no joint to lock
+        precision, rows = found
         locked = -1 if self.locked is None else self.locked
         free = [j for j in range(arm.dof) if j != locked]
         backwards = rows[0].backwards
-        rounded = is_rounded(rows)
+        closed_form = rows[0].family != MEETING_PAIR
+        rounded = closed_form and precision is not EXACT
         tolerance = [self.tolerance.position, self.tolerance.rotation, 0.0]
         return Chain(
             geometry=np.array([row.packed() for row in rows]),
@@ -110,7 +105,7 @@ class CompiledIK(ArmIK):
                 ]
             ),
             limits=_limits(arm, 0.0),
-            leeway=_limits(arm, LEEWAY if rounded or rows[0].family == MEETING_PAIR else 0.0),
+            leeway=_limits(arm, LEEWAY if rounded or not closed_form else 0.0),
             forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
             fixed=np.arange(arm.dof) == locked,
         )

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from eaik.IK_HP import HPRobot
 
 from symgrasp.errors import UrdfError
-from symgrasp.ik.chain import chain_geometries, has_exact_pair, is_rounded
+from symgrasp.ik.chain import COARSE, EXACT, chain_geometries, has_exact_pair
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.robot.robot import PITCH, Arm
 
@@ -25,11 +24,11 @@ GENERIC_ANGLE = 0.3
 """Value (rad) at which locks are tried: the answer is the same at almost any value, but at zero axes may
 happen to be parallel."""
 
-CLOSED_FORM, ROUNDED_CLOSED_FORM, FIXED_PAIR, TURNED_PAIR, ROUNDED_PAIR, EAIK_ALONE, UNKNOWN = range(7)
-"""What a lock leaves, best first: a closed form that is compiled; the same once axes are moved a little; two
-axes that meet at one end of the arm; the same on both sides of the locked joint, so that the point where
-they meet depends on φ, and may be far away; two that meet once they are moved a little; an arm
-that EAIK alone knows; an arm that nothing here solves."""
+CLOSED_FORM, ROUNDED_CLOSED_FORM, FIXED_PAIR, TURNED_PAIR, COARSE_CLOSED_FORM, COARSE_PAIR, UNKNOWN = range(7)
+"""What a lock leaves, best first: a closed form; the same once axes are moved by what rounding explains; two
+axes that meet at one end of the arm; the same on both sides of the locked joint, so that the point where they
+meet depends on φ, and may be far away; a closed form, or two axes that meet, once axes are moved further; an
+arm that nothing here solves."""
 
 
 def joint_to_lock(arm: Arm) -> int | None:
@@ -45,20 +44,23 @@ def joint_to_lock(arm: Arm) -> int | None:
             arm.robot.model.path,
             f"arm {arm.name}",
             list(arm.joint_names),
-            "two axes at one end of the arm that meet in a point, with any joint of seven locked",
+            "two axes at one end of the arm that meet in a point, or three parallel ones that begin with the "
+            "second or the third, with any joint of seven locked",
         )
     return choices[kinds.index(min(kinds))]
 
 
 def _kind(arm: Arm, joint: int | None) -> int:
     """Return what locking a joint leaves."""
-    geometry = chain_geometries(arm, joint, np.array([GENERIC_ANGLE]))
-    if geometry is None:
-        locks = [] if joint is None else [(joint, GENERIC_ANGLE)]
-        return EAIK_ALONE if HPRobot(arm.H, arm.P, locks).hasKnownDecomposition() else UNKNOWN
-    if geometry[0].family != MEETING_PAIR:
-        return ROUNDED_CLOSED_FORM if is_rounded(geometry) else CLOSED_FORM
+    found = chain_geometries(arm, joint, np.array([GENERIC_ANGLE]))
+    if found is None:
+        return UNKNOWN
+    precision, (geometry,) = found
+    if geometry.family != MEETING_PAIR:
+        if precision is COARSE:
+            return COARSE_CLOSED_FORM
+        return CLOSED_FORM if precision is EXACT else ROUNDED_CLOSED_FORM
     if not has_exact_pair(arm, joint, GENERIC_ANGLE):
-        return ROUNDED_PAIR
-    between = (1,) if geometry[0].backwards else (arm.dof - 2,)
+        return COARSE_PAIR
+    between = (1,) if geometry.backwards else (arm.dof - 2,)
     return TURNED_PAIR if joint in between else FIXED_PAIR

@@ -1,7 +1,7 @@
 """The closed form of arms with three parallel joints in a row, compiled: UR3, UR5, UR10, Z1.
 
-Six joints, or seven with one locked: joint 1, then 2, 3 and 4 parallel, then 5 and 6 whose axes meet in a
-point W (or the same read backwards). The displacement of the tool from its pose at zero is
+Six joints, or seven with one locked: joint 1, then 2, 3 and 4 parallel, then 5 and 6, whose axes mostly meet
+in a point W (or the same read backwards). The displacement of the tool from its pose at zero is
 
     G = e1 · e2 e3 e4 · e5 e6,     ek = rotation by qk about the line (hk, ok).
 
@@ -14,7 +14,14 @@ plane of W perpendicular to h2, and R24 = R2 R3 R4,
     R24 = R1⁻¹ R_G R6⁻¹ R5⁻¹                        the sum of joints 2, 3 and 4
     |e3 O4 − O2| = |e1⁻¹ G W − R24 (W − O4) − O2|   joint 3: two values, then joint 2
 
-which are the subproblems 4, 4, 1, 1, 3 and 1 of Paden and Kahan, eight branches in all.
+which are the subproblems 4, 4, 1, 1, 3 and 1 of Paden and Kahan, eight branches in all. Where the axes of
+joints 5 and 6 do not meet, W is the point of the last one that is nearest to the other, and O5 the nearest of
+the other. Then the first two equations are
+
+    h2 · (e1⁻¹ G W − O5) = h2 · R5 (W − O5),     h2 · R1⁻¹ R_G h6 = h2 · R5 h6,
+
+linear in cosine and sine of joint 5, whose squares sum up to 1 at four values of joint 1 (subproblem 6 of
+A. Elias and J. Wen, IK-Geo: Unified robot inverse kinematics using subproblem decomposition, 2025).
 """
 
 from __future__ import annotations
@@ -30,12 +37,15 @@ from symgrasp.ik.chain import (
     FOREARM,
     HAND,
     MEETING,
+    OFFSET,
     PARALLEL_PHI,
     PARALLEL_SLACK,
     SHOULDER,
+    SKEW,
     TURN,
 )
-from symgrasp.ik.joints import nearest_turn, outside, sine, tool_motion, within, write_branch
+from symgrasp.ik.joints import ROOT_TOLERANCE, nearest_turn, outside, sine, tool_motion, within, write_branch
+from symgrasp.ik.roots import find_roots, size2, start_circle_quartic
 from symgrasp.ik.vectors import (
     STRICT,
     cross,
@@ -55,9 +65,14 @@ __all__ = ["parallel_branches"]
 
 
 @njit(**STRICT)
-def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside):
-    """Solve one pose (4, 4); see `symgrasp.ik.branches.branches_at` for arguments and result."""
+def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, work):
+    """Solve one pose (4, 4); see `symgrasp.ik.branches.branches_at` for arguments and result.
+
+    Work is memory for nine complex numbers.
+    """
     R, p = tool_motion(g, joint[7], T)
+    if g[SKEW]:
+        return _skew_branches(g, joint, limits, R, p, inside_only, q, exists, inside, work)
     h1, h2 = vec(g, AXES), vec(g, AXES + 3)
     base, wrist = vec(g, BASE), vec(g, MEETING)
     a = minus(plus(times(R, wrist), p), base)  # G W, seen from joint 1
@@ -85,16 +100,14 @@ def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside):
 
 @njit(**STRICT)
 def _wrist(g, joint, limits, R, seen, q1, s1, c1, branch, inside_only, q, exists, inside):
-    """Joints 5 and 6, and the sum of joints 2, 3 and 4, for a value of joint 1."""
-    h1, h2, h5, h6 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 12), vec(g, AXES + 15)
+    """Joint 5, then the others, for a value of joint 1."""
+    h1, h2, h6 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 15)
     middle, length, part = vec(g, TURN)
     sm, cm = g[TURN + 3], g[TURN + 4]
     c = (dot(h2, rotate(h1, -s1, c1, times(R, h6))) - part) / length
     s = sine(c, g[PARALLEL_SLACK])
     if s < 0.0:
         return
-    before = transposed_times(R, rotate(h1, s1, c1, h2))  # R_G⁻¹ R1 h2
-    side = perpendicular(h2)
     for i in range(2):
         way = s if i == 0 else -s
         s5, c5 = sm * c + cm * way, cm * c - sm * way
@@ -103,19 +116,77 @@ def _wrist(g, joint, limits, R, seen, q1, s1, c1, branch, inside_only, q, exists
         q5 = nearest_turn(limits, joint[4], middle + math.atan2(way, c))
         if inside_only and not within(limits, joint[4], q5):
             continue
-        y6, x6 = subproblem1(h6, before, rotate(h5, -s5, c5, h2))
-        s6, c6 = unit(y6, x6)
-        if inside_only and outside(limits, joint[5], s6, c6):
+        _hand(
+            g, joint, limits, R, seen, q1, s1, c1, q5, s5, c5, branch + 2 * i, inside_only, q, exists, inside
+        )
+
+
+@njit(**STRICT)
+def _skew_branches(g, joint, limits, R, p, inside_only, q, exists, inside, work):
+    """Joints 1 and 5 where the axes of joints 5 and 6 do not meet, then the others."""
+    h1, h2, base, o5 = vec(g, AXES), vec(g, AXES + 3), vec(g, BASE), minus(vec(g, MEETING), vec(g, OFFSET))
+    a, v = minus(plus(times(R, vec(g, MEETING)), p), base), times(R, vec(g, AXES + 15))
+    part_a, part_v = dot(h1, a) * dot(h1, h2), dot(h1, v) * dot(h1, h2)
+    # The parts along h2 that joint 5 has to make, as 1, cos q1 and sin q1.
+    f = (part_a + dot(h2, minus(base, o5)) - g[SKEW + 1], dot(h2, a) - part_a, -dot(h2, cross(h1, a)))
+    e = (part_v - g[SKEW + 2], dot(h2, v) - part_v, -dot(h2, cross(h1, v)))
+    c0, c1, c2 = _combined(g[SKEW + 3], f, g[SKEW + 4], e)
+    s0, s1, s2 = _combined(g[SKEW + 5], f, g[SKEW + 6], e)
+    c, s = complex(0.5 * c1, -0.5 * c2), complex(0.5 * s1, -0.5 * s2)
+    work[4], work[3] = c * c + s * s, 2.0 * (c0 * c + s0 * s)
+    work[2] = c0 * c0 + s0 * s0 - 1.0 + 2.0 * (size2(c) + size2(s)) + 0.0j
+    work[1], work[0] = work[3].conjugate(), work[4].conjugate()
+    start_circle_quartic(work, 0, 5)
+    find_roots(work, 0, 4, work[5:9])
+    off = 2.0 * math.sqrt(ROOT_TOLERANCE + g[PARALLEL_SLACK])
+    solvable = False
+    for i in range(4):
+        b = work[5 + i]
+        if not abs(size2(b) - 1.0) < off:
             continue
-        q6 = nearest_turn(limits, joint[5], math.atan2(y6, x6))
-        if inside_only and not within(limits, joint[5], q6):
+        solvable = True
+        # Two that all but coincide may be beside the circle: each starts on its own side.
+        q1 = math.atan2(b.imag, b.real) + 0.5 * (size2(b) - 1.0)
+        sin1, cos1 = math.sin(q1), math.cos(q1)
+        q1 = nearest_turn(limits, joint[0], q1)
+        if inside_only and not within(limits, joint[0], q1):
             continue
-        turned = rotate(h1, -s1, c1, times(R, rotate(h6, -s6, c6, rotate(h5, -s5, c5, side))))
-        y, x = subproblem1(h2, side, turned)
-        sum_s, sum_c = unit(y, x)
-        t = minus(minus(seen, rotate(h2, sum_s, sum_c, vec(g, HAND))), vec(g, SHOULDER))
-        total = math.atan2(y, x)
-        _elbow(g, joint, limits, t, total, q1, q5, q6, branch + 2 * i, inside_only, q, exists, inside)
+        sin5, cos5 = unit(s0 + s1 * cos1 + s2 * sin1, c0 + c1 * cos1 + c2 * sin1)
+        q5 = nearest_turn(limits, joint[4], math.atan2(sin5, cos5))
+        if inside_only and not within(limits, joint[4], q5):
+            continue
+        seen = plus(rotate(h1, -sin1, cos1, a), base)
+        _hand(
+            g, joint, limits, R, seen, q1, sin1, cos1, q5, sin5, cos5, 2 * i, inside_only, q, exists, inside
+        )
+    return solvable
+
+
+@njit(**STRICT)
+def _combined(x, v, y, w):
+    """Return x v + y w."""
+    return x * v[0] + y * w[0], x * v[1] + y * w[1], x * v[2] + y * w[2]
+
+
+@njit(**STRICT)
+def _hand(g, joint, limits, R, seen, q1, s1, c1, q5, s5, c5, branch, inside_only, q, exists, inside):
+    """Joint 6 and the sum of joints 2, 3 and 4, for values of joints 1 and 5."""
+    h1, h2, h5, h6 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 12), vec(g, AXES + 15)
+    before = transposed_times(R, rotate(h1, s1, c1, h2))  # R_G⁻¹ R1 h2
+    y6, x6 = subproblem1(h6, before, rotate(h5, -s5, c5, h2))
+    s6, c6 = unit(y6, x6)
+    if inside_only and outside(limits, joint[5], s6, c6):
+        return
+    q6 = nearest_turn(limits, joint[5], math.atan2(y6, x6))
+    if inside_only and not within(limits, joint[5], q6):
+        return
+    side = perpendicular(h2)
+    turned = rotate(h1, -s1, c1, times(R, rotate(h6, -s6, c6, rotate(h5, -s5, c5, side))))
+    y, x = subproblem1(h2, side, turned)
+    sum_s, sum_c = unit(y, x)
+    reach = plus(vec(g, HAND), rotate(h5, s5, c5, vec(g, OFFSET)))
+    t = minus(minus(seen, rotate(h2, sum_s, sum_c, reach)), vec(g, SHOULDER))
+    _elbow(g, joint, limits, t, math.atan2(y, x), q1, q5, q6, branch, inside_only, q, exists, inside)
 
 
 @njit(**STRICT)

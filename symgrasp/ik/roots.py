@@ -18,6 +18,9 @@ LINE_STEPS, LINE_CLOSE = 40, 1e-12
 INSIDE = 1.0 - 1e-12
 """Where it begins: at ±1 there may be a zero whose lines are imaginary."""
 
+LEAST_LEADING = 1e-12
+"""Leading coefficient, as a share of the others, below which two roots are far away, wherever."""
+
 LEAST_DIVISOR = 0.1
 """A quotient by less is computed otherwise."""
 
@@ -87,7 +90,8 @@ def start_circle_quartic(c, first, z):
         first: index of the constant one.
         z: index in c of the first estimate.
     """
-    size = math.sqrt(size2(c[first + 4]))
+    largest = math.sqrt(size2(c[first + 3])) + abs(c[first + 2].real)
+    size = max(math.sqrt(size2(c[first + 4])), LEAST_LEADING * largest)
     turn = _unit_root(c[first + 4].conjugate() * (1.0 / size))
     k1 = c[first + 3] * turn
     a, b, k0 = 0.5 * k1.real / size, 0.5 * k1.imag / size, 0.5 * c[first + 2].real / size

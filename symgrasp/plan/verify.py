@@ -18,7 +18,7 @@ import numpy as np
 
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility.candidates import CandidateChecker
-from symgrasp.ik import independent_solver
+from symgrasp.ik import solver_for
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Hold, Plan, PlanTask, Pose
 from symgrasp.poses import Array, from_position_quat, inverse, pose_error, rotation_z
 from symgrasp.progress import Progress, part_of
@@ -322,7 +322,7 @@ def _check_margins(
         torso = arm.robot.torso.samples_at([hold.joints[name] for name in arm.robot.torso.joint_names])
         if not report.expect(torso, f"{who}: the torso is at none of the values that maps try"):
             return
-    ik = independent_solver(arm, scene.settings.redundancy, torso)
+    ik = solver_for(arm, scene.settings.redundancy, torso)
     checker = CandidateChecker(world, arm, ik, scene.settings.approach, holders=holders)
     for name in scene.robots:
         world.park(name)

@@ -86,7 +86,7 @@ def write_plan(
     tasks: Sequence[PlanTask],
 ) -> Plan:
     """Write the plan of a scene."""
-    packages = ("symgrasp", "numpy", "pybullet", "eaik")
+    packages = ("symgrasp", "numpy", "pybullet")
     return Plan(
         kind=kind,
         scene=SceneRecord(name=scene.name, sha256=scene.sha256, content=scene.content),

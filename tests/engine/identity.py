@@ -9,12 +9,13 @@ import numpy as np
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import GridSolvers, independent_solver
+from symgrasp.ik import GridSolvers
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
+from tests.ik.eaik import independent_solver
 
 TOLERANCE = 1e-6
 

@@ -12,13 +12,14 @@ from symgrasp.feasibility import exact
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker, create_map, explain
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import ClosedFormIK, CompiledIK
+from symgrasp.ik import CompiledIK
 from symgrasp.object.manifold import ROLLS
 from symgrasp.poses import from_position_rpy, inverse, pose_error, rotation_z, translation
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import PLAIN, load_small, write_scene
+from tests.ik.eaik import EaikIK
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -82,7 +83,7 @@ def test_the_map_by_brute_force():
     arm = scene.arm()
     for task in scene.tasks.values():
         m = create_map(scene, task=task.name, method="reference")
-        ik = ClosedFormIK(arm, 4)
+        ik = EaikIK(arm, 4)
         with BulletWorld(scene) as world:
             world.set_object(task.T_world_object)
             for roll, i, j in np.ndindex(m.reason.shape):

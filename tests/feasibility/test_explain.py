@@ -14,13 +14,13 @@ from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.explain import Explanation, RetreatFailure
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.ik import ClosedFormIK
 from symgrasp.poses import inverse, translation
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.conftest import PLAIN, load_small
+from tests.ik.eaik import EaikIK
 
 COLLISIONS = (
     Reason.SELF_COLLISION, Reason.OBJECT_COLLISION, Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION,
@@ -124,7 +124,7 @@ def explained_pose(world: BulletWorld) -> np.ndarray:
 def test_candidates_are_those_of_eaik():
     scene = load_small("bottle_on_table", 6, 12, 6)
     arm = scene.arm()
-    ik = ClosedFormIK(arm, 6)
+    ik = EaikIK(arm, 6)
     unreachable = 0
     with BulletWorld(scene) as world:
         maker = MapMaker(world)
@@ -150,7 +150,7 @@ def test_retreats_end_for_every_cause():
     """Into an obstacle, out of reach and limits, and where only another branch goes on."""
     scene = load_small("bottle_on_table", 8, 24, 6).with_settings(approach=0.3)
     causes = set()
-    ik, T_base_world = ClosedFormIK(scene.arm(), 6), inverse(scene.arm().robot.T_world_base)
+    ik, T_base_world = EaikIK(scene.arm(), 6), inverse(scene.arm().robot.T_world_base)
     with BulletWorld(scene) as world:
         maker = MapMaker(world)
         m = maker.map(method="reference")

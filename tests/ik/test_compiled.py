@@ -5,15 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symgrasp.ik import ClosedFormIK, CompiledIK, solver_for
+from symgrasp.ik import CompiledIK
 from symgrasp.poses import from_position_quat, pose_error, rotation_about
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
+from tests.ik.eaik import EaikIK
 from tests.ik.redundancy import solve_at
 from tests.ik.synthetic import distance, samples, synthetic
 
-ARMS = ("panda", "iiwa", "backwards", "six", "pr2", "ur5", "ur5_backwards", "skew", "seven")
+ARMS = (
+    "panda",
+    "iiwa",
+    "backwards",
+    "six",
+    "pr2",
+    "ur5",
+    "ur5_backwards",
+    "skew",
+    "seven",
+    "offset_ends",
+    "offset_ends_backwards",
+    "offset_skew",
+)
 
 
 def arm_of(scene: Scene, name: str) -> Arm:
@@ -43,6 +57,9 @@ def arms() -> dict[str, Arm]:
     ur5 = np.array([
         [0, 0, 0.089], [0, 0.136, 0], [0.425, -0.12, 0], [0.392, 0, 0], [0, 0.093, 0], [0, 0, -0.095],
         [0, 0.082, 0],
+    ])  # fmt: skip
+    offset = np.array([
+        [0, 0, 0.09], [0.05, 0.1, 0], [0.42, 0, 0], [0.39, 0, 0], [0, 0.1, 0], [0.05, 0, -0.09], [0, 0.08, 0],
     ])  # fmt: skip
     R0 = rotation_about(np.array([0.6, 0.0, 0.8]), 1.1)
     x, y, z = np.eye(3)
@@ -74,20 +91,28 @@ def arms() -> dict[str, Arm]:
         "skew": synthetic([z + 0.3 * y, y, -y, y, x + 0.3 * z, z + 0.4 * y], [
             [0, 0, 0.2], [0, 0.1, 0], [0.4, 0.1, 0], [0.3, 0, 0.1], [0, 0.1, 0], [0, 0, 0], [0.1, 0, 0]
         ]),
+        # Three parallel axes; neither the first two meet nor the last two. The same from its other end.
+        "offset_ends": synthetic([z, y, y, y, z, y], offset, R0),
+        "offset_ends_backwards": synthetic([-y, -z, -y, -y, -y, -z], -offset[::-1], R0),
+        # The same of "skew".
+        "offset_skew": synthetic([z + 0.3 * y, y, -y, y, x + 0.3 * z, z + 0.4 * y], [
+            [0, 0, 0.2], [0.05, 0.1, 0], [0.4, 0.1, 0], [0.3, 0, 0.1], [0, 0.1, 0], [0, 0.08, 0.02],
+            [0.1, 0, 0],
+        ]),
         # A UR5 on a turntable: its first joint is locked.
         "seven": synthetic([z, z + 0.3 * x, y, y, y, -z, y], [[0.1, 0, 0.2], *ur5], R0),
     }  # fmt: skip
 
 
 def test_the_lock_is_chosen_so_that_the_compiled_closed_form_applies(arms):
-    assert ClosedFormIK(arms["pr2"], 1).locked == 0  # its first choices fit EAIK alone
-    assert all(isinstance(solver_for(arms[name], 1), CompiledIK) for name in ARMS)
+    assert EaikIK(arms["pr2"], 1).locked == 0  # its first choices fit EAIK alone
+    assert all(CompiledIK(arms[name], 1).complete for name in ARMS)
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_same_branches_as_eaik(name, arms):
     arm = arms[name]
-    general, ik = ClosedFormIK(arm, 4), CompiledIK(arm, 4)
+    general, ik = EaikIK(arm, 4), CompiledIK(arm, 4)
     assert ik.locked == general.locked
     np.testing.assert_array_equal(ik.phi, general.phi)
     total = 0
@@ -152,7 +177,7 @@ def test_an_answer_does_not_depend_on_what_else_is_asked(name, arms):
 @pytest.mark.parametrize("name", ["panda", "iiwa"])
 def test_out_of_reach(name, arms):
     ik = CompiledIK(arms[name], 8)
-    general = ClosedFormIK(arms[name], 8)
+    general = EaikIK(arms[name], 8)
     rng = np.random.default_rng(5)
     empty = 0
     for _ in range(300):
@@ -174,24 +199,3 @@ def test_aligned_axes_of_the_triple(arms):
         assert (np.abs(found.q[:, [3, 4, 5]] - q[[3, 4, 5]]).max(axis=1) < 1e-5).any()
         position, _ = pose_error(arm.tool_pose(found.q), T)
         assert position.max() < 1e-6
-
-
-def test_solver_for_takes_the_compiled_one_where_it_can(arms):
-    assert isinstance(solver_for(arms["panda"], 2), CompiledIK)
-    _, y, z = np.eye(3)
-    # Three parallel axes, but neither the first two meet nor the last two: EAIK alone knows it.
-    parallel = synthetic(
-        [z, y, y, y, z, y],
-        [
-            [0, 0, 0.09],
-            [0.05, 0.1, 0],
-            [0.42, 0, 0],
-            [0.39, 0, 0],
-            [0, 0.1, 0],
-            [0.05, 0, -0.09],
-            [0, 0.08, 0],
-        ],
-    )
-    assert type(solver_for(parallel, 2)) is ClosedFormIK
-    with pytest.raises(ValueError, match="no axes meet"):
-        CompiledIK(parallel, 2)

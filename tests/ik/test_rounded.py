@@ -183,3 +183,38 @@ def test_xarm7_against_ssik():
         at = ik.at(theirs[:, ik.locked])
         for k, q_theirs in enumerate(theirs):
             assert distance(at.solve_sample(T, k).q, q_theirs).min(initial=np.inf) < 1e-4
+
+
+def gen3(offset: float) -> Arm:
+    """Return a Kinova Gen3, of which three axes of the wrist miss each other by an offset (m)."""
+    return synthetic(
+        [-Z, Y, -Z, Y, -Z, Y, -Z],
+        [[0, 0, 0.15643], [0, -0.005375, 0.12838], [0, -0.006375, 0.21038], [0, -0.006375, 0.21038],
+         [0, -0.006375, 0.20843], [0, -offset, 0.10593], [0, -offset, 0.10593], [0, 0, 0.061525]],
+    )  # fmt: skip
+
+
+def test_what_rounding_explains():
+    """Real offsets of the size that angles of two decimals leave, but between axes that are not rounded."""
+    assert CompiledIK(gen3(0.0), 1).family == "closed form, spherical triple"
+    assert CompiledIK(gen3(5e-6), 1).family == "closed form, spherical triple, rounded axes"
+    assert CompiledIK(gen3(0.00017505), 1).family == "search, two axes that meet"
+
+
+def test_recall_with_offsets_of_less_than_a_millimetre():
+    arm, lost = gen3(0.00017505), 0
+    ik = CompiledIK(arm, 1)
+    for q in np.random.default_rng(4).uniform(arm.lower, arm.upper, (1000, 7)):
+        lost += not found(ik, q)
+    assert lost <= 1
+
+
+def test_axes_that_only_angles_of_two_decimals_explain():
+    """Where nothing meets but for them, the closed form of what is meant still serves."""
+    P = ARMS["ur5"].P.copy()
+    P[[1, 5], 0] += 1e-4
+    arm = synthetic(ARMS["ur5"].H, P)
+    ik = CompiledIK(arm, 1)
+    assert ik.family == "closed form, three parallel axes, rounded axes"
+    q = np.random.default_rng(5).uniform(arm.lower, arm.upper, (300, 6))
+    assert sum(found(ik, row) for row in q) > 290

@@ -7,11 +7,11 @@ import pytest
 import ssik
 
 from symgrasp.errors import UrdfError
-from symgrasp.ik import ClosedFormIK
 from symgrasp.poses import from_position_quat, pose_error
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 from tests.conftest import load_small
+from tests.ik.eaik import EaikIK
 from tests.ik.redundancy import solve_at
 from tests.robot.test_robot import KUKA
 
@@ -38,7 +38,7 @@ def distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def test_recall(name, request):
     """The branches at q's own locked value contain q, for every one of thousands of q."""
     arm: Arm = request.getfixturevalue(name)
-    ik = ClosedFormIK(arm, 1)
+    ik = EaikIK(arm, 1)
     assert ik.locked is not None
     q = np.random.default_rng(0).uniform(arm.lower, arm.upper, (3000, arm.dof))
     worst = max(
@@ -48,7 +48,7 @@ def test_recall(name, request):
 
 
 def test_every_solution_reaches_the_pose(arm):
-    ik = ClosedFormIK(arm, 16)
+    ik = EaikIK(arm, 16)
     rng = np.random.default_rng(1)
     checked = 0
     for _ in range(200):
@@ -66,13 +66,13 @@ def test_every_solution_reaches_the_pose(arm):
 
 
 def test_redundancy_samples_are_centres_of_equal_parts(arm):
-    ik = ClosedFormIK(arm, 4)
+    ik = EaikIK(arm, 4)
     lower, upper = arm.lower[ik.locked], arm.upper[ik.locked]
     np.testing.assert_allclose(ik.phi, lower + (upper - lower) * np.array([1, 3, 5, 7]) / 8)
 
 
 def test_one_sample_is_the_same_as_its_part_of_all(arm):
-    ik = ClosedFormIK(arm, 8)
+    ik = EaikIK(arm, 8)
     T = arm.tool_pose([0.1, -0.5, 0.2, -2.0, 0.3, 1.5, 0.4])
     every = ik.solve(T)
     for k in range(8):
@@ -82,7 +82,7 @@ def test_one_sample_is_the_same_as_its_part_of_all(arm):
 def test_ssik_agrees_on_reachability(arm):
     """What either solver reaches the other reaches too, at the value of the locked joint it used."""
     other = ssik.Manipulator.from_urdf(arm.robot.model.path, base="panda_link0", ee=arm.tool)
-    ik = ClosedFormIK(arm, 64)
+    ik = EaikIK(arm, 64)
     rng = np.random.default_rng(2)
     reached = missed = 0
     for _ in range(150):
@@ -112,4 +112,4 @@ def test_an_arm_of_which_no_axes_meet(kuka):
     skewed.H = H / np.linalg.norm(H, axis=1, keepdims=True)
     skewed.P = rng.normal(size=(8, 3))
     with pytest.raises(UrdfError, match="meet in a point"):
-        ClosedFormIK(skewed, 4)
+        EaikIK(skewed, 4)

@@ -1,8 +1,4 @@
-"""The inverse kinematics of arms by EAIK, an independent library: slower, for checks of the compiled one.
-
-It is the only one for the few arms that EAIK alone knows: three parallel joints in a row, but no two at an
-end of the arm whose axes meet.
-"""
+"""The inverse kinematics of arms by EAIK, an independent library, to check the compiled one with."""
 
 from __future__ import annotations
 
@@ -16,13 +12,13 @@ from eaik.IK_HP import HPRobot
 from symgrasp.ik.arm_ik import ArmIK, Solutions
 from symgrasp.poses import Array, pose_error
 
-__all__ = ["ClosedFormIK"]
+__all__ = ["EaikIK"]
 
 OPPOSITE_COSINE = -1.0 + 1e-9
 """Axes the cosine of whose angle is below this point in opposite directions."""
 
 
-class ClosedFormIK(ArmIK):
+class EaikIK(ArmIK):
     """All branches of the inverse kinematics of an arm, by EAIK.
 
     Args:
