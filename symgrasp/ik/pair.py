@@ -70,7 +70,7 @@ VIEWS = 12
 """Parts of a turn, at most, from whose values N is computed."""
 
 NOISE = 1e-13
-"""Error of N that is computed from values, as a share of the largest."""
+"""Error of N that is computed from values all around, as a share of the largest."""
 
 FAINT = 1e3
 """Largest coefficient of N, as a multiple of that error, below which it is computed from other values."""
@@ -140,13 +140,15 @@ def _search_view(chain, g, R, equations, memory, view, count, beyond):
     largest = _compute_values(equations, centre, stretch, memory)
     if not largest > 0.0:
         return count
+    # The residuals are known up to some error, and small where the view is.
+    noise = NOISE * largest / stretch
     outer = chain.joint[3] if g[OUTER_LAST] else chain.joint[0]
     for arc in range(-last, last + 1):
         if view == 0 and _arc_outside(chain.leeway, outer, arc) != beyond:
             continue
         bernstein(memory.values, arc % ARCS, memory.coefficients[0])
         where = (centre, stretch, arc, view)
-        count = _search_arc(chain, g, R, equations, memory, where, NOISE * largest, count)
+        count = _search_arc(chain, g, R, equations, memory, where, noise, count)
     return count
 
 

@@ -7,8 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik import arcs
 from symgrasp.poses import Array
+
+bernstein, halve, zeros_within = (njit(**ENTRY)(f) for f in (arcs.bernstein, arcs.halve, arcs.zeros_within))
+single_zero, double_zero = njit(**ENTRY)(arcs.single_zero), njit(**ENTRY)(arcs.double_zero)
 
 
 def polynomial(roots: np.ndarray, angle: Array) -> Array:
@@ -21,20 +25,20 @@ def zeros(values: Array, noise: float) -> list[float]:
     found = []
     for arc in range(arcs.ARCS):
         c = np.empty(arcs.ARCS)
-        arcs.bernstein(values, arc, c)
+        bernstein(values, arc, c)
         parts = [(c, 0.0, 1.0)]
         while parts:
             c, first, last = parts.pop()
-            many = arcs.zeros_within(c, noise)
+            many = zeros_within(c, noise)
             if many == arcs.ONE_ZERO:
-                places = [arcs.single_zero(c)]
+                places = [single_zero(c)]
             elif many == arcs.NO_ZERO:
                 continue
             elif last - first < 1e-4 or arcs.largest_of(c) < 10 * noise:
-                places = list(arcs.double_zero(c))
+                places = list(double_zero(c))
             else:
                 left, right = np.empty(arcs.ARCS), np.empty(arcs.ARCS)
-                arcs.halve(c, left, right)
+                halve(c, left, right)
                 middle = 0.5 * (first + last)
                 parts += [(left, first, middle), (right, middle, last)]
                 continue
@@ -85,7 +89,7 @@ def test_a_polynomial_on_an_arc():
     roots = np.random.default_rng(1).uniform(-np.pi, np.pi, 16)
     values, c = polynomial(roots, TURN), np.empty(arcs.ARCS)
     for arc in range(arcs.ARCS):
-        arcs.bernstein(values, arc, c)
+        bernstein(values, arc, c)
         for u, end in ((0.0, c[0]), (1.0, c[-1])):
             expected = polynomial(roots, np.array(arcs.angle_in_arc(arc, u)))
             assert end == pytest.approx(expected / np.cos(np.pi / 34) ** 16, rel=1e-6, abs=1e-14)

@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
+from symgrasp.compiling import ENTRY, njit
 from symgrasp.errors import UrdfError
 from symgrasp.ik import CompiledIK, solver_for
 from symgrasp.ik.branches import branch_count, branches_at, new_memory
@@ -18,6 +19,8 @@ from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 from tests.conftest import load_small
 from tests.ik.synthetic import distance, samples, synthetic
+
+compiled_branches_at = njit(**ENTRY)(branches_at)
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -121,7 +124,7 @@ def test_an_answer_does_not_depend_on_what_is_left_out(name, arms):
                 np.empty(shape[0], dtype=bool),
                 np.empty(shape[0], dtype=bool),
             )
-            branches_at(solver.chain, 0, T, inside_only, q, exists, inside, new_memory(arm.dof))
+            compiled_branches_at(solver.chain, 0, T, inside_only, q, exists, inside, new_memory(arm.dof))
             answers.append((q[inside], inside))
         np.testing.assert_array_equal(answers[0][1], answers[1][1])
         np.testing.assert_array_equal(answers[0][0], answers[1][0])
@@ -138,9 +141,9 @@ def test_out_of_reach(name, arms):
     q, exists, inside = np.empty(shape), np.empty(shape[0], dtype=bool), np.empty(shape[0], dtype=bool)
     for row, T in zip(samples(arm, 50, 6), arm.tool_pose(samples(arm, 50, 6)), strict=True):
         at = solver if solver.locked is None else solver.at(row[[solver.locked]])
-        assert branches_at(at.chain, 0, T, True, q, exists, inside, new_memory(arm.dof))
+        assert compiled_branches_at(at.chain, 0, T, True, q, exists, inside, new_memory(arm.dof))
         T[:3, 3] *= 100.0 * length / np.linalg.norm(T[:3, 3])  # the two axes may meet far from the arm
-        assert not branches_at(at.chain, 0, T, True, q, exists, inside, new_memory(arm.dof))
+        assert not compiled_branches_at(at.chain, 0, T, True, q, exists, inside, new_memory(arm.dof))
 
 
 def by_brute_force(arm: Arm, T: np.ndarray, starts: int, seed: int) -> list[np.ndarray]:

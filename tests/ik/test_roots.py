@@ -7,8 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.ik.roots import find_roots, start_circle_quartic
+from symgrasp.compiling import ENTRY, njit
+from symgrasp.ik import roots as of_polynomials
 from symgrasp.poses import Array
+
+find_roots = njit(**ENTRY)(of_polynomials.find_roots)
+start_circle_quartic = njit(**ENTRY)(of_polynomials.start_circle_quartic)
 
 part = st.floats(-1.0, 1.0)
 
