@@ -16,11 +16,11 @@ from symgrasp.engine.search import CLEARANCE_TOLERANCE
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
 from symgrasp.feasibility.create import create_map
-from symgrasp.ik import independent_solver
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.world import BulletWorld
 from tests.conftest import load_small
+from tests.engine.identity import independent_solver
 
 TOLERANCE = 1e-3
 """Distances (m) that the engine states are lower bounds, up to 3 % below the true ones."""
