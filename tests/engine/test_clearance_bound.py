@@ -20,7 +20,7 @@ from symgrasp.poses import inverse
 from symgrasp.reason import Reason
 from symgrasp.world import BulletWorld
 from tests.conftest import load_small
-from tests.engine.identity import independent_solver
+from tests.ik.eaik import independent_solver
 
 TOLERANCE = 1e-3
 """Distances (m) that the engine states are lower bounds, up to 3 % below the true ones."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Self
@@ -9,10 +10,12 @@ from typing import Self
 import numpy as np
 from eaik.IK_HP import HPRobot
 
-from symgrasp.ik.arm_ik import ArmIK, Solutions
+from symgrasp.ik import CompiledIK, PitchedIK, Solver, over_torso
+from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions
 from symgrasp.poses import Array, pose_error
+from symgrasp.robot.robot import Arm
 
-__all__ = ["EaikIK"]
+__all__ = ["EaikIK", "independent_solver"]
 
 OPPOSITE_COSINE = -1.0 + 1e-9
 """Axes the cosine of whose angle is below this point in opposite directions."""
@@ -91,3 +94,15 @@ class EaikIK(ArmIK):
         q, inside = self.arm.within_limits(q[exact])
         here = self.arm.in_cell(q)
         return Solutions(q[here], sample[exact][here], branch[exact][here], inside[here])
+
+
+def independent_solver(arm: Arm, samples: int, torso: Sequence[int] | None = None) -> Solver:
+    """Return EAIK's solver of an arm where it has one; see `symgrasp.ik.solver_for` for the rest."""
+    if arm.pitched:
+        return PitchedIK(arm, samples, lambda own, lock: _alone(own, len(lock.phi), lock))
+    return over_torso(arm, lambda alone: _alone(alone, samples), torso)
+
+
+def _alone(arm: Arm, samples: int, lock: Lock | None = None) -> ArmIK:
+    general = EaikIK(arm, samples, lock=lock)
+    return general if general.knows_arm else CompiledIK(arm, samples, lock=lock)
