@@ -87,14 +87,13 @@ def test_recall(name):
     arm = arm_with(name).pitching((0.0, 0.01), (-1.2, 1.2), 0.1)
     ik = solver_for(arm, 4)
     assert isinstance(ik, PitchedIK)
-    assert ik.complete == (name == "on the axis")
+    assert ik.complete
     q = random_configurations(arm, 300, 0)
     assert recall(sampled_solver(ik), q) >= 299
     q[:, AZIMUTH] = 0.0
     middle = ik.parts[0][0]
-    if name != "across":  # of this one, only a search at samples is known
-        assert middle.locked == AZIMUTH
-        assert recall(middle, q) == 300
+    assert middle.locked == AZIMUTH
+    assert recall(middle, q) == 300
 
 
 @pytest.mark.parametrize("name", ["on the axis", "beside it"])
