@@ -12,7 +12,7 @@ from docs.imports import MODULES, imported, room_of
 ROOMS = [
     "symgrasp.errors", "symgrasp.progress", "symgrasp.files", "symgrasp.references", "symgrasp.page",
     "symgrasp.compiling", "symgrasp.poses", "symgrasp.meshes", "symgrasp.reason", "symgrasp.object",
-    "symgrasp.robot", "symgrasp.hands", "symgrasp.survey",
+    "symgrasp.descriptions", "symgrasp.robot", "symgrasp.hands", "symgrasp.survey",
     "symgrasp.ik", "symgrasp.scene", "symgrasp.world", "symgrasp.engine", "symgrasp.feasibility",
     "symgrasp.plan", "symgrasp.planners", "symgrasp.bench", "symgrasp.cli", "symgrasp.__main__",
     "app.choices", "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute",

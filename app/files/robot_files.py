@@ -11,16 +11,16 @@ from pathlib import Path
 
 import yaml
 
+from symgrasp.descriptions.description import read_description
+from symgrasp.descriptions.srdf import find_srdf, srdf_text
+from symgrasp.descriptions.xml_file import LARGEST_XML
 from symgrasp.errors import InputError, SceneError, UrdfError
 from symgrasp.feasibility.starter import robot_content
 from symgrasp.files import read_file
 from symgrasp.hands.measure import hand_yaml, measure_hand
 from symgrasp.references import package_dirs, resolve, sought
 from symgrasp.robot.catalogue import CatalogueRobot
-from symgrasp.robot.description import read_description
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.srdf import find_srdf, srdf_text
-from symgrasp.robot.xml_file import LARGEST_XML
 from symgrasp.scene.format import ArmFile, HandFile, MountFile, RobotFile, xacro_texts
 from symgrasp.scene.scene import Scene
 from symgrasp.survey import find_arms

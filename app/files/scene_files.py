@@ -17,10 +17,10 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
+from symgrasp.descriptions.srdf import find_srdf
 from symgrasp.errors import InputError, SceneError
 from symgrasp.files import LARGEST_YAML, SCENES_DIR, TEMPORARY, parse_yaml, read_file
 from symgrasp.references import package_dirs, portable, resolve
-from symgrasp.robot.srdf import find_srdf
 from symgrasp.scene.format import SceneFile, describe_error, xacro_texts
 from symgrasp.scene.scene import Scene
 

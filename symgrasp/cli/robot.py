@@ -52,9 +52,9 @@ def run(args: argparse.Namespace) -> int:
     if args.scene and args.scene.suffix not in (".yaml", ".yml"):
         raise InputError("command line", "--scene", str(args.scene), "a name that ends in .yaml")
 
+    from symgrasp.descriptions.srdf import find_srdf
     from symgrasp.feasibility.starter import robot_content, starter_scene
     from symgrasp.robot.model import RobotModel
-    from symgrasp.robot.srdf import find_srdf
     from symgrasp.survey import find_arms, in_catalogue
 
     xacro_args = dict(args.xacro)

@@ -1,1 +1,1 @@
-"""Robots from URDFs: kinematic trees, arms, hands and their prints."""
+"""Robots: kinematic trees, arms, hands and their prints."""

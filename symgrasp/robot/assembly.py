@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from symgrasp.descriptions.description import read_description
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array, from_position_quat, rpy
 from symgrasp.references import resolve, sought
-from symgrasp.robot.description import read_description
 
 __all__ = ["Frame", "Mount", "assemble"]
 

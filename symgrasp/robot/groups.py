@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from symgrasp.descriptions.srdf import EndEffector, Group
 from symgrasp.robot.arm_joints import MOST_JOINTS, revolute_joints
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.srdf import EndEffector, Group
 
 __all__ = ["ArmGroup", "arm_group", "arm_groups", "group_links"]
 

@@ -12,14 +12,14 @@ import numpy as np
 import yourdfpy
 from numpy.typing import ArrayLike
 
+from symgrasp.descriptions.description import read_description
+from symgrasp.descriptions.srdf import read_srdf
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
-from symgrasp.robot.description import read_description
 from symgrasp.robot.joint import Joint, joint_motion
 from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
-from symgrasp.robot.srdf import read_srdf
 
 __all__ = ["RobotModel"]
 

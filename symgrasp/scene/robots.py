@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from symgrasp.descriptions.srdf import find_srdf
 from symgrasp.errors import InputError, SceneError, UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.references import resolve
@@ -15,7 +16,6 @@ from symgrasp.robot.groups import arm_group
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
-from symgrasp.robot.srdf import find_srdf
 from symgrasp.robot.support import area_of_corners, area_of_feet
 from symgrasp.robot.torso import Torso
 from symgrasp.scene.format import ArmFile, RobotFile, xacro_texts

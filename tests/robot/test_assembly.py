@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from symgrasp.descriptions.xml_file import DEEPEST, LARGEST_XML, MOST_ELEMENTS
 from symgrasp.errors import UrdfError
 from symgrasp.poses import from_position_rpy, quat_wxyz
 from symgrasp.references import resolve
 from symgrasp.robot import assembly
 from symgrasp.robot.assembly import MOST_LINKS, Frame, Mount, assemble
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.xml_file import DEEPEST, LARGEST_XML, MOST_ELEMENTS
 from tests.hostile import chain_urdf
 
 WSG = resolve("package://static_scenes/hands/wsg50.urdf", Path()) or Path()

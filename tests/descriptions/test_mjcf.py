@@ -12,13 +12,13 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symgrasp.descriptions import mjcf
+from symgrasp.descriptions.srdf import read_srdf, srdf_text
 from symgrasp.errors import UrdfError
 from symgrasp.feasibility.create import create_map
 from symgrasp.poses import Array
-from symgrasp.robot import mjcf
 from symgrasp.robot.link_shapes import collision_hulls
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.srdf import read_srdf, srdf_text
 from symgrasp.scene.scene import Scene
 
 DATA = Path(__file__).parent.parent / "data/arm_description"
@@ -273,7 +273,7 @@ def test_what_is_only_seen_keeps_no_robot_out(tmp_path):
      '<include file="/etc/hostname"/>', '<include file="../secret.xml"/>'],
 )  # fmt: skip
 def test_a_file_from_elsewhere_reads_nothing_outside_its_folder(tmp_path, rest):
-    from symgrasp.robot.description import read_description
+    from symgrasp.descriptions.description import read_description
 
     inside = tmp_path / "inside"
     inside.mkdir()

@@ -1,4 +1,4 @@
-"""The process that expands one xacro file: ``python -P -m symgrasp.robot.xacro_process``.
+"""The process that expands one xacro file: ``python -P -m symgrasp.descriptions.xacro_process``.
 
 xacro evaluates Python expressions of the file, runs them without bounds, and opens whatever files they name.
 So it runs in this process, which has limits of time and memory, and where
@@ -30,8 +30,8 @@ from xml.dom import minidom
 import xacro
 from xacro import substitution_args
 
+from symgrasp.descriptions.xml_file import LARGEST_XML
 from symgrasp.references import package_folders
-from symgrasp.robot.xml_file import LARGEST_XML
 
 __all__: list[str] = []
 

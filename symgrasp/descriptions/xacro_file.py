@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
+from symgrasp.descriptions.xml_file import parse_xml
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.references import VARIABLE
-from symgrasp.robot.xml_file import parse_xml
 
 __all__ = ["expand_xacro", "is_xacro"]
 
@@ -73,12 +73,12 @@ def expand_xacro(path: Path, args: Mapping[str, str], inside: Path | None = None
 
 
 def _run(path: Path, request: str, confined: bool) -> dict[str, str]:
-    """Return the answer of the process that expands; see `symgrasp.robot.xacro_process`."""
+    """Return the answer of the process that expands; see `symgrasp.descriptions.xacro_process`."""
     environment = os.environ
     if confined:
         environment = {name: os.environ[name] for name in SEARCHED if name in os.environ}
     folders = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path)
-    command = [sys.executable, "-P", "-X", "utf8", "-m", "symgrasp.robot.xacro_process"]
+    command = [sys.executable, "-P", "-X", "utf8", "-m", "symgrasp.descriptions.xacro_process"]
     try:
         done = subprocess.run(
             command, input=request, capture_output=True, text=True, encoding="utf-8", timeout=LONGEST,

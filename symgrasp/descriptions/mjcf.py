@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from symgrasp.descriptions.mjcf_files import complete_mjcf
+from symgrasp.descriptions.srdf import Srdf
 from symgrasp.errors import UrdfError
 from symgrasp.poses import Array, from_position_quat, from_rotation, inverse, rotation_about, rpy, translation
-from symgrasp.robot.mjcf_files import complete_mjcf
-from symgrasp.robot.srdf import Srdf
 
 __all__ = ["read_mjcf"]
 

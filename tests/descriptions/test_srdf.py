@@ -7,10 +7,10 @@ import shutil
 import numpy as np
 import pytest
 
+from symgrasp.descriptions.srdf import find_srdf, read_srdf
 from symgrasp.errors import UrdfError
 from symgrasp.references import resolve
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.srdf import find_srdf, read_srdf
 from symgrasp.scene.scene import Scene
 from symgrasp.world import checked_self_pairs, prepared
 

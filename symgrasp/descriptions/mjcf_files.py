@@ -11,8 +11,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from symgrasp.descriptions.xml_file import MOST_ELEMENTS, read_xml
 from symgrasp.errors import UrdfError
-from symgrasp.robot.xml_file import MOST_ELEMENTS, read_xml
 
 __all__ = ["complete_mjcf"]
 

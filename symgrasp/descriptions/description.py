@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from symgrasp.descriptions.mjcf import read_mjcf
+from symgrasp.descriptions.srdf import Srdf
+from symgrasp.descriptions.xacro_file import expand_xacro, is_xacro
+from symgrasp.descriptions.xml_file import read_xml
 from symgrasp.errors import UrdfError
-from symgrasp.robot.mjcf import read_mjcf
-from symgrasp.robot.srdf import Srdf
-from symgrasp.robot.xacro_file import expand_xacro, is_xacro
-from symgrasp.robot.xml_file import read_xml
 
 __all__ = ["Description", "read_description"]
 

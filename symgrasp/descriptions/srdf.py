@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from symgrasp.descriptions.xacro_file import is_xacro
+from symgrasp.descriptions.xml_file import read_xml
 from symgrasp.errors import UrdfError
-from symgrasp.robot.xacro_file import is_xacro
-from symgrasp.robot.xml_file import read_xml
 
 __all__ = ["EndEffector", "Group", "Srdf", "find_srdf", "read_srdf", "srdf_text"]
 

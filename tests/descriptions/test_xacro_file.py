@@ -13,14 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symgrasp.cli.main import main
+from symgrasp.descriptions import xacro_file
+from symgrasp.descriptions.srdf import find_srdf, read_srdf
+from symgrasp.descriptions.xacro_file import expand_xacro
 from symgrasp.errors import SceneError, UrdfError
 from symgrasp.poses import from_position_rpy
 from symgrasp.references import VARIABLE, give_packages
-from symgrasp.robot import xacro_file
 from symgrasp.robot.assembly import assemble
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.srdf import find_srdf, read_srdf
-from symgrasp.robot.xacro_file import expand_xacro
 from symgrasp.scene.scene import Scene
 
 ARM = Path(__file__).parent.parent / "data/arm_description/urdf/arm.urdf.xacro"
@@ -160,7 +160,7 @@ def test_the_environment_stays_outside_of_a_file_from_elsewhere(tmp_path, monkey
 ACTIONS = """
 import os, shutil, socket, subprocess, sys, urllib.request
 from pathlib import Path
-from symgrasp.robot import xacro_process
+from symgrasp.descriptions import xacro_process
 
 inside = Path(sys.argv[1]).resolve()
 (inside / "a").write_text("a")

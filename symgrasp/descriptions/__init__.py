@@ -1,0 +1,1 @@
+"""Files that describe robots: URDF, xacro, MJCF and SRDF."""
