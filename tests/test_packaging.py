@@ -88,7 +88,7 @@ def test_everything_needed_comes_with_the_wheel_and_nothing_else(contents):
     assert {"symgrasp/static_scenes/bowl.obj", "symgrasp/schemas/plan.schema.json"} <= names
     assert {"symgrasp/py.typed", "symgrasp_app/py.typed"} <= names
     endings = {Path(name).suffix for name in names if ".dist-info/" not in name}
-    assert endings == {".css", ".json", ".obj", ".py", ".typed", ".urdf", ".yaml"}
+    assert endings == {".css", ".json", ".obj", ".py", ".srdf", ".typed", ".urdf", ".yaml"}
     assert not any("test" in name for name in names)
 
 
