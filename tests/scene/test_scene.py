@@ -269,7 +269,7 @@ def test_bad_scenes_get_one_line(change, kind, field, expected, content, tmp_pat
     error = caught.value
     assert error.field == field
     assert expected in error.expected
-    assert str(error).startswith(str(tmp_path))
+    assert error.source.startswith(str(tmp_path))
     assert "\n" not in str(error)
 
 
