@@ -29,11 +29,11 @@ class Place(NamedTuple):
 
 
 PLACES = {
-    "symgrasp.compiling": Place(0, 0), "symgrasp.poses": Place(2, 0), "symgrasp.files": Place(3, 0),
-    "symgrasp.errors": Place(4, 0), "symgrasp.progress": Place(6, 0), "symgrasp.meshes": Place(4, 1),
-    "symgrasp.page": Place(5, 1), "symgrasp.references": Place(3, 1.4),
-    "symgrasp.descriptions": Place(3, 2.25),
-    "symgrasp.object": Place(2, 1.8), "symgrasp.robot": Place(2, 3), "symgrasp.hands": Place(4, 3.5),
+    "symgrasp.compiling": Place(0, 0), "symgrasp.poses": Place(2, 0), "symgrasp.files": Place(1, 0),
+    "symgrasp.errors": Place(4, 0), "symgrasp.progress": Place(6, 0), "symgrasp.meshes": Place(4.5, 1.15),
+    "symgrasp.page": Place(5, 0.45), "symgrasp.references": Place(3, 0.75),
+    "symgrasp.descriptions": Place(3, 1.55),
+    "symgrasp.object": Place(2, 2.2), "symgrasp.robot": Place(2, 3), "symgrasp.hands": Place(4, 3.5),
     "symgrasp.survey": Place(4, 4.5),
     "symgrasp.ik": Place(1, 4), "symgrasp.scene": Place(2, 4), "symgrasp.reason": Place(3, 4.5),
     "symgrasp.world": Place(2, 5), "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),

@@ -196,17 +196,16 @@ def boxes(rounds: int) -> Iterator[Figure]:
         return Scene.from_content({**content, "obstacles": obstacles}).with_settings(**GRID)
 
     with TemporaryDirectory() as folder, _MapTimer(scene=among(few)) as quick:
-        others = {
-            "the same boxes, 4 cut into 400": [part for box in few for part in _cut(box)],
-            f"the same boxes as meshes of {4 * FINE:,} triangles": [
-                _fine_mesh(box, Path(folder)) for box in few
-            ],
-        }
-        for name, obstacles in others.items():
+
+        def against(obstacles: list[dict[str, Any]]) -> tuple[float, ...]:
             with _MapTimer(scene=among(obstacles)) as slow:
                 assert np.array_equal(quick.map().feasible, slow.map().feasible)
-                ratios = tuple(slow.time() / quick.time() for _ in range(rounds))
-            yield Figure(name, "×", ratios)
+                return tuple(slow.time() / quick.time() for _ in range(rounds))
+
+        cut = [part for box in few for part in _cut(box)]
+        yield Figure("the same boxes, 4 cut into 400", "×", against(cut))
+        fine = [_fine_mesh(box, Path(folder)) for box in few]
+        yield Figure(f"the same boxes as meshes of {4 * FINE:,} triangles", "×", against(fine))
 
 
 def _fine_mesh(box: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -235,7 +235,8 @@ def check(scene: Scene, maps: Sequence[FeasibilityMap], reasons: Sequence[Reason
         if q is not None:
             ik = sampled_solver(solver)
             at = ik if ik.locked is None else ik.at(q[[ik.locked]])
-            missed = not at.solve(T).inside.any()
+            # A value that would be left out as a sample is one between samples.
+            missed = at.everywhere and not at.solve(T).inside.any()
             pose = tuple(map(tuple, the_map.T_world_object.tolist()))
             label = Reason(the_map.reason[tuple(cell)]).label
             found.append(Refuted(pose, tuple(cell), label, tuple(q.tolist()), missed))

@@ -45,13 +45,13 @@ def run(args: argparse.Namespace) -> int:
 def _solver(robot: CatalogueRobot, arm: CatalogueArm) -> str:
     """Return how the configurations of an arm are found, and whether all of them are."""
     from symgrasp.bench.ik import bare_arm
-    from symgrasp.ik import ArmIK, solver_for
+    from symgrasp.ik import ArmIK, PitchedIK, solver_for
 
     try:
         ik = solver_for(bare_arm(robot, arm), 1)
     except SymgraspError as error:
         return f"no solver: {str(error).partition(': ')[2]}"
-    assert isinstance(ik, ArmIK)  # a bare arm has no torso
+    assert isinstance(ik, ArmIK | PitchedIK)  # a bare arm has no torso
     return f"{ik.family}, {'which finds all configurations' if ik.complete else 'which may miss some'}"
 
 

@@ -97,6 +97,11 @@ class ArmIK(ABC):
         return other
 
     @property
+    def everywhere(self) -> bool:
+        """Whether no redundancy sample is left out because nothing can be computed there."""
+        return True
+
+    @property
     @abstractmethod
     def family(self) -> str:
         """What the inverse kinematics of the arm is called."""

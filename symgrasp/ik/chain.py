@@ -47,8 +47,12 @@ closed form of axes where they are meant to be only says where Newton's method s
 PARALLEL = 1e-6
 """Unit axes whose cross product is shorter than this do not meet in a point that can be computed."""
 
-LEAST_SKEW = 1e-3
-"""Least determinant (m) of the equations of joint 5 where its axis and that of joint 6 do not meet."""
+LEAST_OFFSET = 1e-3
+"""Axes of joints 5 and 6 that come closer than this (m) are taken to meet, up to rounding, or not solved."""
+
+LEAST_SKEW = 1e-5
+"""Least determinant (m) of the equations of joint 5 where its axis and that of joint 6 do not meet: it is near
+zero where they are nearly parallel."""
 
 SLACK_RATIO = 30.0
 """Slack of the roots of a closed form (see `symgrasp.ik.joints.sine`) for each m or rad that axes are moved
@@ -237,9 +241,11 @@ def chain_geometries(
         for backwards in (False, True):
             rows = [find(_joints(arm, locked, float(value), backwards), precision) for value in phi]
             known = [row for row in rows if row is not None]
-            if find is _meeting_pair and known:
-                # At single values the axes of a pair may be parallel: nothing is found there.
-                nowhere = known[0]._replace(W=np.full(3, np.nan))
+            # At single values the axes of a pair may be parallel, or so nearly that nothing can be computed.
+            if known and (
+                find is _meeting_pair or (find is _three_parallel_skew and 2 * len(known) > len(rows))
+            ):
+                nowhere = known[0]._replace(W=np.full(3, np.nan))  # nothing is found there
                 filled = zip(rows, phi, strict=True)
                 return precision, [row or nowhere._replace(phi=float(value)) for row, value in filled]
             if len(known) == len(rows):
@@ -333,7 +339,7 @@ def _parallel_geometry(
         for i, v in enumerate((W - O5, h[5])):
             along[i] = (h[4] @ v) * (h[1] @ h[4])
             matrix[i] = h[1] @ v - along[i], h[1] @ np.cross(h[4], v)
-        if abs(np.linalg.det(matrix)) < LEAST_SKEW:
+        if np.linalg.norm(W - O5) < LEAST_OFFSET or abs(np.linalg.det(matrix)) < LEAST_SKEW:
             return None
         skew = np.concatenate([[1.0], along, np.linalg.inv(matrix).ravel()])
     return ParallelGeometry(

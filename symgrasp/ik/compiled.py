@@ -43,7 +43,7 @@ class CompiledIK(ArmIK):
         self, arm: Arm, samples: int, tolerance: Tolerance | None = None, lock: Lock | None = None
     ) -> None:
         super().__init__(arm, samples, tolerance, lock)
-        self.chain = self._pack_chain()
+        self.chain = self._pack_chain(self.phi)
 
     @property
     def family(self) -> str:
@@ -53,12 +53,19 @@ class CompiledIK(ArmIK):
     @property
     def complete(self) -> bool:
         """Whether every configuration at the samples is found: by a closed form of the true axes."""
-        return bool(self.chain.joint[8] != MEETING_PAIR and not self.chain.joint[9])
+        return self.everywhere and bool(self.chain.joint[8] != MEETING_PAIR and not self.chain.joint[9])
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether no redundancy sample is left out because nothing can be computed there: axes are parallel."""
+        return bool(np.isfinite(self.chain.geometry).all())
 
     def at(self, phi: Array) -> Self:
         """Return the solver of the same arm at other samples (K,) of its redundancy (rad)."""
         other = super().at(phi)
-        other.chain = other._pack_chain()
+        # With those that are known, because at single values the arm may be of no family.
+        chain = self._pack_chain(np.concatenate([self.phi, phi]))
+        other.chain = chain._replace(geometry=chain.geometry[len(self.phi) :])
         return other
 
     def solve(self, T_base_tool: Array) -> Solutions:
@@ -80,10 +87,10 @@ class CompiledIK(ArmIK):
         sample, branch = np.nonzero(exists)
         return Solutions(q[exists], sample + first, branch, inside[exists])
 
-    def _pack_chain(self) -> Chain:
-        """Pack the arm's geometry at every redundancy sample into arrays."""
+    def _pack_chain(self, phi: Array) -> Chain:
+        """Pack the arm's geometry at values (K,) of its redundancy (rad) into arrays."""
         arm = self.arm
-        found = chain_geometries(arm, self.locked, self.phi)
+        found = chain_geometries(arm, self.locked, phi)
         assert found is not None  # or there would be no joint to lock
         precision, rows = found
         locked = -1 if self.locked is None else self.locked

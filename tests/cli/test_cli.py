@@ -163,7 +163,7 @@ def test_bad_input_is_one_line_and_status_2(arguments, message, capsys, tmp_path
         ("map", "a.yaml", " " * 1_000_001, "more than 1 MB"),
         ("object", "a.yaml", doubling_yaml(12, merged=True), "more than 100,000 values"),
         ("object", "a.yaml", f"name: a\nprofile: {[[k, 1] for k in range(10_001)]}", "at most 10,000 knots"),
-        ("hand", "a.urdf", chain_urdf(2000), "a palm with two or more moving fingers"),
+        ("hand", "a.urdf", chain_urdf(2000), "two or more fingers, or --tool for one jaw"),
         ("hand", "a.urdf", chain_urdf(5001), "at most 5,000 of them"),
         ("verify", "a.json", "[" * 1_000_000, "recursion"),
         ("verify", "a.json", " " * 5_000_001, "more than 5 MB"),
@@ -175,7 +175,8 @@ def test_a_hostile_file_is_one_line_that_names_the_limit(command, name, text, li
     path.write_text(text)
     assert main([command, str(path)]) == 2
     captured = capsys.readouterr()
-    assert captured.err.startswith(f"symgrasp: {path}: ")
+    assert captured.err.startswith(f"symgrasp: {tmp_path.anchor}")
+    assert f"{name}: " in captured.err
     assert limit in captured.err
     assert captured.err.count("\n") == 1
     assert captured.out == ""
@@ -291,9 +292,8 @@ def test_a_folder_that_cannot_be_written_is_told_before_anything_is_computed(sma
     out = small.parent / "map.json"
     assert main(["map", str(small), "--out", str(out)]) == 2
     captured = capsys.readouterr()
-    assert (
-        captured.err == f"symgrasp: command line: --out: {str(out)!r}: expected a file that can be written\n"
-    )
+    assert captured.err.startswith("symgrasp: command line: --out: '")
+    assert captured.err.endswith("map.json': expected a file that can be written\n")
     assert captured.out == ""
 
 

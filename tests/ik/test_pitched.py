@@ -145,6 +145,28 @@ def test_samples_mean_the_same_in_every_row():
         narrow.solve_sample(np.eye(4), 1)
 
 
+@pytest.mark.parametrize("name", OFFSETS)
+def test_steep_pitches_are_sampled_too(name):
+    """Near ±90° the last two axes are nearly parallel; at 90° they are, and nothing is found there alone."""
+    arm = arm_with(name).pitching((0.0, 0.0), (-1.7, 1.7), 0.1)
+    ik = solver_for(arm, 64)
+    assert isinstance(ik, PitchedIK)
+    assert len(ik.parts) == 2
+    sampled, numbers = ik.parts[1]
+    assert len(numbers) == 62  # the samples that are inside the limits
+    assert sampled.family.startswith("closed form")
+    rng = np.random.default_rng(0)
+    configurations = rng.uniform(arm.lower, arm.upper, (len(numbers), arm.dof))
+    for k, q in enumerate(configurations):
+        q[PITCH] = sampled.phi[k]
+        found = sampled.solve_sample(arm.tool_pose(q), k).q
+        assert np.abs(found - q).max(axis=1).min() < 1e-5
+    upright = sampled.at(np.array([0.2, 0.5, np.pi / 2]))
+    assert not upright.complete
+    configurations[:, PITCH] = np.pi / 2
+    assert not any(len(upright.solve_sample(arm.tool_pose(q), 2).q) for q in configurations)
+
+
 def test_only_azimuths_beyond_the_cell_are_out_of_reach():
     """A pitch beyond its limits is a joint limit."""
     arm = arm_with("on the axis")

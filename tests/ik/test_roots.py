@@ -39,7 +39,7 @@ def test_roots(a, b, c, d, k0):
         others = np.sort(others[others > 0]) / abs(root)
         # A root that all but coincides with others is blurred.
         blur = 1e-15 / max(float(np.prod(np.minimum(others, 1.0))), 1e-12) if len(others) == 3 else 1e-3
-        assert np.abs(roots - root).min() / abs(root) < 1e-9 + min(1e3 * blur, 1e-3)
+        assert np.abs(roots - root).min() < (1e-9 + min(1e3 * blur, 1e-3)) * abs(root) + 1e-14
 
 
 def of_angles(angles: Array) -> tuple[complex, complex, float]:

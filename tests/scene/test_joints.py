@@ -43,7 +43,8 @@ def test_one_arm_of_a_humanoid_leaves_the_torso_at_home_and_the_scene_says_so(co
     assert guessed.file.robots[0].arm_files()[0].joints == ("arm_left_1_joint", "arm_left_7_joint")
     assert guessed.notes[0].startswith("talos: srdf: talos.srdf, which lets ")
     assert guessed.notes[1:] == (
-        "left: joints: [arm_left_1_joint, arm_left_7_joint]; torso_1_joint, torso_2_joint rest at home",
+        "left: joints: [arm_left_1_joint, arm_left_7_joint], group l_arm of the SRDF; "
+        "torso_1_joint, torso_2_joint rest at home",
     )
     again = Scene.from_content(guessed.content)
     assert again.sha256 == guessed.sha256
