@@ -51,8 +51,8 @@ LEAST_OFFSET = 1e-3
 """Axes of joints 5 and 6 that come closer than this (m) are taken to meet, up to rounding, or not solved."""
 
 LEAST_SKEW = 1e-5
-"""Least determinant (m) of the equations of joint 5 where its axis and that of joint 6 do not meet: it is near
-zero where they are nearly parallel."""
+"""Least determinant (m) of the equations of joint 5 where its axis and that of joint 6 do not meet. Near
+parallel axes have a smaller one."""
 
 SLACK_RATIO = 30.0
 """Slack of the roots of a closed form (see `symgrasp.ik.joints.sine`) for each m or rad that axes are moved

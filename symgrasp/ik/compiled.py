@@ -57,7 +57,7 @@ class CompiledIK(ArmIK):
 
     @property
     def everywhere(self) -> bool:
-        """Whether no redundancy sample is left out because nothing can be computed there: axes are parallel."""
+        """Whether no redundancy sample is left out because axes are parallel there."""
         return bool(np.isfinite(self.chain.geometry).all())
 
     def at(self, phi: Array) -> Self:
