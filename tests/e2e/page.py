@@ -117,7 +117,7 @@ class GraspPage:
         def still(view: np.ndarray) -> bool:
             seen.append(view)
             green = np.abs(view.astype(int) - rgb(Reason.FEASIBLE.color)).max(axis=-1) < 25
-            return green.sum() > 500 and len(seen) > 4 and all(np.array_equal(view, v) for v in seen[-4:])
+            return green.sum() > 100 and len(seen) > 4 and all(np.array_equal(view, v) for v in seen[-4:])
 
         return self.wait_for_view(still)
 
