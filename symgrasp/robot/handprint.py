@@ -85,13 +85,14 @@ def handprint(hulls: Sequence[Array], manifold: Manifold, T_object_tool: Array) 
     cells = np.zeros((last - first + 1, manifold.angles), dtype=bool)
     for hull, points in zip(hulls, placed, strict=True):
         edges = _known_edges(hull.tobytes())  # of one opening they are the same wherever the hand is
-        for k in range(len(cells)):
-            bottom = manifold.profile.h_min + (first + k) * manifold.dh
+        lowest, highest = points[:, 2].min(), points[:, 2].max()
+        for row in range(to_row(lowest - ROUNDING_MARGIN), to_row(highest + ROUNDING_MARGIN) + 1):
+            bottom = manifold.profile.h_min + row * manifold.dh
             corners = slab_corners(
                 points, edges, bottom - ROUNDING_MARGIN, bottom + manifold.dh + ROUNDING_MARGIN
             )
             if len(corners):
-                cells[k] |= _covered_columns(corners, manifold)
+                cells[row - first] |= _covered_columns(corners, manifold)
     cells.setflags(write=False)
     return Handprint(cells, first)
 

@@ -160,7 +160,8 @@ def collision_hulls(shape: CollisionShape, field: str) -> tuple[Array, ...]:
     else:
         assert shape.path is not None
         hulls = _mesh_hulls(shape.path, shape.sha256, shape.size, field)
-    return tuple(points @ shape.pose[:3, :3].T + shape.pose[:3, 3] for points in hulls)
+    placed = (points @ shape.pose[:3, :3].T + shape.pose[:3, 3] for points in hulls)
+    return tuple(map(np.asarray, placed))  # trimesh tracks changes of its own arrays, which is slow
 
 
 @lru_cache(maxsize=1024)
