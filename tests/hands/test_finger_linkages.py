@@ -57,7 +57,7 @@ def linkage_hand(signs: dict[str, int], chained: bool, offset: float, root: floa
     for side, name in ((1, "l"), (-1, "r")):
         # A positive turn about x takes z towards -y: the left crank closes that way, the right one opens.
         y, z = side * CRANK * np.sin(TILT), CRANK * np.cos(TILT)
-        crank = box([0.01, 0.008, 0.008], [0, 0.5 * y, 0.5 * z])
+        crank = "".join(box([0.01, 0.008, 0.008], [0, at * y, at * z]) for at in (0.25, 0.5, 0.75, 1.0))
         pad = box([0.02, 0.01, PAD_LENGTH], [0, side * (0.005 - FACE), 0.5 * PAD_LENGTH])
         if root:
             pad += box([0.02, 0.01 + root, 0.012], [0, side * (0.005 - FACE - root / 2), 0.006])
