@@ -14,7 +14,8 @@ ROOMS = [
     "symgrasp.compiling", "symgrasp.poses", "symgrasp.meshes", "symgrasp.reason", "symgrasp.object",
     "symgrasp.descriptions", "symgrasp.robot", "symgrasp.hands", "symgrasp.survey",
     "symgrasp.ik", "symgrasp.scene", "symgrasp.world", "symgrasp.engine", "symgrasp.feasibility",
-    "symgrasp.plan", "symgrasp.planners", "symgrasp.bench", "symgrasp.cli", "symgrasp.__main__",
+    "symgrasp.plan", "symgrasp.planners", "symgrasp.motion", "symgrasp.bench",
+    "symgrasp.cli", "symgrasp.__main__",
     "app.choices", "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute",
     "app.panels", "app.server", "app.__main__",
 ]  # fmt: skip

@@ -1,0 +1,1 @@
+"""Motions: how the arms get from grasp to grasp, and when."""
