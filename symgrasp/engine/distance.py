@@ -24,7 +24,7 @@ from symgrasp.compiling import njit
 from symgrasp.engine.pieces import SEED_GRID
 from symgrasp.engine.simplex import FAST, SURROUNDS, depth_inside, reduce_to_nearest
 
-__all__ = ["distance_bounds"]
+__all__ = ["between_centres", "distance_bounds", "distance_bounds_from"]
 
 STEPS = 40
 """Largest number of iterations; the bounds at that point are returned."""
@@ -50,13 +50,30 @@ def distance_bounds(pieces, pose, a, b, enough, sure, little, work):
     Returns:
         The bounds. Where the pieces overlap the upper one is negative and the lower one -inf.
     """
+    lower, upper, _ = distance_bounds_from(
+        pieces, pose, a, b, enough, sure, little, work, between_centres(pieces.size, pose, a, b)
+    )
+    return lower, upper
+
+
+@njit(**FAST)
+def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, v):
+    """Return the bounds of `distance_bounds`, and a direction along which the pieces are apart.
+
+    Args:
+        pieces, pose, a, b, enough, sure, little, work: see `distance_bounds`.
+        v: the direction (3,) from b to a to begin with: where the pieces have hardly moved since, the one
+            that was returned then is almost always enough.
+
+    Returns:
+        The bounds, and the last direction.
+    """
     vertices, edge_start, edges, seeds, index, size = pieces
     thick = size[a, 0] + size[b, 0]
     enough += thick
     sure += thick
     little += thick
-    ca, cb = _centre(size, pose, a), _centre(size, pose, b)
-    v0, v1, v2 = ca[0] - cb[0], ca[1] - cb[1], ca[2] - cb[2]
+    v0, v1, v2 = v
     square = v0 * v0 + v1 * v1 + v2 * v2
     if square < 1e-24:
         v0, v1, v2, square = 1.0, 0.0, 0.0, 1.0
@@ -81,13 +98,13 @@ def distance_bounds(pieces, pose, a, b, enough, sure, little, work):
             break
         for k in range(count):
             if work[k, 0] == w0 and work[k, 1] == w1 and work[k, 2] == w2:
-                return lower - thick, upper - thick  # w is in the simplex already: converged
+                return lower - thick, upper - thick, (v0, v1, v2)  # w is in the simplex already: converged
         work[count, 0], work[count, 1], work[count, 2] = w0, w1, w2
         count += 1
         if count == 4:
             deep = depth_inside(work)
             if deep > SURROUNDS:
-                return -math.inf, -deep - thick
+                return -math.inf, -deep - thick, (v0, v1, v2)
         count, v0, v1, v2 = reduce_to_nearest(work, count)
         square = v0 * v0 + v1 * v1 + v2 * v2
         upper = min(upper, math.sqrt(square))
@@ -95,7 +112,14 @@ def distance_bounds(pieces, pose, a, b, enough, sure, little, work):
             break
         if square < 1e-24:
             break
-    return lower - thick, upper - thick
+    return lower - thick, upper - thick, (v0, v1, v2)
+
+
+@njit(**FAST)
+def between_centres(size, pose, a, b):
+    """Return the centre of the box of piece a relative to that of piece b."""
+    ca, cb = _centre(size, pose, a), _centre(size, pose, b)
+    return ca[0] - cb[0], ca[1] - cb[1], ca[2] - cb[2]
 
 
 @njit(**FAST)

@@ -12,7 +12,16 @@ from symgrasp.engine.boxes import box_of, boxes_of
 from symgrasp.engine.simplex import FAST
 from symgrasp.poses import Array
 
-__all__ = ["MovingPieces", "Scratch", "copied", "new_scratch", "place_arm", "place_hand"]
+__all__ = [
+    "MovingPieces",
+    "Scratch",
+    "copied",
+    "new_scratch",
+    "place_arm",
+    "place_frames",
+    "place_hand",
+    "place_pieces",
+]
 
 
 class MovingPieces(NamedTuple):
@@ -138,7 +147,13 @@ def place_hand(moving, pieces, scratch, T_world_base, T, row):
 @njit(**FAST)
 def place_arm(moving, pieces, scratch, q):
     """Write poses and boxes of the pieces between base and tool, at joint values q (n,)."""
-    frames = scratch.frames
+    place_frames(moving, q, scratch.frames)
+    place_pieces(moving, pieces, scratch, scratch.frames)
+
+
+@njit(**FAST)
+def place_frames(moving, q, frames):
+    """Write the joint frames (n, 12) in the world, but the last, at joint values q (n,)."""
     for j in range(len(moving.joint_origin) - 1):
         if j == 0:
             for i in range(12):
@@ -146,6 +161,11 @@ def place_arm(moving, pieces, scratch, q):
         else:
             compose(frames[j - 1], moving.joint_origin[j], frames[j])
         rotate(frames[j], moving.joint_axis[j], q[j])
+
+
+@njit(**FAST)
+def place_pieces(moving, pieces, scratch, frames):
+    """Write poses and boxes of the pieces between base and tool, given the joint frames (n, 12)."""
     for k in range(moving.hand.shape[1], len(moving.frame)):
         compose(frames[moving.frame[k]], moving.local[k], scratch.pose[k])
         box_of(pieces.size, scratch.pose, k, scratch.box[k])

@@ -12,10 +12,11 @@ import numpy as np
 
 from symgrasp.compiling import njit
 from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import UNDECIDED, check_arm, check_hand
-from symgrasp.engine.kinematics import place_arm, place_hand
+from symgrasp.engine.checks import UNDECIDED, check_hand
+from symgrasp.engine.kinematics import place_frames, place_hand
+from symgrasp.engine.path_checks import check_path_of_arm, check_path_of_hand, write_tool
 from symgrasp.engine.search_types import BLOCKED, FEASIBLE, RETREAT_UNDECIDED
-from symgrasp.ik.branches import branches_at
+from symgrasp.ik.branches import branches_near
 from symgrasp.ik.retreat import RETREAT_TURN
 from symgrasp.ik.vectors import STRICT
 
@@ -23,12 +24,11 @@ __all__ = ["arm_retreats", "copy_row", "moved_along", "tool_clearance", "tool_re
 
 
 @njit(**STRICT)
-def tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, step, T):
-    """Place the pieces that are fixed to the tool and check them.
+def tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, T):
+    """Place the pieces that are fixed to the tool at the grasp and check them.
 
     Args:
         run: index of the cell's run.
-        step: 0 at the grasp, else 1 + index of the step of the retreat.
         T: tool pose (4, 4) in the base.
 
     Returns:
@@ -38,74 +38,82 @@ def tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, step, T):
     if inputs.always_collides:
         scratch.hit[0] = -1
         return -math.inf
-    if rows.gap[run, step] == -math.inf:
-        scratch.hit[0], scratch.hit[1] = rows.hit[run, step, 0], rows.hit[run, step, 1]
-        scratch.depth[0] = rows.depth[run, step]
+    if rows.gap[run, 0] == -math.inf:
+        scratch.hit[0], scratch.hit[1] = rows.hit[run, 0, 0], rows.hit[run, 0, 1]
+        scratch.depth[0] = rows.depth[run, 0]
         return -math.inf
-    return check_hand(moving, pieces, tree, scratch, inputs.margin, rows.gap[run, step])
+    return check_hand(moving, pieces, tree, scratch, inputs.margin, rows.gap[run, 0])
 
 
 @njit(**STRICT)
 def tool_retreats(moving, pieces, tree, scratch, branches, inputs, rows, run, T):
-    """Whether the pieces that are fixed to the tool are certified free at every step of the retreat."""
-    moved = branches.T
-    for s in range(len(inputs.retreat)):
-        moved_along(T, inputs.retreat[s], moved)
-        if tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, s + 1, moved) <= UNDECIDED:
-            return False
-    return True
-
-
-@njit(**STRICT)
-def arm_retreats(
-    chain, moving, pieces, tree, scratch, branches, inputs, balance, rows, run, T, k, b, tool_free
-):
-    """Follow a candidate, at which the arm is placed, along the retreat, in the steps of `CandidateChecker`.
-
-    Args:
-        k: redundancy sample of the candidate.
-        b: branch of the candidate.
-        tool_free: whether `tool_retreats` holds.
+    """Check the pieces that are fixed to the tool along the retreat, and write its tool poses.
 
     Returns:
         FEASIBLE, BLOCKED, or RETREAT_UNDECIDED.
     """
+    path, moved, row, steps = branches.path, branches.T, inputs.row[run], len(inputs.retreat)
+    worst, middle = 0.0, steps // 2
+    for step in range(1 + steps):
+        s = middle if step == steps else step  # the hand stays at the middle
+        moved_along(T, inputs.retreat[s], moved)
+        place_hand(moving, pieces, scratch, inputs.T_world_base, moved, row)
+        write_tool(scratch, path, s)
+        worst = min(worst, rows.gap[run, 1 + s])
+        if worst == -math.inf:
+            scratch.hit[0], scratch.hit[1] = rows.hit[run, 1 + s, 0], rows.hit[run, 1 + s, 1]
+            scratch.depth[0] = rows.depth[run, 1 + s]
+            return BLOCKED
+    way = max(
+        abs(inputs.retreat[middle] - inputs.retreat[0]), abs(inputs.retreat[-1] - inputs.retreat[middle])
+    )
+    for g in range(moving.hand.shape[1]):
+        path.motion[g] = way
+    return _status(min(worst, check_path_of_hand(moving, pieces, tree, scratch, path, row, inputs.margin)))
+
+
+@njit(**STRICT)
+def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, balance, run, T, k, b, tool):
+    """Follow a candidate along the retreat, in the steps of `CandidateChecker`.
+
+    The order of the checks is another one: a candidate is blocked if any step is, whatever the others are.
+
+    Args:
+        k: redundancy sample of the candidate.
+        b: branch of the candidate.
+        tool: what `tool_retreats` returned for the cell.
+
+    Returns:
+        FEASIBLE, BLOCKED, or RETREAT_UNDECIDED. The pair that blocks it, if one does, is in ``scratch.hit``.
+    """
+    if tool == BLOCKED:
+        return BLOCKED
     q, exists, inside, at = branches.q[1], branches.exists[1], branches.inside[1], branches.at
-    moved, falls, row = branches.T, len(balance.edges) > 0, inputs.row[run]
+    path, moved, falls, row = branches.path, branches.T, len(balance.edges) > 0, inputs.row[run]
+    scratch.hit[0] = -1
     copy_row(branches.q[0][b], at)
     if falls and not stands(balance, scratch.frames, inputs.T_world_base, T, row, False):
-        scratch.hit[0] = scratch.hit[2] = -1
         return BLOCKED
-    furthest = FEASIBLE
     for s in range(len(inputs.retreat)):
         moved_along(T, inputs.retreat[s], moved)
-        scratch.hit[0] = scratch.hit[2] = -1
-        branches_at(chain, k, moved, True, q, exists, inside, branches.memory)
+        branches_near(chain, k, moved, at, RETREAT_TURN, q, exists, inside, branches.memory)
         if not _follow(chain.limits, q, inside, at):
-            furthest = BLOCKED
-            break
-        if falls:
-            place_arm(moving, pieces, scratch, at)
-            if not stands(balance, scratch.frames, inputs.T_world_base, moved, row, False):
-                furthest = BLOCKED
-                break
-        gap = 0.0  # on the retreat only collisions matter, not the clearance
-        if tool_free:
-            place_hand(moving, pieces, scratch, inputs.T_world_base, moved, row)
-        else:
-            gap = min(gap, tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, s + 1, moved))
-        if gap != -math.inf:
-            place_arm(moving, pieces, scratch, at)
-            gap = check_arm(moving, pieces, tree, scratch, inputs.margin, gap, -math.inf)
-        if gap == -math.inf:
-            furthest = BLOCKED
-            break
-        if gap == UNDECIDED:
-            # Later steps need no check: PyBullet decides the whole retreat.
-            furthest = RETREAT_UNDECIDED
-            break
-    scratch.hit[2] = -1
-    return furthest
+            return BLOCKED
+        place_frames(moving, at, path.frames[s])
+        if falls and not stands(balance, path.frames[s], inputs.T_world_base, moved, row, False):
+            return BLOCKED
+    moved_along(T, inputs.retreat[len(inputs.retreat) // 2], moved)
+    place_hand(moving, pieces, scratch, inputs.T_world_base, moved, row)
+    found = _status(check_path_of_arm(moving, pieces, tree, scratch, path, row, inputs.margin))
+    return tool if found == FEASIBLE else found
+
+
+@njit(**STRICT)
+def _status(gap):
+    """Return what a clearance (m) of a path means: FEASIBLE, BLOCKED, or RETREAT_UNDECIDED."""
+    if gap == -math.inf:
+        return BLOCKED
+    return RETREAT_UNDECIDED if gap == UNDECIDED else FEASIBLE
 
 
 @njit(**STRICT)

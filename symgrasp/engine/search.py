@@ -104,7 +104,10 @@ def search(
         hit=np.full((runs, steps, 2), -1, dtype=np.int64),
         depth=np.full((runs, steps), np.nan),
     )
-    own = [(copied(scratch), new_branches(chain, joints)) for _ in range(inputs.parts)]
+    own = [
+        (copied(scratch), new_branches(chain, joints, steps - 1, len(moving.frame)))
+        for _ in range(inputs.parts)
+    ]
 
     # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
     def search_part(part: int, wants_rows: bool) -> None:
@@ -161,7 +164,8 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
     q, exists, inside = branches.q[0], branches.exists[0], branches.inside[0]
     hand = math.nan  # clearance of the pieces fixed to the tool; NaN until a candidate needs it
     best = -math.inf
-    elbow_reaches = retreat_known = tool_free = False
+    elbow_reaches = retreat_known = False
+    tool = FEASIBLE
     for k in inputs.sample_order:
         elbow_reaches |= branches_at(chain, k, T, True, q, exists, inside, branches.memory)
         for b in range(len(inside)):
@@ -175,7 +179,7 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                     continue
             if math.isnan(hand):
                 result.status[cell] = HIT
-                hand = tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, 0, T)
+                hand = tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, T)
                 if hand == -math.inf:
                     _name_pair(scratch, result, cell)
                     return
@@ -189,28 +193,18 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
             if gap != UNDECIDED and len(inputs.retreat):
                 if not retreat_known:
                     retreat_known = True
-                    tool_free = tool_retreats(moving, pieces, tree, scratch, branches, inputs, rows, run, T)
+                    tool = tool_retreats(moving, pieces, tree, scratch, branches, inputs, rows, run, T)
                 furthest = arm_retreats(
-                    chain,
-                    moving,
-                    pieces,
-                    tree,
-                    scratch,
-                    branches,
-                    inputs,
-                    balance,
-                    rows,
-                    run,
-                    T,
-                    k,
-                    b,
-                    tool_free,
-                )
+                    chain, moving, pieces, tree, scratch, branches, inputs, balance, run, T, k, b, tool
+                )  # fmt: skip
                 place_hand(moving, pieces, scratch, inputs.T_world_base, T, inputs.row[run])
                 if furthest == BLOCKED:
                     if result.status[cell] == HIT:
                         result.status[cell] = BLOCKED
                         _name_pair(scratch, result, cell)
+                    if tool == BLOCKED:  # which all candidates are then
+                        result.undecided_count[cell] = 0
+                        return
                     continue
                 if furthest == RETREAT_UNDECIDED:
                     gap = UNDECIDED

@@ -21,6 +21,7 @@ __all__ = [
     "UNREACHABLE",
     "Balance",
     "BranchScratch",
+    "Path",
     "RowChecks",
     "SearchInput",
     "SearchResult",
@@ -123,6 +124,20 @@ class RowChecks(NamedTuple):
     depth: Array
 
 
+class Path(NamedTuple):
+    """Where an arm is at each of the s steps of a retreat, and how far its M pieces move on the way.
+
+    Attributes:
+        frames: (s, n, 12) joint frames in the world, but the last.
+        tool: (s, 12) tool poses in the world.
+        motion: (M,) how far (m) any point of a piece is from where it is at the middle step, at most.
+    """
+
+    frames: Array
+    tool: Array
+    motion: Array
+
+
 class BranchScratch(NamedTuple):
     """Arrays that one thread writes inverse kinematics to: index 0 at the grasp, index 1 on the retreat.
 
@@ -132,6 +147,7 @@ class BranchScratch(NamedTuple):
         inside: (2, B) which branches reach it inside the limits.
         at: (n,) present joint values on the retreat.
         T: (4, 4) present tool pose on the retreat.
+        path: the retreat of the arm.
         memory: what the inverse kinematics needs.
     """
 
@@ -140,11 +156,19 @@ class BranchScratch(NamedTuple):
     inside: np.ndarray
     at: Array
     T: Array
+    path: Path
     memory: Memory
 
 
-def new_branches(chain: Chain, joints: int) -> BranchScratch:
-    """Return arrays for the inverse kinematics of an arm with that many joints."""
+def new_branches(chain: Chain, joints: int, steps: int, moving: int) -> BranchScratch:
+    """Return arrays for the inverse kinematics of an arm.
+
+    Args:
+        chain: the arm.
+        joints: number n of its joints.
+        steps: number s of the steps of the retreat.
+        moving: number M of the pieces that it moves.
+    """
     count = branch_count(chain)
     return BranchScratch(
         q=np.empty((2, count, joints)),
@@ -152,5 +176,6 @@ def new_branches(chain: Chain, joints: int) -> BranchScratch:
         inside=np.empty((2, count), dtype=bool),
         at=np.empty(joints),
         T=np.empty((4, 4)),
+        path=Path(np.empty((steps, joints, 12)), np.empty((steps, 12)), np.empty(moving)),
         memory=new_memory(joints),
     )

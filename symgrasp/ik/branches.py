@@ -6,13 +6,14 @@ depend on what else is asked.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik.arcs import ARCS, HALVINGS
-from symgrasp.ik.chain import THREE_PARALLEL
+from symgrasp.ik.chain import COSINE_TOLERANCE, THREE_PARALLEL, Chain
 from symgrasp.ik.joints import misses, settle
 from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair import PAIR_BRANCHES, STARTS, VIEWS, pair_branches
@@ -23,7 +24,7 @@ from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
 
-__all__ = ["Memory", "branch_count", "branches_at", "new_memory", "solve_range"]
+__all__ = ["Memory", "branch_count", "branches_at", "branches_near", "new_memory", "solve_range"]
 
 CLOSED_FORM_BRANCHES = 8
 """Branches of every closed form here: three times two values."""
@@ -43,6 +44,7 @@ class Memory(NamedTuple):
         starts: (2, STARTS, n) joint values, inside the limits and outside, from which Newton's method starts.
         counts: (2,) how many.
         row: (n,) joint values.
+        near: (6, n) limits around a configuration, see `Chain`.
     """
 
     J: Array
@@ -55,6 +57,7 @@ class Memory(NamedTuple):
     starts: Array
     counts: np.ndarray
     row: Array
+    near: Array
 
 
 def new_memory(joints: int) -> Memory:
@@ -70,6 +73,7 @@ def new_memory(joints: int) -> Memory:
         np.empty((2, STARTS, joints)),
         np.empty(2, dtype=np.int64),
         np.empty(joints),
+        np.empty((6, joints)),
     )
 
 
@@ -130,6 +134,30 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         inside[b] = inside[b] and exists[b]
         exists[b] = exists[b] and _in_cell(chain, q[b])
     return solvable
+
+
+@njit(**STRICT)
+def branches_near(chain, k, T, at, most, q, exists, inside, memory):
+    """Solve one pose (4, 4) like `branches_at`, but for the branches inside the limits near a configuration.
+
+    Those that turn a joint by more than ``most`` are left out early where that is known before they are
+    polished; those that remain may be a full turn off, see `branches_at`.
+
+    Args:
+        chain, k, T, q, exists, inside, memory: see `branches_at`.
+        at: (n,) joint values (rad) inside the limits.
+        most: the largest turn (rad), below π.
+    """
+    limits, leeway = chain.limits, chain.leeway
+    if chain.joint[8] != MEETING_PAIR and not chain.joint[9]:
+        limits = leeway = memory.near
+        for j in range(at.shape[0]):
+            limits[0, j] = max(chain.limits[0, j], at[j] - most)
+            limits[1, j] = min(chain.limits[1, j], at[j] + most)
+            limits[2, j], limits[3, j], limits[4, j] = at[j], math.cos(at[j]), math.sin(at[j])
+            limits[5, j] = math.cos(most) - COSINE_TOLERANCE
+    near = Chain(chain.geometry, chain.joint, limits, leeway, chain.forward, chain.fixed)
+    branches_at(near, k, T, True, q, exists, inside, memory)
 
 
 @njit(**STRICT)
