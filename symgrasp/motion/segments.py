@@ -33,7 +33,7 @@ class Segment:
         times: (n,) s from the segment's start, strictly increasing from 0; None before timing.
         gripper: arm → opening of its hand, of which the hand's joints follow as `Hand.joint_values` says;
             they move in proportion to time. Hands without an entry stay as they are.
-        held_by: names of the arms in whose hands the object is fixed.
+        held_by: names of the arms in whose hands the object is fixed; not those that close or open them.
         task_from: the task at whose pose the object is at the start.
         task_to: the same at the end.
         clearance: smallest distance (m) proven along it of bodies that may not touch.

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from symgrasp import page
 from symgrasp.errors import PlanError, SymgraspError
 from symgrasp.feasibility.pictures import to_png
 from symgrasp.files import check_size, read_file, write_atomically
+from symgrasp.plan.motion_record import MotionRecord
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.scene.format import MOST_TASKS, describe_error
 
@@ -35,6 +37,9 @@ CLEARANCE_LIMIT = 0.1
 
 LARGEST_PLAN = 5_000_000
 """Largest plan file (bytes) that is read."""
+
+NUMBERS = re.compile(r"\[\n\s*([-+\d.eE,\s]+?)\n\s*\]")
+"""An array of numbers over several lines; in a string there is no line break."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Row = tuple[Finite, Finite, Finite, Finite]
@@ -119,9 +124,9 @@ class SceneRecord(_Part):
 
 
 class Plan(_Part):
-    """A plan, format version 1."""
+    """A plan, format version 2: version 1 has no motion."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[1, 2] = 2
     kind: Literal["sequential", "bimanual", "handover"]
     scene: SceneRecord
     versions: dict[str, str]
@@ -134,10 +139,23 @@ class Plan(_Part):
     }
     robots: dict[str, tuple[str, ...]] = Field(description="robot → names of all its joints")
     tasks: Annotated[tuple[PlanTask, ...], Field(max_length=MOST_TASKS, fail_fast=True)]
+    motion: MotionRecord | None = Field(default=None, description="how the arms get from grasp to grasp")
+
+    @model_validator(mode="after")
+    def _motion_since_version_2(self) -> Plan:
+        if self.motion is not None and self.schema_version == 1:
+            raise ValueError("schema_version 2 of a plan with a motion")
+        return self
 
     def to_json(self) -> str:
         """Return the plan as JSON text; floats read back exactly."""
-        return json.dumps(self.model_dump(mode="json"), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        text = json.dumps(self.model_dump(mode="json"), indent=2, ensure_ascii=False, allow_nan=False)
+        return (
+            NUMBERS.sub(
+                lambda found: "[" + ", ".join(number.strip() for number in found[1].split(",")) + "]", text
+            )
+            + "\n"
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the plan, in one piece."""

@@ -19,6 +19,7 @@ import numpy as np
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.ik import solver_for
+from symgrasp.plan.check_motion import check_motion
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Hold, Plan, PlanTask, Pose
 from symgrasp.poses import Array, from_position_quat, inverse, pose_error, rotation_z
 from symgrasp.progress import Progress, part_of
@@ -117,6 +118,8 @@ def verify(plan: Plan | str | Path, progress: Progress | None = None) -> Report:
                 held = [other.arm for other in task.holds]
                 shares = sum(other.robot == hold.robot for other in task.holds) > 1
                 _check_margins(hold, shares, held, task.object_pose_turned.array(), who, world, report, tell)
+        if plan.motion is not None and not report.failures:
+            check_motion(plan, plan.motion, world, report.expect)
     if progress:
         progress(1.0)
     return report

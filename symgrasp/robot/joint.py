@@ -8,7 +8,10 @@ import numpy as np
 
 from symgrasp.poses import Array, from_rotation, rotation_about
 
-__all__ = ["Joint", "joint_motion"]
+__all__ = ["DEFAULT_VELOCITY", "Joint", "joint_motion"]
+
+DEFAULT_VELOCITY = 1.0
+"""Largest speed (rad/s or m/s) of joints for which a URDF states none above zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,7 @@ class Joint:
         source: index into the robot's joint values, or -1 for a fixed joint.
         ratio: value of this joint for each unit of the source (1 unless it mimics).
         offset: value of this joint where the source is zero.
+        velocity: largest speed (rad/s or m/s).
     """
 
     name: str
@@ -40,6 +44,7 @@ class Joint:
     source: int
     ratio: float = 1.0
     offset: float = 0.0
+    velocity: float = DEFAULT_VELOCITY
 
 
 def joint_motion(joint: Joint, value: Array) -> Array:

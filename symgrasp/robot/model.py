@@ -17,7 +17,7 @@ from symgrasp.descriptions.srdf import read_srdf
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
-from symgrasp.robot.joint import Joint, joint_motion
+from symgrasp.robot.joint import DEFAULT_VELOCITY, Joint, joint_motion
 from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
 
@@ -56,6 +56,7 @@ class RobotModel:
         joint_names: the joints that take a value: neither fixed nor mimic.
         lower: their lower limits (n,), -inf where there is none.
         upper: their upper limits (n,), inf where there is none.
+        velocity: their largest speeds (n,) (rad/s or m/s), `DEFAULT_VELOCITY` where the file states none.
     """
 
     def __init__(
@@ -93,6 +94,7 @@ class RobotModel:
         by_name = {joint.name: joint for joint in self.joints}
         self.lower = np.array([by_name[name].lower for name in self.joint_names])
         self.upper = np.array([by_name[name].upper for name in self.joint_names])
+        self.velocity = np.array([by_name[name].velocity for name in self.joint_names])
 
     def _content_sha256(self) -> str:
         """Hash the URDF and the files of its collision meshes; meshes that are only seen are left out."""
@@ -165,7 +167,7 @@ class RobotModel:
                 lower, upper = min(ends), max(ends)
         return Joint(
             j.name, j.type, links[j.parent], links[j.child], origin, axis, lower, upper,
-            source, ratio, offset,
+            source, ratio, offset, _stated_velocity(j),
         )  # fmt: skip
 
     def _followed(
@@ -333,6 +335,11 @@ def _stated_limits(j: yourdfpy.Joint) -> tuple[float, float] | None:
     if j.limit is None or j.limit.lower is None or j.limit.upper is None:
         return None
     return float(j.limit.lower), float(j.limit.upper)
+
+
+def _stated_velocity(j: yourdfpy.Joint) -> float:
+    stated = j.limit.velocity if j.limit is not None else None
+    return float(stated) if stated is not None and 0 < stated < np.inf else DEFAULT_VELOCITY
 
 
 def _root_link(urdf: yourdfpy.URDF) -> str:

@@ -20,10 +20,14 @@ from symgrasp.robot.model import RobotModel
 from symgrasp.robot.pitch import STEEPEST, pitch_range
 from symgrasp.robot.torso import Torso
 
-__all__ = ["AZIMUTH", "PITCH", "Arm", "Robot"]
+__all__ = ["AZIMUTH", "DEFAULT_ACCELERATION", "PITCH", "Arm", "Robot"]
 
 PITCH, AZIMUTH = 5, 6
 """Where pitch and azimuth are among the values of a pitched arm."""
+
+DEFAULT_ACCELERATION = 2.0
+"""Largest acceleration (rad/s² or m/s²) of joints where a scene states none: about the least that MoveIt's
+configuration of the Panda gives a joint (1.875)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,7 @@ class Robot:
         torso: the joints before the arms that maps sample; None where they stay at home.
         support: corners (k, 2) in the world, counterclockwise, of the convex area that its centre of mass
             must stay above; None where it cannot fall.
+        acceleration: largest acceleration (rad/s² or m/s²) of its joints.
     """
 
     name: str
@@ -46,6 +51,7 @@ class Robot:
     home: Array
     torso: Torso | None = None
     support: Array | None = None
+    acceleration: float = DEFAULT_ACCELERATION
 
     def at(self, sample: int) -> Robot:
         """Return the robot whose torso rests at a sample."""

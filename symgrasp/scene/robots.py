@@ -15,7 +15,7 @@ from symgrasp.robot.assembly import Mount
 from symgrasp.robot.groups import arm_group
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.robot import Arm, Robot
+from symgrasp.robot.robot import DEFAULT_ACCELERATION, Arm, Robot
 from symgrasp.robot.support import area_of_corners, area_of_feet
 from symgrasp.robot.torso import Torso
 from symgrasp.scene.format import ArmFile, RobotFile, xacro_texts
@@ -99,7 +99,8 @@ class RobotBuilder:
         home = self._home(f"{field}.home", entry, model, [name for names in joints for name in names], hands)
         base = entry.base.matrix()
         support = self._support(field, entry, model, home, base)
-        robot = Robot(entry.name, model, base, home, torso, support)
+        acceleration = entry.acceleration or DEFAULT_ACCELERATION
+        robot = Robot(entry.name, model, base, home, torso, support, acceleration)
         arms = [
             Arm(a.name, robot, tool, hand, frozenset(chain) - frozenset(names))
             for a, tool, hand, chain, names in zip(files, tools, hands, chains, joints, strict=True)

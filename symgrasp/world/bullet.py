@@ -290,6 +290,24 @@ class BulletWorld:
         """
         return self.margin if reason in MARGIN_REASONS else 0.0
 
+    def all_pairs_within(self, distance: float, touching: Sequence[Arm] = ()) -> list[Collision]:
+        """Return the pairs of bodies, of all robots, that are closer than a distance.
+
+        Args:
+            distance: the distance (m); the depths of the result are relative to it.
+            touching: the arms whose touch links may touch the object.
+        """
+        touch = _touch_links(touching)
+        found, done = [], set[int]()
+        for name, body in self.bodies.robots.items():
+            arm = next(arm for arm in self.scene.arms.values() if arm.robot.name == name)
+            alone = (Reason.SELF_COLLISION, Reason.SCENE_COLLISION)
+            queries = [q for q in self._queries[arm.name] if q.reason in alone]
+            queries += [q for q in self._parked_queries[name] if q.b not in done]
+            found += [c for q in queries for c in self._collisions(q, distance) if not _touches(c, touch)]
+            done.add(body)
+        return found
+
     def _collisions(self, query: Query, margin: float | None = None) -> list[Collision]:
         """Return the pairs of a query that are closer than a margin (m), by default that of its reason."""
         if margin is None:

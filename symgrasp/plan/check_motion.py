@@ -1,0 +1,184 @@
+"""Whether the motion of a plan can be done as it says, and nothing touches on the way that must not.
+
+The motion is followed from its start, at home, with nothing but its numbers: each segment begins where
+the one before ended, its rows are put through the URDF and into PyBullet, and no planner's code takes part.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from symgrasp.plan.check_motion_rows import TOLERANCE, Expect, check_rows
+from symgrasp.plan.check_motion_states import RIGID, SegmentStates, check_free, tool_pose
+from symgrasp.plan.motion_record import MotionRecord, SegmentRecord
+from symgrasp.plan.plan import Hold, Plan
+from symgrasp.poses import Array, inverse, pose_error
+from symgrasp.progress import Progress
+from symgrasp.world import BulletWorld
+
+__all__ = ["check_motion"]
+
+GRASP_TOLERANCE = 1e-5
+"""By how much (m, rad) a hand may be off its grasp when it closes: solutions are refined to about 1e-8."""
+
+LIFT = 0.2
+"""Largest height (m) by which several hands lift the object in the end."""
+
+
+def check_motion(
+    plan: Plan, motion: MotionRecord, world: BulletWorld, expect: Expect, progress: Progress | None = None
+) -> None:
+    """Check every statement of a motion, up to the first segment that cannot be followed.
+
+    Args:
+        plan: the plan, of which all else has been checked.
+        motion: its motion.
+        world: a world of its scene; robots and object are put along the motion.
+        expect: notes a statement, and what is wrong where it does not hold.
+        progress: called with the finished share; may raise `Cancelled`.
+    """
+    arms = world.scene.arms
+    for name, joints in motion.joint_names.items():
+        known = name in arms and arms[name].joint_names == joints
+        if not expect(known, f"motion: joint_names: the scene has no arm {name} with joints {list(joints)}"):
+            return
+    total = sum(segment.times[-1] for segment in motion.segments)
+    text = f"motion: duration is {total:.6f} s, not {motion.duration:.6f} s"
+    expect(abs(total - motion.duration) <= TOLERANCE, text)
+    walk = _Walk(plan, world, expect)
+    for k, segment in enumerate(motion.segments):
+        if progress:
+            progress(k / len(motion.segments))
+        if not walk.follow(segment, f"motion.segments[{k}] ({segment.kind})"):
+            return
+    walk.check_end(motion.segments[-1])
+
+
+class _Walk:
+    """Where everything is at the end of the segments so far.
+
+    Args:
+        plan: the plan.
+        world: a world of its scene.
+        expect: see `check_motion`.
+    """
+
+    def __init__(self, plan: Plan, world: BulletWorld, expect: Expect) -> None:
+        self._plan, self._world, self._scene, self._expect = plan, world, world.scene, expect
+        self._values = {name: robot.home.copy() for name, robot in self._scene.robots.items()}
+        self._opening: dict[str, float] = {}
+        self._in_hand: dict[str, Array] = {}  # arm that holds the object → T_tool_object
+        self._T = plan.tasks[0].object_pose_turned.array()
+        self._task = 0  # index of the task that the object is in, or was last
+        self._complete = False  # whether all arms of it held the object
+
+    def follow(self, segment: SegmentRecord, where: str) -> bool:
+        """Check a segment and move to its end; return whether the next one can be checked."""
+        released = [name for name in segment.gripper if self._in_hand.pop(name, None) is not None]
+        if not self._check_start(segment, where):
+            return False
+        if not check_rows(segment, self._values, self._scene, where, self._expect):
+            return False
+        states = SegmentStates(self._scene, segment, self._values, self._T, self._in_hand)
+        check_free(states, self._world, where, self._expect)
+        last = states.values(states.rows[-1:])
+        self._T = states.objects(last)[0][0]
+        self._values = {name: rows[0] for name, rows in last.items()}
+        self._opening |= {name: end for name, (_, end) in segment.gripper.items()}
+        if released and not self._in_hand:
+            text = f"{where}: the object is let go where nothing holds it up"
+            self._expect(self._world.object_rests(self._T), text)
+        return self._check_arrival(segment, where) and self._check_hands(segment, where)
+
+    def _check_start(self, segment: SegmentRecord, where: str) -> bool:
+        """Check that a segment begins where the one before has ended."""
+        task, holding = self._plan.tasks[self._task].name, sorted(self._in_hand)
+        ok = self._expect(segment.task_from == task, f"{where}: from {segment.task_from}, not {task}")
+        text = f"{where}: held by {sorted(segment.held_by)}, not {holding}"
+        ok &= self._expect(sorted(segment.held_by) == holding, text)
+        for name, rows in segment.joints.items():
+            arm = self._scene.arms[name]
+            jump = float(np.abs(np.array(rows[0]) - self._values[arm.robot.name][arm.indices]).max())
+            ok &= self._expect(jump <= TOLERANCE, f"{where}: {name} starts {jump:.6f} away from where it is")
+        for name, (first, _) in segment.gripper.items():
+            was = self._opening.get(name)
+            same = first is was if first is None or was is None else abs(first - was) <= TOLERANCE
+            ok &= self._expect(same, f"{where}: the hand of {name} starts at {first} m, but is at {was}")
+        return ok
+
+    def _check_arrival(self, segment: SegmentRecord, where: str) -> bool:
+        """Check that the object is where a segment brings it, and that this is where the plan goes on."""
+        tasks = self._plan.tasks
+        if segment.task_to != segment.task_from:
+            later = range(self._task + 1, len(tasks))
+            following = next((k for k in later if tasks[k].name != segment.task_from), None)
+            known = following is not None and tasks[following].name == segment.task_to and self._complete
+            if not self._expect(known, f"{where}: {segment.task_to} does not follow {segment.task_from}"):
+                return False
+            self._task, self._complete = following or 0, False
+        self._note_holders()
+        goal = tasks[self._task].object_pose_turned.array()
+        if self._plan.kind == "bimanual" and segment.kind == "carry" and segment.task_to == segment.task_from:
+            goal[2, 3] += min(max(float(self._T[2, 3] - goal[2, 3]), 0.0), LIFT)
+        distance, angle = (float(error) for error in pose_error(self._T, goal))
+        away = f"{1e3 * distance:.3f} mm and {np.rad2deg(angle):.3f}°"
+        text = f"{where}: the object ends {away} away from {segment.task_to}"
+        return self._expect(distance <= RIGID[0] and angle <= RIGID[1], text)
+
+    def _note_holders(self) -> None:
+        self._complete |= set(self._in_hand) == {hold.arm for hold in self._plan.tasks[self._task].holds}
+
+    def _check_hands(self, segment: SegmentRecord, where: str) -> bool:
+        """Check what hands take when they have closed, and that they open as far as grasps take."""
+        ok = True
+        for name, (_, end) in segment.gripper.items() if segment.kind == "close" else ():
+            hold = self._hold(name)
+            if not self._expect(hold, f"{where}: {name} takes nothing in {segment.task_to}") or not hold:
+                return False
+            ok &= self._check_grasp(name, hold, end, where)
+            self._in_hand[name] = inverse(tool_pose(self._scene, name, self._values)) @ self._T
+        for name, (_, end) in segment.gripper.items() if segment.kind != "close" else ():
+            known = {hold.opening for task in self._plan.tasks for hold in task.holds if hold.arm == name}
+            right = any(abs(end - opening) <= TOLERANCE for opening in known)
+            ok &= self._expect(
+                right, f"{where}: {name} opens to {end} m, but its grasps take {sorted(known)}"
+            )
+        self._note_holders()
+        return ok
+
+    def _hold(self, name: str) -> Hold | None:
+        """Return how an arm takes the object now: where it is grasped anew, as the plan's next task says."""
+        tasks, k = self._plan.tasks, self._task
+        if self._complete and not self._in_hand and k + 1 < len(tasks) and tasks[k + 1].name == tasks[k].name:
+            self._task, self._complete = k + 1, False
+        return next((hold for hold in tasks[self._task].holds if hold.arm == name), None)
+
+    def _check_grasp(self, name: str, hold: Hold, closed: float, where: str) -> bool:
+        """Check that a hand that has closed has the grasp of the plan."""
+        hand, radius = self._scene.arms[name].hand, float(self._scene.profile.radius(hold.grasp.h))
+        wanted = float(np.clip(2 * radius, hand.min_opening, hand.max_opening))
+        ok = self._expect(abs(closed - wanted) <= TOLERANCE, f"{where}: closes to {closed} m, not {wanted} m")
+        tool = tool_pose(self._scene, name, self._values)
+        distance, angle = (float(error) for error in pose_error(tool, hold.tool_pose.array()))
+        text = f"{where}: {name} is {1e3 * distance:.4f} mm and {np.rad2deg(angle):.4f}° off its grasp"
+        return ok & self._expect(distance <= GRASP_TOLERANCE and angle <= GRASP_TOLERANCE, text)
+
+    def check_end(self, last: SegmentRecord) -> None:
+        """Check that all of the plan was done, and that the arms are at home that do not hold the object.
+
+        They go on holding it where nothing else holds it up, and several hands that lift it together.
+        """
+        task = self._plan.tasks[-1]
+        where = f"motion: the end, {task.name}"
+        done = self._task == len(self._plan.tasks) - 1 and self._complete
+        self._expect(done, f"{where}: not all of the plan is done")
+        holders = {hold.arm for hold in task.holds}
+        if self._plan.kind == "bimanual":
+            self._expect(last.kind == "carry", f"{where}: the object is not lifted")
+        elif self._world.object_rests(task.object_pose_turned.array()):
+            holders = set()
+        text = f"{where}: held by {sorted(self._in_hand)}, not {sorted(holders)}"
+        self._expect(set(self._in_hand) == holders, text)
+        for arm in self._scene.arms.values():
+            away = np.abs(self._values[arm.robot.name] - arm.robot.home)[arm.indices].max()
+            self._expect(arm.name in holders or away <= TOLERANCE, f"{where}: {arm.name} is not at home")

@@ -1,0 +1,205 @@
+"""Whether bodies keep their distance at every state of a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symgrasp.plan.check_motion_rows import Expect
+from symgrasp.plan.motion_record import SegmentRecord
+from symgrasp.poses import Array, pose_error
+from symgrasp.scene.scene import Scene
+from symgrasp.world import BodyName, BulletWorld, Collision
+
+__all__ = ["RIGID", "SegmentStates", "check_free", "tool_pose"]
+
+CLEARANCE_TOLERANCE = 1e-5
+"""By how much (m) a clearance may be overstated: PyBullet reads URDFs in single precision."""
+
+RIGID = 1e-3, 0.01
+"""How far (m) and how much (rad) the object may move in the hands when several hold it: between two rows
+each arm follows its own straight line in joint space."""
+
+FINEST = 5e-4
+"""Shortest distance (m) between two states that are checked, where the stated clearance is shorter."""
+
+TOUCHING, SUNK = 2e-3, 2e-3
+"""How near (m) the object is to what it rests on, and by how much (m) it may sink into it when it is
+lifted off or put down."""
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentStates:
+    """Where everything is in a segment.
+
+    Attributes:
+        scene: the scene.
+        segment: the segment.
+        start: robot → values (N,) of all its joints where it starts.
+        T_start: pose (4, 4) of the object there.
+        in_hand: arm that holds the object → T_tool_object (4, 4).
+    """
+
+    scene: Scene
+    segment: SegmentRecord
+    start: Mapping[str, Array]
+    T_start: Array
+    in_hand: Mapping[str, Array]
+
+    @property
+    def rows(self) -> Array:
+        """The indices (n,) of the rows."""
+        return np.arange(len(self.segment.times), dtype=float)
+
+    def values(self, at: Array) -> dict[str, Array]:
+        """Return robot → values (m, N) of all its joints at rows (m,), or between them."""
+        t = np.array(self.segment.times)
+        share = np.interp(at, self.rows, t) / t[-1]
+        values = {name: np.tile(row, (len(at), 1)) for name, row in self.start.items()}
+        for name, rows in self.segment.joints.items():
+            arm = self.scene.arms[name]
+            for j, column in zip(arm.indices, np.array(rows).T, strict=True):
+                values[arm.robot.name][:, j] = np.interp(at, self.rows, column)
+        for name, (first, last) in self.segment.gripper.items():
+            arm = self.scene.arms[name]
+            for joint, end in arm.hand.joint_values(last).items():
+                k = arm.robot.model.joint_names.index(joint)
+                if first is None:
+                    was = self.start[arm.robot.name][k]
+                    column = was + share * (end - was)
+                else:
+                    openings = first + share * (last - first)
+                    column = np.array([arm.hand.joint_values(float(x))[joint] for x in openings])
+                values[arm.robot.name][:, k] = column
+        return values
+
+    def objects(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Return the poses (m, 4, 4) of the object in the first hand, and how far (2,) others have it off.
+
+        The latter is a distance (m) and an angle (rad), the largest ones.
+        """
+        count = len(next(iter(values.values())))
+        poses = [tool_pose(self.scene, name, values) @ own for name, own in self.in_hand.items()]
+        if not poses:
+            return np.tile(self.T_start, (count, 1, 1)), np.zeros(2)
+        off = [[float(error.max()) for error in pose_error(poses[0], other)] for other in poses]
+        return poses[0], np.max(off, axis=0)
+
+
+def tool_pose(scene: Scene, name: str, values: Mapping[str, Array]) -> Array:
+    """Return ``T_world_tool`` (..., 4, 4) of an arm for robot → values (..., N) of its joints."""
+    arm = scene.arms[name]
+    links = arm.robot.model.forward(values[arm.robot.name])
+    return arm.robot.T_world_base @ links[..., arm.robot.model.link_index(arm.tool), :, :]
+
+
+def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Expect) -> None:
+    """Check that all bodies keep the clearance of a segment, at steps that are shorter than it.
+
+    Args:
+        states: of the segment.
+        world: a world of the scene; it ends at the end of the segment, or where a clearance is not kept.
+        where: what it is called in failures.
+        expect: notes a statement, and what is wrong where it does not hold.
+    """
+    segment = states.segment
+    expect(segment.clearance >= 0, f"{where}: clearance is {segment.clearance} m")
+    rows = states.values(states.rows)
+    moved = _largest_steps(states.scene, rows, states.objects(rows)[0])
+    count = np.ceil(moved / max(FINEST, segment.clearance)).astype(int).clip(1)
+    at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(count))])
+    fine = states.values(at)
+    poses, (slip, twist) = states.objects(fine)
+    text = f"{where}: the object slips by {1e3 * slip:.2f} mm and {np.rad2deg(twist):.2f}° in the hands"
+    expect(slip <= RIGID[0] and twist <= RIGID[1], text)
+    near = _NearBodies(states, world, fine, poses)
+    for k, pose in enumerate(poses):
+        for name, values in fine.items():
+            world.set_robot(name, values[k])
+        world.set_object(pose)
+        for c, gap in near.too_close():
+            text = f"{where}: row {at[k]:.2f}: {c.a} and {c.b} keep {1e3 * gap:.3f} mm"
+            expect(False, f"{text}, not {1e3 * segment.clearance:.3f} mm beyond the margin")
+            return
+    expect(True, where)
+
+
+class _NearBodies:
+    """Finds bodies that are closer than a segment states.
+
+    Two bodies that move as one stay as far apart as they are, and are left out.
+
+    Args:
+        states: of the segment.
+        world: a world of the scene.
+        values: robot → values (m, N) of its joints along the segment.
+        objects: (m, 4, 4) poses of the object.
+    """
+
+    def __init__(
+        self, states: SegmentStates, world: BulletWorld, values: Mapping[str, Array], objects: Array
+    ) -> None:
+        self._world, self._clearance = world, states.segment.clearance
+        scene, kind = states.scene, states.segment.kind
+        taking = states.segment.joints if kind in ("approach", "close", "open", "retreat") else ()
+        self._touching = [scene.arms[name] for name in {*states.in_hand, *taking}]
+        moving = {name: np.ptp(rows, axis=0) > 0 for name, rows in values.items()}
+        self._group: dict[BodyName, tuple[str, str] | None] = {}  # what stands has none
+        for name, robot in scene.robots.items():
+            for link in robot.model.link_names:
+                chain = [j for j in robot.model.chain(link) if j.source >= 0 and moving[name][j.source]]
+                self._group[BodyName(name, link)] = (name, chain[-1].name) if chain else None
+        holder = next((scene.arms[name] for name in states.in_hand), None)
+        group = self._group[BodyName(holder.robot.name, holder.tool)] if holder else None
+        self._group[BodyName(scene.file.object.name, "")] = group
+        self._carried = group is not None
+        self._resting: set[BodyName] = set()
+        for pose in objects[[0, -1]] if self._carried else ():
+            world.set_object(pose)
+            self._resting |= {c.b for c in world.object_contacts(TOUCHING)}
+
+    def too_close(self) -> Iterator[tuple[Collision, float]]:
+        """Yield the pairs that are closer than they may be in the world now, with their distance (m).
+
+        The distance is that beyond the margin.
+        """
+        world = self._world
+        reach = self._clearance + world.margin
+        for c in world.all_pairs_within(reach, self._touching):
+            gap = reach - c.depth - world.margin_for(c.reason)
+            moved = self._group.get(c.a) != self._group.get(c.b)
+            if moved and gap < self._clearance - CLEARANCE_TOLERANCE:
+                yield c, gap
+        for c in world.object_contacts(reach) if self._carried else ():
+            gap = reach - c.depth
+            if gap < (-SUNK if c.b in self._resting else self._clearance) - CLEARANCE_TOLERANCE:
+                yield c, gap
+
+
+def _largest_steps(scene: Scene, values: Mapping[str, Array], objects: Array) -> Array:
+    """Return how far (n - 1,) (m) any point of robots and object moves from row to row, at most."""
+    profile = scene.profile
+    r = float(profile.points[:, 1].max())
+    steps = [_moves(objects, _corners([-r, -r, profile.h_min], [r, r, profile.h_max]))]
+    for name, rows in values.items():
+        model = scene.robots[name].model
+        poses = model.forward(rows)
+        for link in model.colliding_links():
+            points = np.concatenate(model.hulls(link))
+            corners = _corners(points.min(axis=0), points.max(axis=0))
+            steps.append(_moves(poses[:, model.link_index(link)], corners))
+    return np.max(steps, axis=0)
+
+
+def _corners(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Array:
+    """Return the corners (8, 3) of a box."""
+    ends = np.array([low, high])
+    return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i, j, k in np.ndindex(2, 2, 2)])
+
+
+def _moves(poses: Array, points: Array) -> Array:
+    """Return how far (n - 1,) (m) any of some points (k, 3) moves from pose to pose (n, 4, 4)."""
+    placed = np.einsum("nij,kj->nki", poses[:, :3, :3], points) + poses[:, None, :3, 3]
+    return np.linalg.norm(np.diff(placed, axis=0), axis=2).max(axis=1)

@@ -1,0 +1,209 @@
+"""Motions in plan files: read back as they were written, checked, and caught when they are changed."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symgrasp.cli.main import main
+from symgrasp.errors import PlanError
+from symgrasp.motion.record import from_plan, to_record
+from symgrasp.plan import check_motion as check_motion_module
+from symgrasp.plan.motion_record import MotionRecord, SegmentRecord
+from symgrasp.plan.plan import Plan
+from symgrasp.scene.scene import Scene
+from symgrasp.world import BulletWorld, open_world
+from tests.motion.recorded import recorded_motion, recorded_plan
+
+
+@pytest.fixture(scope="module")
+def world() -> Iterator[BulletWorld]:
+    with open_world(Scene.from_content(recorded_plan().scene.content)) as world:
+        yield world
+
+
+@pytest.fixture(scope="module")
+def content() -> dict[str, Any]:
+    motion = recorded_plan().motion
+    assert motion
+    return json.loads(motion.model_dump_json())
+
+
+def failures(motion: dict[str, Any], world: BulletWorld) -> list[str]:
+    """Return what does not hold of the content of a motion; what cannot be read counts too."""
+    found: list[str] = []
+
+    def expect(ok: object, failure: str) -> bool:
+        if not ok:
+            found.append(failure)
+        return bool(ok)
+
+    try:
+        record = MotionRecord.model_validate(motion)
+    except ValueError as error:
+        return [str(error)]
+    check_motion_module.check_motion(recorded_plan(), record, world, expect)
+    return found
+
+
+def test_a_motion_is_read_as_it_was_written():
+    plan = Plan.parse(recorded_plan().to_json(), "plan")
+    assert plan == recorded_plan()
+    scene = Scene.from_content(plan.scene.content)
+    motion = from_plan(plan, scene)
+    assert motion
+    assert to_record(motion) == plan.motion
+    assert motion.duration == recorded_motion().duration
+    for t in np.linspace(0, motion.duration, 30):
+        here, there = motion.at(t), recorded_motion().at(t)
+        np.testing.assert_array_equal(here.T_world_object, there.T_world_object)
+        np.testing.assert_array_equal(here.values["panda"], there.values["panda"])
+
+
+def test_rows_of_numbers_take_one_line():
+    text = recorded_plan().to_json()
+    assert json.loads(text) == json.loads(recorded_plan().model_dump_json())
+    assert max(len(line) for line in text.splitlines()) > 100
+    assert len(text.splitlines()) < 3000
+
+
+def test_numbers_in_strings_stay():
+    plan = recorded_plan()
+    name = "[\\n  1,\n  2\n]"
+    scene = plan.scene.model_copy(update={"name": name})
+    text = plan.model_copy(update={"scene": scene}).to_json()
+    assert Plan.parse(text, "plan").scene.name == name
+
+
+def test_the_whole_plan_holds(tmp_path, capsys):
+    path = tmp_path / "plan.json"
+    recorded_plan().save(path)
+    assert main(["verify", str(path)]) == 0
+    assert "the plan holds" in capsys.readouterr().out
+
+
+def test_version_1_has_no_motion():
+    content = json.loads(recorded_plan().to_json())
+    motion = content.pop("motion")
+    content["schema_version"] = 1
+    assert Plan.parse(json.dumps(content), "plan").motion is None
+    with pytest.raises(PlanError, match="schema_version 2"):
+        Plan.parse(json.dumps({**content, "motion": motion}), "plan")
+
+
+def numbers(node: Any, path: tuple = ()) -> Iterator[tuple]:
+    """Yield the path of every number, of times and rows every fortieth and those at both ends."""
+    items = list(
+        node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    )
+    for k, (key, value) in enumerate(items):
+        if len(items) > 20 and k % 40 and k not in (1, len(items) - 2, len(items) - 1):
+            continue
+        if isinstance(value, (int, float)):
+            yield (*path, key)
+        else:
+            yield from numbers(value, (*path, key))
+
+
+@pytest.fixture
+def only_changed_states(content, monkeypatch):
+    """Look for collisions only in segments that are not as they were, which are known to be free."""
+    free = {SegmentRecord.model_validate(segment).model_dump_json() for segment in content["segments"]}
+    original = check_motion_module.check_free
+
+    def check_free(states, *rest):
+        if states.segment.model_dump_json() not in free:
+            original(states, *rest)
+
+    monkeypatch.setattr(check_motion_module, "check_free", check_free)
+
+
+@pytest.mark.usefixtures("only_changed_states")
+def test_every_changed_number_is_caught(content, world):
+    """Clearances are what was proven, and may be larger in truth: they are changed by more."""
+    paths = list(numbers(content))
+    assert len(paths) > 300
+    assert failures(content, world) == []
+    missed = []
+    for path in paths:
+        changed = copy.deepcopy(content)
+        node = changed
+        for key in path[:-1]:
+            node = node[key]
+        node[path[-1]] += 0.1 if path[-1] == "clearance" else 1e-3
+        if not failures(changed, world):
+            missed.append(path)
+    assert missed == []
+
+
+def reversed_segment(segment: dict[str, Any]) -> None:
+    for rows in (*segment["joints"].values(), *segment["velocities"].values()):
+        rows.reverse()
+    segment["times"] = [segment["times"][-1] - t for t in segment["times"][::-1]]
+
+
+def retimed(motion: dict[str, Any], k: int, factor: float) -> None:
+    """Make a segment faster, with all that follows from it."""
+    segment = motion["segments"][k]
+    motion["duration"] += (factor - 1) * segment["times"][-1]
+    segment["times"] = [factor * t for t in segment["times"]]
+    segment["velocities"] = {
+        arm: [[v / factor for v in row] for row in rows] for arm, rows in segment["velocities"].items()
+    }
+
+
+def without(motion: dict[str, Any], k: int) -> None:
+    motion["duration"] -= motion["segments"].pop(k)["times"][-1]
+
+
+def swapped(motion: dict[str, Any], k: int) -> None:
+    segments = motion["segments"]
+    segments[k], segments[k + 1] = segments[k + 1], segments[k]
+
+
+SEGMENTS = range(9)
+CHANGES: dict[str, Callable[[dict[str, Any]], object]] = {
+    **{f"without {k}": lambda m, k=k: without(m, k) for k in SEGMENTS},
+    **{f"swapped {k}": lambda m, k=k: swapped(m, k) for k in SEGMENTS[:-1]},
+    **{f"reversed {k}": lambda m, k=k: reversed_segment(m["segments"][k]) for k in (1, 2, 4, 5, 7, 8)},
+    **{f"faster {k}": lambda m, k=k: retimed(m, k, 0.95) for k in (1, 2, 4, 5, 7, 8)},
+    "all reversed": lambda m: m["segments"].reverse(),
+    "hand shut at once": lambda m: retimed(m, 3, 0.01),
+    "held by nobody": lambda m: m["segments"][4].update(held_by=[]),
+    "held too early": lambda m: m["segments"][2].update(held_by=["panda"]),
+    "carried elsewhere": lambda m: m["segments"][4].update(task_to="place"),
+    "not closed": lambda m: m["segments"][3]["gripper"].update(panda=[0.039, 0.035]),
+    "another arm": lambda m: m["joint_names"].update(other=m["joint_names"].pop("panda")),
+    "joints in another order": lambda m: m["joint_names"]["panda"].reverse(),
+    "a row left out": lambda m: m["segments"][1]["joints"]["panda"].pop(5),
+    "a time left out": lambda m: m["segments"][1]["times"].pop(5),
+    "a time twice": lambda m: m["segments"][1]["times"].__setitem__(5, m["segments"][1]["times"][4]),
+    "a kind that closes nothing": lambda m: m["segments"][3].update(kind="open"),
+}
+
+
+@pytest.mark.usefixtures("only_changed_states")
+@pytest.mark.parametrize("name", CHANGES)
+def test_changed_segments_are_caught(name, content, world):
+    changed = copy.deepcopy(content)
+    CHANGES[name](changed)
+    assert failures(changed, world)
+
+
+def test_a_path_through_an_obstacle_is_named(content):
+    """The same motion in a scene with a post in the way of the carry."""
+    plan = recorded_plan()
+    pole = {"name": "post", "cylinder": {"radius": 0.02, "height": 1.0}}
+    scene = Scene.from_content(plan.scene.content)
+    middle = recorded_motion().at(sum(recorded_motion().starts[4:6]) / 2).T_world_object[:3, 3]
+    pole["pose"] = {"position": [float(middle[0]), float(middle[1]), 0.5]}
+    obstacles = [*plan.scene.content["obstacles"], pole]
+    blocked = Scene.from_content({**scene.content, "obstacles": obstacles})
+    with open_world(blocked) as world:
+        found = failures(content, world)
+    assert any("post" in failure and "(carry)" in failure for failure in found)
