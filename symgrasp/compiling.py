@@ -34,6 +34,7 @@ SOURCES = (
     "engine/*.py",
     "feasibility/margins.py",
     "ik/*.py",
+    "motion/*.py",
     "object/manifold.py",
     "planners/*.py",
 )

@@ -23,7 +23,15 @@ from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, BulletWorld, Shape, own_pairs
 
-__all__ = ["ArmGeometry", "arm_geometry", "supports"]
+__all__ = [
+    "ArmGeometry",
+    "PlacedPiece",
+    "arm_geometry",
+    "link_piece",
+    "object_piece",
+    "obstacle_pieces",
+    "supports",
+]
 
 
 class ArmGeometry(NamedTuple):
@@ -60,7 +68,7 @@ class ArmGeometry(NamedTuple):
         return self.moving._replace(local=self.local[row]) if len(self.local) else self.moving
 
 
-class _Placed(NamedTuple):
+class PlacedPiece(NamedTuple):
     """A piece with the name of its body and its pose (4, 4) in the world."""
 
     name: BodyName
@@ -114,10 +122,13 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
     zero = arm.robot_values(np.zeros(arm.dof))
     at_zero = arm.robot.T_world_base @ model.forward(zero)
     frames = [at_zero[j.child] for j in joints]
-    own = [_Placed(BodyName(arm.robot.name, k), _piece(s), at_zero[model.link_index(k)]) for k, s in order]
+    own = [
+        PlacedPiece(BodyName(arm.robot.name, k), link_piece(s), at_zero[model.link_index(k)])
+        for k, s in order
+    ]
     name = BodyName(scene.file.object.name, "")
-    objects = [_Placed(name, _revolved(v), np.eye(4)) for v in scene.profile.convex_pieces()]
-    others = [*_obstacles(scene), *_other_robots(world, arm)]
+    objects = [PlacedPiece(name, object_piece(v), np.eye(4)) for v in scene.profile.convex_pieces()]
+    others = [*obstacle_pieces(scene), *_other_robots(world, arm)]
     placed = [*own, *objects, *others]
 
     moving_links = links[:moving_count]
@@ -186,7 +197,8 @@ def _last_joint(model: RobotModel, joints: list[Joint], link: str) -> int:
     return max((k for k, joint in enumerate(joints) if joint.name in chain), default=-1)
 
 
-def _piece(shape: Shape) -> Piece:
+def link_piece(shape: Shape) -> Piece:
+    """Return the piece of a shape of a link, in the link's frame."""
     return Piece(shape.vertices, shape.rounding, shape.slack)
 
 
@@ -239,7 +251,7 @@ def _sort_by_arm_piece(pairs: np.ndarray, hands: int, count: int) -> tuple[np.nd
     return ordered, np.searchsorted(ordered[:, 0], np.arange(count + 1))
 
 
-def _revolved(vertices: Array) -> Piece:
+def object_piece(vertices: Array) -> Piece:
     """Return the revolved piece around the vertices (n, 3) of a convex piece of the object.
 
     It contains the prism that PyBullet has; the slack is the height of its arcs over the sides of the prism.
@@ -251,13 +263,13 @@ def _revolved(vertices: Array) -> Piece:
     return Piece(np.unique(np.round(knots, 12), axis=0), rounding=1e-11, slack=slack, revolved=True)
 
 
-def _obstacles(scene: Scene) -> Iterator[_Placed]:
+def obstacle_pieces(scene: Scene) -> Iterator[PlacedPiece]:
     """Yield the pieces of the obstacles; those of a mesh are its flat faces."""
     for o in scene.obstacles:
         for link, shape in o.shapes():
             name, pose = BodyName(o.name, link), o.T_world_obstacle @ shape.pose
             for piece in _exact(shape, name):
-                yield _Placed(name, piece, pose)
+                yield PlacedPiece(name, piece, pose)
 
 
 def _exact(shape: CollisionShape, name: BodyName) -> Iterator[Piece]:
@@ -273,7 +285,7 @@ def _exact(shape: CollisionShape, name: BodyName) -> Iterator[Piece]:
         yield from map(Piece, convex_faces(shape.mesh(f"obstacle {name}")))
 
 
-def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[_Placed]:
+def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[PlacedPiece]:
     """Yield the pieces of all robots but the arm's, at home."""
     scene: Scene = world.scene
     for name, robot in scene.robots.items():
@@ -282,8 +294,10 @@ def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[_Placed]:
             yield from _links(world.shapes(name), name, robot.model, links)
 
 
-def _links(shapes: dict[str, list[Shape]], name: str, model: RobotModel, links: Array) -> Iterator[_Placed]:
+def _links(
+    shapes: dict[str, list[Shape]], name: str, model: RobotModel, links: Array
+) -> Iterator[PlacedPiece]:
     """Yield the pieces of a URDF, given the shapes and the world poses (links, 4, 4) of its links."""
     for link, parts in shapes.items():
         for shape in parts:
-            yield _Placed(BodyName(name, link), _piece(shape), links[model.link_index(link)])
+            yield PlacedPiece(BodyName(name, link), link_piece(shape), links[model.link_index(link)])

@@ -1,0 +1,151 @@
+"""Straight paths of the tool, complete on the grid: dynamic programming over redundancy values and branches.
+
+At every sample of the path the inverse kinematics gives all configurations. They are the layers of a graph;
+its edges are lines in joint space that turn no joint far and are proven free. The best path through the layers
+has the largest smallest clearance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symgrasp.ik import Solver
+from symgrasp.motion.search import NoMotionError, blockers, prove
+from symgrasp.motion.situation import Situation
+from symgrasp.poses import Array, inverse, pose_error
+
+__all__ = ["CLEAR", "LineTree", "configurations", "follow"]
+
+LARGEST_TURN = 0.25
+"""Largest change of a joint (rad or m) between two samples of a path."""
+
+DEVIATION = 1e-3
+"""Largest deviation (m, and rad × 0.1 m) of the tool from the path in the middle of two samples."""
+
+KEPT = 6
+"""Edges into each configuration that are tried, those with the smallest turns first."""
+
+CLEAR = 0.02
+"""Clearance (m) above which paths are equally good."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineTree:
+    """The best path to every configuration of the last layer that can be reached.
+
+    Attributes:
+        layers: (m, n) configurations of each sample, of those that can be reached.
+        before: for each layer but the first, the index of the configuration before.
+        value: (m,) clearance (m) of the path to each of the last layer.
+    """
+
+    layers: list[Array]
+    before: list[np.ndarray]
+    value: Array
+
+    @property
+    def ends(self) -> Array:
+        """The configurations (m, n) of the last layer."""
+        return self.layers[-1]
+
+    def path(self, end: int) -> Array:
+        """Return the path (samples, n) to one of the last layer."""
+        k, rows = end, [self.layers[-1][end]]
+        for layer, before in zip(self.layers[-2::-1], self.before[::-1], strict=True):
+            k = int(before[k])
+            rows.append(layer[k])
+        return np.array(rows[::-1])
+
+
+def configurations(solver: Solver, T_world_tool: Array) -> Array:
+    """Return all configurations (m, n) inside the limits that reach a tool pose (4, 4)."""
+    found = solver.solve(inverse(solver.arm.robot.T_world_base) @ T_world_tool)
+    return found.q[found.inside]
+
+
+def follow(
+    situation: Situation,
+    solver: Solver,
+    poses: Sequence[Array],
+    start: Array | None = None,
+    value: Array | None = None,
+) -> LineTree:
+    """Follow a path with the only arm that moves.
+
+    Args:
+        situation: what moves and stands.
+        solver: the inverse kinematics of the arm.
+        poses: ``T_world_tool`` (4, 4) at each sample.
+        start: (m, n) configurations at the first sample to start from; all that are free if None.
+        value: (m,) clearance (m) with which they start.
+
+    Raises:
+        NoMotionError: the path cannot be followed to its end; says where and why it ends.
+    """
+    layer = configurations(solver, poses[0]) if start is None else start
+    reached, hits = prove(situation, layer, layer, CLEAR)
+    if not (reached >= 0).any():
+        raise NoMotionError(f"its start is not free: {blockers(situation, hits)}")
+    if value is not None:
+        reached = np.where(reached >= 0, np.minimum(reached, value), reached)
+    layer, reached = layer[reached >= 0], reached[reached >= 0]
+    layers, befores = [layer], []
+    for k, pose in enumerate(poses[1:], start=1):
+        following = configurations(solver, pose)
+        new = _following_turns(layer, following, situation.linkage.limits)
+        a, b = _edges(layer, new)
+        middle = _middle(poses[k - 1], pose)
+        straight = _deviation(solver, 0.5 * (layer[a] + new[a, b]), middle) <= DEVIATION
+        a, b = a[straight], b[straight]
+        found, hits = prove(situation, layer[a], new[a, b], CLEAR)
+        edge = np.minimum(found, reached[a])
+        ok = found >= 0
+        if not ok.any():
+            why = blockers(situation, hits) if len(a) else "no joint values go on from there"
+            raise NoMotionError(f"it ends at {100 * k / (len(poses) - 1):.0f} % of its length: {why}")
+        a, b, edge = a[ok], b[ok], edge[ok]
+        order = np.lexsort((np.abs(layer[a] - new[a, b]).max(axis=1), -edge))
+        _, first = np.unique(b[order], return_index=True)
+        chosen = order[first]
+        befores.append(a[chosen])
+        layer, reached = new[a[chosen], b[chosen]], edge[chosen]
+        layers.append(layer)
+    return LineTree(layers, befores, reached)
+
+
+def _following_turns(layer: Array, following: Array, limits: Array) -> Array:
+    """Return what follows (m, k, n) each configuration: with full turns added towards it, inside the limits."""
+    turns = 2 * np.pi * np.round((layer[:, None] - following[None]) / (2 * np.pi))
+    near = following[None] + turns
+    return np.where((near >= limits[0]) & (near <= limits[1]), near, following[None])
+
+
+def _edges(layer: Array, new: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Return the edges worth trying: those without a jump, the shortest into each configuration."""
+    if not new.size:
+        return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
+    turn = np.abs(new - layer[:, None]).max(axis=2)
+    nearest = np.argsort(turn, axis=0)[:KEPT]
+    b = np.broadcast_to(np.arange(new.shape[1]), nearest.shape)
+    a, b = nearest.ravel(), b.ravel()
+    keep = turn[a, b] <= LARGEST_TURN
+    return a[keep], b[keep]
+
+
+def _middle(a: Array, b: Array) -> Array:
+    """Return the pose (4, 4) half way between two that are near each other."""
+    middle = 0.5 * (a + b)
+    u, _, v = np.linalg.svd(middle[:3, :3])
+    middle[:3, :3] = u @ v
+    return middle
+
+
+def _deviation(solver: Solver, q: Array, T_world_tool: Array) -> Array:
+    """Return how far (m, and rad × 0.1 m) the tool is from a pose (4, 4) at configurations (m, n)."""
+    if not len(q):
+        return np.zeros(0)
+    position, angle = pose_error(solver.arm.world_tool_pose(q), T_world_tool)
+    return np.maximum(position, 0.1 * angle)

@@ -1,0 +1,258 @@
+"""Proofs that straight lines in joint space are free, by conservative advancement. Compiled.
+
+At a point of the line every pair of pieces is certified to be apart by some distance, see
+`symgrasp.engine.distance`. No point of a piece moves further in the next stretch of the line than its speed
+and the largest acceleration allow, so a stretch in which no piece can use up the distance is free as a whole:
+the proof goes on at its end. Nothing is sampled.
+
+For joint values ``q + t·d``, a point of a piece has the speed ``Σ dⱼ ∂p/∂qⱼ`` at ``t = 0``, and since
+``∂²p/∂qᵢ∂qⱼ`` is no longer than ``∂p/∂qⱼ`` if i comes before j in the chain, its acceleration is at most
+``Σᵢⱼ |dᵢ dⱼ| L`` with the lever L of the later one of both. Of a pair only the joints count that carry one of
+its pieces and not the other: the others change no distance.
+"""
+
+from __future__ import annotations
+
+import math
+
+from symgrasp.compiling import ENTRY, njit
+from symgrasp.engine.boxes import box_of, boxes_apart, oriented_boxes_apart
+from symgrasp.engine.checks import FREE_BAND
+from symgrasp.engine.distance import distance_bounds
+from symgrasp.engine.kinematics import compose, rotate
+from symgrasp.engine.simplex import FAST
+
+__all__ = ["BLOCKED", "CLOSEST", "clearances", "line_clearance", "place", "tilt_excess"]
+
+CLOSEST = 1e-4
+"""Where pieces are closer than allowed and this (m), a line is not proven free: the steps become too short."""
+
+SHARE = 0.7
+"""Share of a distance that a stretch may use up."""
+
+FAR = 0.1
+"""No piece moves further (m) in a stretch: distances above it need not be known."""
+
+CLOSEST_ANGLE = 1e-4
+"""The same as `CLOSEST` for the angle (rad) that is left to the largest tilt."""
+
+BLOCKED = -1.0
+"""Stands for the clearance of a line that is not proven free."""
+
+
+@njit(**ENTRY)
+def clearances(linkage, pieces, tree, work, start, end, most, found, hits):
+    """Write the clearance (m) that each of E lines is proven to have, or `BLOCKED`.
+
+    Args:
+        linkage: see `Linkage`.
+        pieces: see `PackedPieces`.
+        tree: boxes of the standing pieces that all moving ones are checked against.
+        work: see `Workspace`.
+        start: (E, J) joint values.
+        end: (E, J) joint values.
+        most: clearance (m) above which it need not be known.
+        found: (E,) receives the clearances.
+        hits: (E, 2) receives the pair of pieces that each blocked line meets first.
+    """
+    for e in range(len(start)):
+        found[e] = line_clearance(linkage, pieces, tree, work, start[e], end[e], most)
+        hits[e, 0], hits[e, 1] = work.hit[0], work.hit[1]
+
+
+@njit(**FAST)
+def line_clearance(linkage, pieces, tree, work, start, end, most):
+    """Return the clearance (m), at most ``most``, that a line (J,) to (J,) is proven to have, or `BLOCKED`.
+
+    Where it is blocked, ``work.hit`` names the pair of pieces.
+    """
+    q, d = work.q[0], work.q[1]
+    count = len(q)
+    for j in range(count):
+        d[j] = end[j] - start[j]
+    t, least = 0.0, most
+    while True:
+        for j in range(count):
+            q[j] = start[j] + t * d[j] if t < 1.0 else end[j]
+        place(linkage, pieces.size, work, q)
+        step = 1.0 - t
+        if linkage.tilted >= 0:
+            step = _tilt_step(linkage, work, d, step)
+            if step < 0.0:
+                return BLOCKED
+        for k in range(len(linkage.piece)):
+            v, a = _rates(linkage, work, d, k, -1)
+            work.speed[k, 0], work.speed[k, 1] = v, a
+            step = min(step, _time(FAR, v, a))
+        step, least = _free_step(linkage, pieces, tree, work, d, step, least)
+        if step < 0.0:
+            return BLOCKED
+        if t >= 1.0:
+            return max(least, 0.0)
+        t += step
+        if t > 1.0 - 1e-9:
+            t = 1.0
+
+
+@njit(**FAST)
+def place(linkage, size, work, q):
+    """Write the poses and boxes of the moving pieces at joint values q (J,)."""
+    frames = work.frames
+    for j in range(len(q)):
+        parent = linkage.parent[j]
+        if parent < 0:
+            for i in range(12):
+                frames[j, i] = linkage.origin[j, i]
+        else:
+            compose(frames[parent], linkage.origin[j], frames[j])
+        if linkage.slides[j]:
+            for i in range(3):
+                along = (
+                    frames[j, 3 * i] * linkage.axis[j, 0]
+                    + frames[j, 3 * i + 1] * linkage.axis[j, 1]
+                    + frames[j, 3 * i + 2] * linkage.axis[j, 2]
+                )
+                frames[j, 9 + i] += along * q[j]
+        else:
+            rotate(frames[j], linkage.axis[j], q[j])
+    for k in range(len(linkage.piece)):
+        p = linkage.piece[k]
+        compose(frames[linkage.frame[k]], linkage.local[k], work.pose[p])
+        box_of(size, work.pose, p, work.box[p])
+
+
+@njit(**FAST)
+def _free_step(linkage, pieces, tree, work, d, step, least):
+    """Return a step of the line that is free, and the clearance (m) that it has at least.
+
+    Args:
+        step: the longest step to take.
+        least: the clearance (m) so far.
+
+    Returns:
+        The step, -1 where a pair is too close, and the clearance.
+    """
+    box = work.box
+    for k in range(len(linkage.piece)):
+        keep = linkage.margin[k] + FREE_BAND
+        if keep == math.inf:
+            continue
+        p, v, a = linkage.piece[k], work.speed[k, 0], work.speed[k, 1]
+        moved = v * step + 0.5 * a * step * step
+        node = 0
+        while node < len(tree.skip):
+            reach = keep + max(moved / SHARE, moved + least, CLOSEST)
+            if boxes_apart(box, p, node, tree.box, reach):
+                node = tree.skip[node]
+                continue
+            if tree.piece[node] >= 0:
+                step, moved, least = _pair_step(pieces, work, p, tree.piece[node], keep, v, a, step, least)
+                if step < 0.0:
+                    return step, least
+            node += 1
+    for i in range(len(linkage.pair)):
+        k, p, other = linkage.pair[i, 0], linkage.pair[i, 1], linkage.other[i]
+        keep = linkage.distance[i] + FREE_BAND
+        own = linkage.piece[k]
+        v, a = work.speed[k, 0], work.speed[k, 1]
+        if other >= 0:
+            v, a = v + work.speed[other, 0], a + work.speed[other, 1]
+        moved = v * step + 0.5 * a * step * step
+        if boxes_apart(box, own, p, box, keep + max(moved / SHARE, moved + least, CLOSEST)):
+            continue
+        if other >= 0 and linkage.common[i] >= 0:
+            v, a = _rates(linkage, work, d, k, linkage.common[i])
+            w, b = _rates(linkage, work, d, other, linkage.common[i])
+            v, a = v + w, a + b
+        step, moved, least = _pair_step(pieces, work, own, p, keep, v, a, step, least)
+        if step < 0.0:
+            return step, least
+    return step, least
+
+
+@njit(**FAST)
+def _pair_step(pieces, work, p, other, keep, v, a, step, least):
+    """Return a step that is free for a pair of pieces too, how far (m) they move in it, and the clearance."""
+    moved = v * step + 0.5 * a * step * step
+    reach = keep + max(moved / SHARE, moved + least, CLOSEST)
+    if oriented_boxes_apart(pieces.size, work.pose, p, other, reach):
+        return step, moved, least
+    near = keep + CLOSEST
+    gap, _ = distance_bounds(pieces, work.pose, p, other, reach, near, near, work.simplex)
+    if gap < near:
+        work.hit[0], work.hit[1] = p, other
+        return BLOCKED, moved, least
+    gap -= keep
+    if moved > SHARE * gap:
+        step = min(step, _time(SHARE * gap, v, a))
+        moved = v * step + 0.5 * a * step * step
+    return step, moved, min(least, gap - moved)
+
+
+@njit(**FAST)
+def _time(distance, v, a):
+    """Return in which time a point gets no further than a distance, at a speed v and acceleration a."""
+    across = v + math.sqrt(v * v + 2.0 * a * distance)
+    return 2.0 * distance / across if across > 0.0 else math.inf
+
+
+@njit(**FAST)
+def _rates(linkage, work, d, k, stop):
+    """Return the largest speed and acceleration of points of moving piece k, for rates d (J,) of the joints.
+
+    Only joints after joint ``stop`` of its chain move.
+    """
+    size, pose, frames = work.speed, work.pose, work.frames
+    p = linkage.piece[k]
+    c0, c1, c2 = (
+        0.5 * (work.box[p, 0] + work.box[p, 3]),
+        0.5 * (work.box[p, 1] + work.box[p, 4]),
+        0.5 * (work.box[p, 2] + work.box[p, 5]),
+    )
+    v0 = v1 = v2 = w0 = w1 = w2 = 0.0
+    later = a = 0.0
+    j = linkage.frame[k]
+    while j != stop:
+        f, axis, rate = frames[j], linkage.axis[j], d[j]
+        x0 = rate * (f[0] * axis[0] + f[1] * axis[1] + f[2] * axis[2])
+        x1 = rate * (f[3] * axis[0] + f[4] * axis[1] + f[5] * axis[2])
+        x2 = rate * (f[6] * axis[0] + f[7] * axis[1] + f[8] * axis[2])
+        if linkage.slides[j]:
+            v0, v1, v2 = v0 + x0, v1 + x1, v2 + x2
+        else:
+            w0, w1, w2 = w0 + x0, w1 + x1, w2 + x2
+            r0, r1, r2 = c0 - f[9], c1 - f[10], c2 - f[11]
+            v0, v1, v2 = v0 + x1 * r2 - x2 * r1, v1 + x2 * r0 - x0 * r2, v2 + x0 * r1 - x1 * r0
+        rate = abs(rate)
+        if not linkage.slides[j]:
+            a += 2.0 * rate * later + rate * rate * linkage.lever[k, j]
+        later += rate * linkage.lever[k, j]
+        j = linkage.parent[j]
+    v = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    return v + math.sqrt(w0 * w0 + w1 * w1 + w2 * w2) * linkage.radius[k], a
+
+
+@njit(**FAST)
+def tilt_excess(linkage, frames):
+    """Return by how much (rad) the object is tilted beyond its largest tilt."""
+    f, u = frames[linkage.tilted], linkage.upright
+    x = f[0] * u[0] + f[1] * u[1] + f[2] * u[2]
+    y = f[3] * u[0] + f[4] * u[1] + f[5] * u[2]
+    z = f[6] * u[0] + f[7] * u[1] + f[8] * u[2]
+    return math.atan2(math.sqrt(x * x + y * y), z) - linkage.tilt
+
+
+@njit(**FAST)
+def _tilt_step(linkage, work, d, step):
+    """Return a step in which the object is not tilted too far, -1 where it is so already."""
+    left = -tilt_excess(linkage, work.frames)
+    if left < CLOSEST_ANGLE:
+        work.hit[0] = work.hit[1] = -1
+        return -1.0
+    rate = 0.0
+    j = linkage.tilted
+    while j >= 0:
+        if not linkage.slides[j]:
+            rate += abs(d[j])
+        j = linkage.parent[j]
+    return min(step, SHARE * left / rate) if rate > 0.0 else step

@@ -1,0 +1,139 @@
+"""Calls of the compiled code of this room: proofs of lines, and free motion between configurations."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from symgrasp.errors import NoPlanError
+from symgrasp.motion.proof import clearances
+from symgrasp.motion.situation import Situation
+from symgrasp.motion.trees import Trees, grow, new_trees, shorten
+from symgrasp.poses import Array
+from symgrasp.progress import Progress
+
+__all__ = ["STATED", "NoMotionError", "blockers", "connect", "prove"]
+
+STATED = 0.05
+"""Clearances of motions are proven up to this distance (m)."""
+
+ROOM = ((0.01, 1_000), (0.003, 2_000), (0.0, 20_000))
+"""By how much more (m) than they must bodies keep apart in free motions, if such a motion is found in so many
+samples: the corners of the path are rounded later, and arms do not follow it exactly."""
+
+BATCH = 500
+"""Samples between two reports of progress, at which it may be cancelled."""
+
+TRIES = 150
+"""Lines that are tried to shorten a path."""
+
+
+class NoMotionError(NoPlanError):
+    """A part of a motion was not found; the text says which, and what is in its way."""
+
+
+def prove(situation: Situation, start: Array, end: Array, most: float = 0.0) -> tuple[Array, np.ndarray]:
+    """Return the clearances (E,) (m) that lines are proven to have, up to ``most``, and negative for others.
+
+    Args:
+        situation: what moves and stands.
+        start: (E, J) joint values.
+        end: (E, J) joint values.
+        most: clearance (m) above which it need not be known.
+
+    Returns:
+        The clearances, and the pair (E, 2) of pieces that each line without a proof meets, see `blockers`.
+    """
+    s = situation
+    found, hits = np.empty(len(start)), np.full((len(start), 2), -1, dtype=np.int64)
+    start, end = np.ascontiguousarray(start, dtype=float), np.ascontiguousarray(end, dtype=float)
+    clearances(s.linkage, s.pieces, s.tree, s.work, start, end, float(most), found, hits)
+    return found, hits
+
+
+def blockers(situation: Situation, hits: np.ndarray) -> str:
+    """Return in words what lines meet most often.
+
+    Args:
+        situation: what moves and stands.
+        hits: (., 2) pairs of pieces, -1 for the limit of the tilt.
+    """
+    if not len(hits):
+        return "no configuration reaches it"
+    ((a, b), _) = Counter(map(tuple, np.asarray(hits).tolist())).most_common(1)[0]
+    if a < 0:
+        return "the object would be tilted too far"
+    return f"{situation.names[a]} meets {situation.names[b]}"
+
+
+def connect(
+    situation: Situation, starts: Array, goals: Array, seed: int = 0, progress: Progress | None = None
+) -> Array:
+    """Find a free path from one of some configurations to one of others, and shorten it.
+
+    Args:
+        situation: what moves and stands.
+        starts: (., J) joint values.
+        goals: (., J) joint values.
+        seed: of the random numbers; the same one gives the same path.
+        progress: called now and then; may raise `Cancelled`.
+
+    Returns:
+        The path (n, J), all lines of it proven free.
+
+    Raises:
+        NoMotionError: none was found; says what is in the way most.
+    """
+    s = situation
+    for room, samples in ROOM:
+        wide = s.with_room(room)
+        free = [roots[prove(wide, roots, roots)[0] >= 0] for roots in (starts, goals)]
+        if not all(map(len, free)):
+            continue
+        trees = new_trees(*free, len(s.names), seed)
+        low, high = _sampled(s, np.concatenate(free))
+        for first in range(0, samples, BATCH):
+            if progress:
+                progress(first / samples)
+            if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, first, BATCH):
+                return _shortened(wide, _joined(trees), trees.random)
+    for roots, what in ((starts, "start"), (goals, "end")):
+        found, hits = prove(s, roots, roots)
+        if not (found >= 0).any():
+            raise NoMotionError(f"its {what} is in collision: {blockers(s, hits)}")
+    met = trees.met[:-1].argsort()[::-1][:2]
+    names = " and ".join(dict.fromkeys(str(s.names[k]) for k in met if trees.met[k]))
+    text = f"no way was found in {samples:,} samples"
+    raise NoMotionError(f"{text}; mostly in the way: {names}" if names else text)
+
+
+def _sampled(situation: Situation, roots: Array) -> tuple[Array, Array]:
+    """Return the range (J,), (J,) of joint values that are sampled: of joints without limits a turn each way."""
+    low, high = situation.linkage.limits
+    return (
+        np.where(np.isfinite(low), low, roots.min(axis=0) - np.pi),
+        np.where(np.isfinite(high), high, roots.max(axis=0) + np.pi),
+    )
+
+
+def _joined(trees: Trees) -> Array:
+    """Return the path through two trees that meet."""
+    halves = []
+    for side in (0, 1):
+        k, half = int(trees.meet[side]), []
+        while k >= 0:
+            half.append(trees.node[side, k])
+            k = int(trees.parent[side, k])
+        halves.append(half)
+    path = np.array(halves[0][::-1] + halves[1])
+    apart = np.linalg.norm(np.diff(path, axis=0), axis=1) > 1e-9
+    return path[np.concatenate([[True], apart])]
+
+
+def _shortened(situation: Situation, path: Array, random: np.ndarray) -> Array:
+    s = situation
+    room = np.empty((len(path) + 2 * TRIES, path.shape[1]))
+    room[: len(path)] = path
+    count = shorten(s.linkage, s.pieces, s.tree, s.work, room, len(path), random, TRIES)
+    return room[:count].copy()
