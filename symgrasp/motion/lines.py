@@ -1,8 +1,8 @@
 """Straight paths of the tool, complete on the grid: dynamic programming over redundancy values and branches.
 
-At every sample of the path the inverse kinematics gives all configurations. They are the layers of a graph;
-its edges are lines in joint space that turn no joint far and are proven free. The best path through the layers
-has the largest smallest clearance.
+At every sample of the path the inverse kinematics gives all configurations. They are the layers of a graph,
+whose edges are lines in joint space that turn no joint far and are proven free. The best path through the
+layers has the largest smallest clearance.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def follow(
 
 
 def _following_turns(layer: Array, following: Array, limits: Array) -> Array:
-    """Return what follows (m, k, n) each configuration: with full turns added towards it, inside the limits."""
+    """Return what follows (m, k, n) each configuration: with full turns added towards it, within limits."""
     turns = 2 * np.pi * np.round((layer[:, None] - following[None]) / (2 * np.pi))
     near = following[None] + turns
     return np.where((near >= limits[0]) & (near <= limits[1]), near, following[None])

@@ -341,7 +341,7 @@ class _PlannedMotion:
         return float(found.min())
 
     def _add(self, kind: Kind, situation: Situation, path: Array, before: PlanTask, task: PlanTask) -> None:
-        """Add a segment in which the arms of a situation follow a path (n, J), and move the state to its end."""
+        """Add a segment in which the arms of a situation follow a path (n, J), and move there."""
         paths = situation.by_arm(path)
         self._append(kind, paths, before, task, self._clearance(situation, path))
         for name, own in paths.items():

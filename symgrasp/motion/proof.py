@@ -25,7 +25,7 @@ from symgrasp.engine.simplex import FAST
 __all__ = ["BLOCKED", "CLOSEST", "clearances", "line_clearance", "place", "tilt_excess"]
 
 CLOSEST = 1e-4
-"""Where pieces are closer than allowed and this (m), a line is not proven free: the steps become too short."""
+"""Where pieces are closer than allowed and this (m), a line is not proven free: steps become too short."""
 
 SHARE = 0.7
 """Share of a distance that a stretch may use up."""
@@ -202,13 +202,11 @@ def _rates(linkage, work, d, k, stop):
 
     Only joints after joint ``stop`` of its chain move.
     """
-    size, pose, frames = work.speed, work.pose, work.frames
+    box, frames = work.box, work.frames
     p = linkage.piece[k]
-    c0, c1, c2 = (
-        0.5 * (work.box[p, 0] + work.box[p, 3]),
-        0.5 * (work.box[p, 1] + work.box[p, 4]),
-        0.5 * (work.box[p, 2] + work.box[p, 5]),
-    )
+    c0 = 0.5 * (box[p, 0] + box[p, 3])
+    c1 = 0.5 * (box[p, 1] + box[p, 4])
+    c2 = 0.5 * (box[p, 2] + box[p, 5])
     v0 = v1 = v2 = w0 = w1 = w2 = 0.0
     later = a = 0.0
     j = linkage.frame[k]

@@ -86,30 +86,32 @@ def connect(
         NoMotionError: none was found; says what is in the way most.
     """
     s = situation
-    for room, samples in ROOM:
-        wide = s.with_room(room)
-        free = [roots[prove(wide, roots, roots)[0] >= 0] for roots in (starts, goals)]
-        if not all(map(len, free)):
-            continue
-        trees = new_trees(*free, len(s.names), seed)
-        low, high = _sampled(s, np.concatenate(free))
-        for first in range(0, samples, BATCH):
-            if progress:
-                progress(first / samples)
-            if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, first, BATCH):
-                return _shortened(wide, _joined(trees), trees.random)
     for roots, what in ((starts, "start"), (goals, "end")):
         found, hits = prove(s, roots, roots)
         if not (found >= 0).any():
             raise NoMotionError(f"its {what} is in collision: {blockers(s, hits)}")
-    met = trees.met[:-1].argsort()[::-1][:2]
-    names = " and ".join(dict.fromkeys(str(s.names[k]) for k in met if trees.met[k]))
-    text = f"no way was found in {samples:,} samples"
+    met, taken = np.zeros(len(s.names) + 1, dtype=np.int64), 0
+    for room, samples in ROOM:
+        wide = s.with_room(room)
+        first, second = (roots[prove(wide, roots, roots)[0] >= 0] for roots in (starts, goals))
+        if not len(first) or not len(second):
+            continue
+        trees = new_trees(first, second, len(s.names), seed)
+        low, high = _sampled(s, np.concatenate([first, second]))
+        for done in range(0, samples, BATCH):
+            if progress:
+                progress(done / samples)
+            if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, done, BATCH):
+                return _shortened(wide, _joined(trees), trees.random)
+        met, taken = trees.met, samples
+    most = met[:-1].argsort()[::-1][:2]
+    names = " and ".join(dict.fromkeys(str(s.names[k]) for k in most if met[k]))
+    text = f"no way was found in {taken:,} samples"
     raise NoMotionError(f"{text}; mostly in the way: {names}" if names else text)
 
 
 def _sampled(situation: Situation, roots: Array) -> tuple[Array, Array]:
-    """Return the range (J,), (J,) of joint values that are sampled: of joints without limits a turn each way."""
+    """Return the range (J,), (J,) of joint values that are sampled; half a turn each way without limits."""
     low, high = situation.linkage.limits
     return (
         np.where(np.isfinite(low), low, roots.min(axis=0) - np.pi),

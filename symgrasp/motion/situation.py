@@ -39,7 +39,7 @@ class State:
     T_world_object: Array
 
     def with_arm(self, arm: Arm, q: Array, opening: float | None = None) -> State:
-        """Return the state with an arm at joint values (dof,), and its hand at an opening (m) if one is given."""
+        """Return the state with an arm at joint values (dof,), and its hand at an opening (m) if given."""
         values = self.values[arm.robot.name].copy()
         values[arm.indices] = q
         for joint, value in (arm.hand.joint_values(opening) if opening is not None else {}).items():
@@ -269,7 +269,7 @@ class MotionScene:
     def _joint_rows(
         self, state: State, joints: Sequence[tuple[Robot, Joint]]
     ) -> tuple[tuple[Array, Array, np.ndarray, Array], np.ndarray, Array]:
-        """Return origins, axes, kinds and limits of the joints, their parents, and frames (J, 4, 4) at zero."""
+        """Return origins, axes, kinds and limits of joints, their parents, and frames (J, 4, 4) at zero."""
         zero = self._zero(state, joints)
         frames = np.array([zero[robot.name][joint.child] for robot, joint in joints]).reshape(-1, 4, 4)
         parent = np.full(len(joints), -1, dtype=np.int64)

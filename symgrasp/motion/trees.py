@@ -1,4 +1,4 @@
-"""Free motion: two trees of proven lines grow until they meet (RRT-Connect), and the path is shortened. Compiled.
+"""Free motion: trees of proven lines grow until they meet (RRT-Connect); the path is shortened. Compiled.
 
 J. J. Kuffner and S. M. LaValle, RRT-Connect: an efficient approach to single-query path planning, ICRA 2000.
 Here each tree may have several roots. Where a tilt is limited, samples and new nodes are projected onto what
@@ -38,7 +38,7 @@ class Trees(NamedTuple):
     Attributes:
         node: (2, N, J) joint values.
         parent: (2, N) index of the node before, -1 for a root.
-        count: (2,) number of nodes.
+        filled: (2,) number of nodes.
         meet: (2,) the nodes of both at which they meet.
         random: (1,) state of the random numbers.
         met: (P + 1,) how often each piece was met by lines that were not free; the last one is the tilt.
@@ -46,7 +46,7 @@ class Trees(NamedTuple):
 
     node: Array
     parent: np.ndarray
-    count: np.ndarray
+    filled: np.ndarray
     meet: np.ndarray
     random: np.ndarray
     met: np.ndarray
@@ -59,7 +59,7 @@ def new_trees(starts: Array, goals: Array, pieces: int, seed: int) -> Trees:
     return Trees(
         node=node,
         parent=np.full((2, LARGEST_TREE), -1, dtype=np.int64),
-        count=np.array([len(starts), len(goals)], dtype=np.int64),
+        filled=np.array([len(starts), len(goals)], dtype=np.int64),
         meet=np.full(2, -1, dtype=np.int64),
         random=np.array([seed * 2654435761 + 88172645463325252], dtype=np.uint64),
         met=np.zeros(pieces + 1, dtype=np.int64),
@@ -95,7 +95,7 @@ def grow(linkage, pieces, tree, work, trees, low, high, first, count):
     sample = work.q[2]
     for i in range(first, first + count):
         side = i % 2
-        if trees.count[side] >= trees.node.shape[1] - 1 or trees.count[1 - side] >= trees.node.shape[1] - 1:
+        if trees.filled[side] >= trees.node.shape[1] - 1 or trees.filled[1 - side] >= trees.node.shape[1] - 1:
             return False
         for j in range(len(sample)):
             sample[j] = low[j] + _random(trees.random) * (high[j] - low[j])
@@ -125,7 +125,7 @@ def _extend(linkage, pieces, tree, work, trees, side, target, low, high):
     """
     node = trees.node[side]
     nearest, least = 0, math.inf
-    for i in range(trees.count[side]):
+    for i in range(trees.filled[side]):
         square = 0.0
         for j in range(len(target)):
             square += (target[j] - node[i, j]) ** 2
@@ -134,9 +134,9 @@ def _extend(linkage, pieces, tree, work, trees, side, target, low, high):
     length = math.sqrt(least)
     if length == 0.0:
         return nearest, True
-    if trees.count[side] >= node.shape[0]:
+    if trees.filled[side] >= node.shape[0]:
         return -1, False
-    new = trees.count[side]
+    new = trees.filled[side]
     arrives = length <= STEP
     for j in range(len(target)):
         along = 1.0 if arrives else STEP / length
@@ -160,13 +160,13 @@ def _extend(linkage, pieces, tree, work, trees, side, target, low, high):
         trees.met[work.hit[1]] += 1
         return -1, False
     trees.parent[side, new] = nearest
-    trees.count[side] += 1
+    trees.filled[side] += 1
     return new, arrives
 
 
 @njit(**FAST)
 def _project(linkage, size, work, q, low, high):
-    """Turn the axis of the object inside of the largest tilt, by changing q (J,); return whether that succeeds."""
+    """Turn the axis of the object inside of the largest tilt by changing q (J,), if that succeeds."""
     for _ in range(PROJECTIONS):
         place(linkage, size, work, q)
         excess = tilt_excess(linkage, work.frames)

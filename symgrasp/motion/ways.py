@@ -61,7 +61,7 @@ def retreating(grip: Grip, T_world_object: Array, length: float, profile: Profil
     Args:
         grip: the grasp.
         T_world_object: pose (4, 4) of the object.
-        length: least length (m). It is longer where the tips of the fingers would not be apart from the object.
+        length: least length (m); more where the tips of the fingers would not be apart from the object.
         profile: of the object.
     """
     tips = max(float(points[:, 2].max()) for points in grip.arm.hand_hulls(grip.open))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -110,7 +112,7 @@ def test_a_start_in_collision_is_said_to_be_that():
         arm = scene.arm()
         situation = bodies.situation(bodies.home(), [arm])
         low = np.array([[0.0, 1.7, 0.0, -0.3, 0.0, 1.6, 0.8]])  # the hand in the table
-        with pytest.raises(NoMotionError, match="its start is in collision: .*table"):
+        with pytest.raises(NoMotionError, match=r"its start is in collision: .*table"):
             connect(situation, low, arm.home[None])
 
 
@@ -136,7 +138,7 @@ def test_free_motion_is_found_and_tilts_no_further_than_it_may(seed):
         path = connect(situation, free[:1], free[1:], seed)
         assert (path[0] == free[0]).all()
         assert ((path >= arm.lower) & (path <= arm.upper)).all()
-        for a, b in zip(path[:-1], path[1:], strict=True):
+        for a, b in pairwise(path):
             for s in np.linspace(0, 1, 50):
                 assert _tilt(arm, state, T, a + s * (b - a)) <= largest
 
