@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cache
-from itertools import product
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, cached_property
+from itertools import combinations
 from types import MappingProxyType
+from typing import NamedTuple
 
+import numpy as np
+
+from symgrasp.engine.robot_pairs import COLLIDING, PlacedRobot, RobotPairs
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.object.manifold import ROLLS
-from symgrasp.poses import inverse
+from symgrasp.planners.body_checks import BodyChecks
+from symgrasp.planners.combinations import first_combination, members
+from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.configuration import ArmConfiguration
 from symgrasp.robot.robot import Arm
-from symgrasp.scene.balance import support_margins
 from symgrasp.world import BulletWorld
 
 __all__ = ["ConfigurationFinder", "witnesses"]
@@ -32,6 +38,32 @@ def witnesses(
         assert witness is not None  # planners choose feasible cells
         configurations.append(ArmConfiguration(arm, witness.q, witness.opening))
     return configurations
+
+
+class _Choices:
+    """What an arm can choose from at a cell, with a torso at a sample.
+
+    Attributes:
+        configurations: those that reach the cell inside the limits, in the order of Algorithm 1.
+        samples: their redundancy samples.
+        left: the set of those not known to be infeasible; see `combinations`.
+        checked: the set of those known to be feasible.
+        placed: the robot in each, without what its other arms move.
+    """
+
+    def __init__(
+        self, configurations: Sequence[ArmConfiguration], samples: Sequence[int], placed: PlacedRobot
+    ) -> None:
+        self.configurations, self.samples, self.placed = configurations, samples, placed
+        self.left, self.checked = (1 << len(configurations)) - 1, 0
+
+
+class _At(NamedTuple):
+    """Where an arm is to hold: index of the arm, its cell, and the sample of a torso that it shares."""
+
+    arm: int
+    cell: Cell
+    torso: int | None
 
 
 class ConfigurationFinder:
@@ -53,9 +85,9 @@ class ConfigurationFinder:
     ) -> None:
         self.world, self.arms, self.maps = world, arms, maps
         self._by_torso = by_torso
-        self.body_checks = 0
         self._checker = cache(self._make_checker)
-        self._free = cache(self._feasible)
+        self._choices = cache(self._make_choices)
+        self._pairs: dict[tuple[_At, _At], list[int]] = {}
 
     def maps_at(self, torso: Mapping[str, int]) -> list[FeasibilityMap]:
         """Return the maps of the arms, with the torso that some share at a sample.
@@ -83,38 +115,120 @@ class ConfigurationFinder:
             every: try all combinations of feasible configurations, not the witnesses alone.
         """
         found = witnesses(self.arms, self.maps_at(torso), cells)
-        if self.are_free_together(found):
+        if self.conflict(found) is None:
             return found
-        if every:
-            choices = (
-                self._free(k, cell, torso.get(arm.name))
-                for k, (arm, cell) in enumerate(zip(self.arms, cells, strict=True))
-            )
-            for configurations in product(*choices):
-                if self.are_free_together(configurations):
-                    return list(configurations)
-        return None
+        at = [_At(k, cells[k], torso.get(arm.name)) for k, arm in enumerate(self.arms)]
+        return self._first_free(at) if every else None
 
-    def are_free_together(self, configurations: Sequence[ArmConfiguration]) -> bool:
-        """Return whether nothing collides and no robot falls when every arm takes its configuration."""
-        self.body_checks += 1
-        self.world.set_object(self.maps[0].T_world_object)
-        self.world.set_arms(configurations)
-        margins = support_margins(self.world.scene, self.maps[0].T_world_object, configurations)
-        return min(margins.values(), default=0.0) >= 0 and not self.world.collisions(self.arms)
+    def excluding(self, cells: Sequence[Cell], torso: Mapping[str, int]) -> Iterator[tuple[int, int]]:
+        """Yield pairs of arms, as indices, that cannot hold their cells together, whatever all others do.
 
-    def _feasible(self, k: int, cell: Cell, torso: int | None) -> list[ArmConfiguration]:
-        """Return every feasible configuration of an arm at a cell, the other robots at home."""
-        arm, m = self.arms[k], self.maps[k]
-        for robot in self.world.scene.robots:
-            self.world.park(robot)
-        self.world.set_object(m.T_world_object)
+        Only those that share no torso, and that `find` came upon.
+
+        Args:
+            cells: a feasible cell for every arm, for which `find` has found nothing.
+            torso: arm → sample of its torso, for those that share one.
+        """
+        at = [_At(k, cells[k], None) for k, arm in enumerate(self.arms) if arm.name not in torso]
+        for a, b in combinations(at, 2):
+            if (a, b) in self._pairs and self._exclude(a, b):
+                yield a.arm, b.arm
+
+    def conflict(self, configurations: Sequence[ArmConfiguration]) -> tuple[int, ...] | None:
+        """Return arms that cannot take their configurations together; see `BodyChecks.conflict`."""
+        return self._checks.conflict(configurations)
+
+    @property
+    def body_checks(self) -> int:
+        """How often a robot, or a pair of robots, was checked in PyBullet."""
+        return self._checks.count
+
+    @cached_property
+    def _checks(self) -> BodyChecks:
+        return BodyChecks(self.world, self.arms, self.maps[0].T_world_object)
+
+    @cached_property
+    def _robot_pairs(self) -> RobotPairs:
+        return RobotPairs(self.world)
+
+    def _first_free(self, at: Sequence[_At]) -> list[ArmConfiguration] | None:
+        """Return the first free combination of the arms' feasible configurations, as a product lists them.
+
+        What certainly meets is left out, and everything else checked when a combination needs it.
+        """
+        if any(self._exclude(a, b) for a, b in combinations(at, 2)):
+            return None
+        pairs = {(a.arm, b.arm): self._pairs[a, b] for a, b in combinations(at, 2)}
+        choices = [self._choices(one) for one in at]
+        excluded: defaultdict[tuple[int, ...], set[tuple[int, ...]]] = defaultdict(set)
+        while True:
+            picked = first_combination([own.left for own in choices], pairs, excluded)
+            if picked is None:
+                return None
+            if not all([self._is_feasible(one, i) for one, i in zip(at, picked, strict=True)]):
+                continue
+            found = [own.configurations[i] for own, i in zip(choices, picked, strict=True)]
+            arms = self.conflict(found)
+            if arms is None:
+                return found
+            if len(arms) == 2:
+                a, b = arms
+                pairs[a, b][picked[a]] &= ~(1 << picked[b])
+            elif len(arms) == 1:
+                choices[arms[0]].left &= ~(1 << picked[arms[0]])
+            elif arms:
+                excluded[arms].add(tuple(picked[k] for k in arms))
+            else:
+                return None
+
+    def _exclude(self, a: _At, b: _At) -> bool:
+        """Whether no choices that are left to two arms go together."""
+        if (a, b) not in self._pairs:
+            self._pairs[a, b] = self._make_pairs(a, b)
+        left = self._choices(b).left
+        return not any(self._pairs[a, b][i] & left for i in members(self._choices(a).left))
+
+    def _make_choices(self, at: _At) -> _Choices:
+        arm = self.arms[at.arm]
+        opening = float(self.maps[at.arm].opening[at.cell.row])
+        found = self._checker(at.arm, at.torso).ik.solve(self._tool(at))
+        inside = found.inside
+        configurations = [ArmConfiguration(arm, q, opening) for q in found.q[inside]]
+        values = [arm.robot_values(q, opening) for q in found.q[inside]]
+        placed = self._robot_pairs.place(arm.robot, values, _moved_by_others(arm, self.arms))
+        return _Choices(configurations, found.sample[inside].tolist(), placed)
+
+    def _make_pairs(self, a: _At, b: _At) -> list[int]:
+        """Return, for each choice of an arm, the set of those of another arm that it does not surely meet."""
+        one, other = self._choices(a), self._choices(b)
+        if self.arms[a.arm].robot.name == self.arms[b.arm].robot.name:
+            return [other.left] * len(one.configurations)
+        certain = self._robot_pairs.certify(one.placed, other.placed, self.world.scene.settings.margin)
+        return [sum(1 << int(j) for j in np.flatnonzero(row != COLLIDING)) for row in certain]
+
+    def _is_feasible(self, at: _At, choice: int) -> bool:
+        """Whether a choice is feasible for the arm alone, the other robots at home; forget it if not."""
+        own = self._choices(at)
+        if not own.checked >> choice & 1:
+            for robot in self.world.scene.robots:
+                self.world.park(robot)
+            self.world.set_object(self.maps[at.arm].T_world_object)
+            configuration, sample = own.configurations[choice], own.samples[choice]
+            checker = self._checker(at.arm, at.torso)
+            result = checker.check(self._tool(at), configuration.q, sample, configuration.opening)
+            if result.reason != Reason.FEASIBLE:
+                own.left &= ~(1 << choice)
+                return False
+            own.checked |= 1 << choice
+        return True
+
+    def _tool(self, at: _At) -> Array:
+        """Return the tool pose (4, 4) of a cell in the base of the arm's robot."""
+        arm, m, cell = self.arms[at.arm], self.maps[at.arm], at.cell
         h, theta = m.manifold.h[cell.row], m.manifold.theta[cell.column]
         radius = float(m.manifold.profile.radius(h))
         tool = arm.hand.tool_pose(m.T_world_object, h, theta, ROLLS[cell.roll], radius)
-        opening = float(m.opening[cell.row])
-        candidates = self._checker(k, torso).candidates(inverse(arm.robot.T_world_base) @ tool, opening)
-        return [ArmConfiguration(arm, c.q, opening) for c in candidates if c.reason == Reason.FEASIBLE]
+        return inverse(arm.robot.T_world_base) @ tool
 
     def _make_checker(self, k: int, torso: int | None) -> CandidateChecker:
         settings = self.world.scene.settings
@@ -122,3 +236,18 @@ class ConfigurationFinder:
         ik = solver_for(arm, settings.redundancy, None if torso is None else [torso])
         holders = [own.name for own in self.arms]
         return CandidateChecker(self.world, arm, ik, settings.approach, holders=holders)
+
+
+def _moved_by_others(arm: Arm, arms: Sequence[Arm]) -> set[str]:
+    """Return the names of the links of an arm's robot that depend on joints of others of its arms."""
+    model = arm.robot.model
+    others = {
+        joint
+        for other in arms
+        if other.robot.name == arm.robot.name and other.name != arm.name
+        for joint in (*other.joint_names, *other.hand.joints)
+    } - set(arm.joint_names)
+    sources = {model.joint_names.index(joint) for joint in others}
+    return {
+        link for link in model.colliding_links() if sources.intersection(j.source for j in model.chain(link))
+    }

@@ -154,8 +154,11 @@ class FreePlacements:
             for arm in self._search.torsos[t].maps
         }
         configurations = finder.find(cells, torso)
-        maps = finder.maps_at(torso)
-        return Step(turn.columns, configurations, cells, maps) if configurations else None
+        if configurations:
+            return Step(turn.columns, configurations, cells, finder.maps_at(torso))
+        for a, b in finder.excluding(cells, torso):
+            self._search.rule_out(k, (finder.arms[a].name, cells[a]), (finder.arms[b].name, cells[b]))
+        return None
 
 
 def _near(a: Sequence[Cell], b: Sequence[Cell], angles: int) -> bool:

@@ -21,8 +21,10 @@ import numpy as np
 
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.planners.column_sets import doubled
 from symgrasp.planners.gaps import GapTable, PrintGaps
-from symgrasp.planners.placements import Problem, explore
+from symgrasp.planners.placements import Problem, best_placement, placements_of
+from symgrasp.planners.ruled_out import Grasp, RuledOut
 from symgrasp.planners.sequential import check_same_grid
 from symgrasp.planners.stations import SharedTorso, Station, Turn, best_turns
 from symgrasp.poses import Array
@@ -31,9 +33,6 @@ __all__ = ["HoldRun", "Holding", "HoldingSearch", "hold_runs", "turn_groups"]
 
 LOWEST = -0.5
 """Below the score of every placement, above that of none: `PASSING` counts, `OVERLAP` does not."""
-
-AT_ONCE = 64
-"""Placements of one score that are listed at first; eight times as many whenever more are asked for."""
 
 
 class HoldRun(NamedTuple):
@@ -163,6 +162,36 @@ class HoldingSearch:
         stations = [station for station in self._stations if station.group == group]
         return best_turns(stations, cells, self._shape[1], enough)
 
+    def rule_out(self, task: int, a: tuple[str, Cell], b: tuple[str, Cell]) -> None:
+        """Leave out placements for which two arms would have to hold these cells in a task.
+
+        Args:
+            task: its index.
+            a: name and cell of an arm, with the object turned.
+            b: those of another one.
+        """
+        group = next(g for g, (own, _) in enumerate(self._turned_together) if task in own)
+        grasps = [
+            Grasp(self._hold(task, arm), cell.roll * self._shape[1] + cell.row, cell.column)
+            for arm, cell in (a, b)
+        ]
+        self._ruled_out.add(group, *grasps)
+
+    @cached_property
+    def _ruled_out(self) -> RuledOut:
+        holds, lines = self._alone.shape
+        return RuledOut(len(self._turned_together), holds, lines, self._shape[2])
+
+    @cached_property
+    def _turned_together(self) -> list[tuple[list[int], list[Station]]]:
+        """The groups of tasks in which there is more than one hold, and their stations."""
+        stations = [[s for s in self._stations if s.group == g] for g in range(len(self.groups))]
+        return [
+            (tasks, own)
+            for tasks, own in zip(self.groups, stations, strict=True)
+            if sum(len(s.margins) for s in own) > 1
+        ]
+
     @cached_property
     def _alone(self) -> Array:
         """(n, L) what each line of each hold reaches at most."""
@@ -189,28 +218,12 @@ class HoldingSearch:
 
     def _below(self, ceiling: float, problem: Problem) -> Iterator[Holding]:
         """Yield all placements whose score is below a ceiling, best first."""
-        best = np.empty((1, len(self.holds), 2), dtype=np.int64)
-        while True:
-            found, score = explore(problem, LOWEST, ceiling, True, best)
-            if not found:
-                return
-            yield self._holding(best[0], score)
-            for place in self._all_of(score, problem):
-                if not np.array_equal(place, best[0]):
-                    yield self._holding(place, score)
-            ceiling = score
-
-    def _all_of(self, score: float, problem: Problem) -> Iterator[np.ndarray]:
-        """Yield all placements (n, 2) of a score."""
-        done, room = 0, AT_ONCE
-        while True:
-            places = np.empty((room, len(self.holds), 2), dtype=np.int64)
-            above, below = np.nextafter(score, -np.inf), np.nextafter(score, np.inf)
-            count, _ = explore(problem, above, below, False, places)
-            yield from places[done:count]
-            if count < room:
-                return
-            done, room = count, 8 * room
+        while best := best_placement(problem, self._ruled_out, LOWEST, ceiling):
+            first, ceiling = best
+            yield self._holding(first, ceiling)
+            for place in placements_of(problem, self._ruled_out, ceiling):
+                if not np.array_equal(place, first):
+                    yield self._holding(place, ceiling)
 
     def _holding(self, place: np.ndarray, score: float) -> Holding:
         heights = self._shape[1]
@@ -226,9 +239,9 @@ class HoldingSearch:
     def _problem(self, gaps_of: Callable[[int, int], GapTable]) -> Problem:
         n, (_, _, angles) = len(self.holds), self._shape
         lines = self._alone.shape[1]
-        of_group = {g: [s for s in self._stations if s.group == g] for g in range(len(self.groups))}
-        several = [own for own in of_group.values() if sum(len(s.margins) for s in own) > 1]
+        several = [own for _, own in self._turned_together]
         stations = [s for own in several for s in own]
+        feasible = np.ones((len(several), n, lines, angles), dtype=bool)
         part = np.full((n, len(stations)), -1)
         margins = []
         values = max((len(m) for s in stations for m in s.margins.values()), default=1)
@@ -237,6 +250,10 @@ class HoldingSearch:
                 part[h, column] = len(margins)
                 missing = np.full((values - len(margin), lines, angles), -1.0)
                 margins.append(np.concatenate([margin, missing]))
+        for g, own in enumerate(several):
+            for station in own:
+                for h, margin in station.margins.items():
+                    feasible[g, h] = (margin >= 0).any(axis=0)
         table, rows, gaps, first = np.full((n, n), -1), [], [], 0
         for pair in self._meetings:
             found = gaps_of(*pair)
@@ -247,6 +264,7 @@ class HoldingSearch:
         return Problem(
             order=np.argsort(-self._alone, axis=1, kind="stable"),
             alone=self._alone,
+            feasible=doubled(feasible),
             group=np.array([k for k, own in enumerate(several) for _ in own], dtype=np.int64),
             part=part,
             margins=np.array(margins).reshape(-1, values, lines, angles),

@@ -9,6 +9,9 @@ Sets of columns are words of bits. For a floor that the score must exceed, a pai
 the columns at which their gap exceeds it, and a group the turns at which the margins do; a hold is
 placed where all earlier ones allow it, and given up as soon as a later one has no place left.
 
+Where it was found that two arms cannot hold at their columns and a turn, whatever all others do, no
+placement is given that leaves a group no other turn.
+
 Where arms of a group share a torso they must have one value of it as well: they are a *station* of the
 group, with a set of turns for each value. The turns left to a group are those that each of its stations has
 at some value.
@@ -16,18 +19,26 @@ at some value.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik.vectors import STRICT
+from symgrasp.planners.column_sets import (
+    WORD,
+    copy_set,
+    doubled_words,
+    fill_above,
+    intersect,
+    take_first,
+    word_count,
+)
+from symgrasp.planners.ruled_out import RuledOut
 from symgrasp.poses import Array
 
-__all__ = ["Problem", "explore"]
-
-WORD = 64
-"""Bits of a word."""
+__all__ = ["Problem", "best_placement", "placements_of"]
 
 
 class Problem(NamedTuple):
@@ -36,6 +47,8 @@ class Problem(NamedTuple):
     Attributes:
         order: (n, L) the lines of each hold, most promising first.
         alone: (n, L) what a line reaches at most, whatever the others do; below 0 if infeasible.
+        feasible: (G, n, L, D) the columns, twice in a row, at which a hold is feasible in each of G groups;
+            all where it is not in it.
         group: (S,) group of each station, from 0 on; groups of a single hold have none.
         part: (n, S) where in ``margins`` a hold's margins in a station are, -1 if it is not in it.
         margins: (P, T, L, A) margins (m), below 0 where infeasible.
@@ -46,6 +59,7 @@ class Problem(NamedTuple):
 
     order: np.ndarray
     alone: Array
+    feasible: np.ndarray
     group: np.ndarray
     part: np.ndarray
     margins: Array
@@ -76,6 +90,7 @@ class _Memory(NamedTuple):
         columns: (n, W) the columns of that line still to be tried.
         allowed: (n, n, L, W) by depth: the columns that earlier holds allow the later ones.
         turns: (n + 1, S, T, W) by depth: the turns that they leave each station.
+        open: (n + 1, G, W) by depth: the turns at which a group is feasible and nothing is ruled out.
         left: (W,) scratch.
         reached: (n + 1,) by depth: what they reach.
         place: (n, 2) line and column of each hold.
@@ -86,27 +101,41 @@ class _Memory(NamedTuple):
     columns: np.ndarray
     allowed: np.ndarray
     turns: np.ndarray
+    open: np.ndarray
     left: np.ndarray
     reached: Array
     place: np.ndarray
 
 
-def explore(
-    problem: Problem, floor: float, ceiling: float, improve: bool, cells: np.ndarray
-) -> tuple[int, float]:
-    """Find placements whose score is above a floor and below a ceiling.
+def best_placement(
+    problem: Problem, ruled_out: RuledOut, floor: float, ceiling: float
+) -> tuple[np.ndarray, float] | None:
+    """Return the first of the best placements whose score is above a floor and below a ceiling.
 
     Args:
         problem: what is to be placed.
+        ruled_out: what was found to be impossible.
         floor: what the score must exceed.
         ceiling: what the score must stay below.
-        improve: raise the floor to each score that is found, so that the last is the best.
-        cells: (m, n, 2) receives lines and columns: the best, or the first m that are found.
 
     Returns:
-        How many were found (at most m, or 1 where the best is sought), and the last one's score.
+        Line and column of each hold (n, 2), and the score; None if there is no such placement.
     """
-    return _explore(problem, float(floor), float(ceiling), improve, cells, _new_memory(problem))
+    place = np.empty((len(problem.order), 2), dtype=np.int64)
+    memory = _new_memory(problem)
+    found, score, _ = _explore(problem, ruled_out.table, floor, ceiling, True, place, memory, 0)
+    return (place, score) if found else None
+
+
+def placements_of(problem: Problem, ruled_out: RuledOut, score: float) -> Iterator[np.ndarray]:
+    """Yield all placements (n, 2) of a score; what is ruled out meanwhile counts for those that follow."""
+    above, below = float(np.nextafter(score, -np.inf)), float(np.nextafter(score, np.inf))
+    memory, depth = _new_memory(problem), 0
+    while depth >= 0:
+        place = np.empty((len(problem.order), 2), dtype=np.int64)
+        found, _, depth = _explore(problem, ruled_out.table, above, below, False, place, memory, depth)
+        if found:
+            yield place
 
 
 def _new_memory(problem: Problem) -> _Memory:
@@ -114,8 +143,8 @@ def _new_memory(problem: Problem) -> _Memory:
     holds, lines = problem.order.shape
     angles, stations = problem.gaps.shape[1], problem.part.shape[1]
     parts, torsos = problem.margins.shape[:2]
-    words = (angles + WORD - 1) // WORD
-    count, double = parts * torsos * lines, 2 * words + 1
+    words = word_count(angles)
+    count, double = parts * torsos * lines, doubled_words(angles)
     all_columns = np.full(words, ~np.uint64(0))
     all_columns[-1] >>= np.uint64(WORD * words - angles)
     memory = _Memory(
@@ -129,6 +158,7 @@ def _new_memory(problem: Problem) -> _Memory:
         columns=np.zeros((holds, words), np.uint64),
         allowed=np.empty((holds, holds, lines, words), np.uint64),
         turns=np.empty((holds + 1, stations, torsos, words), np.uint64),
+        open=np.empty((holds + 1, len(problem.feasible), words), np.uint64),
         left=np.empty(words, np.uint64),
         reached=np.full(holds + 1, np.inf),
         place=np.zeros((holds, 2), np.int64),
@@ -136,19 +166,33 @@ def _new_memory(problem: Problem) -> _Memory:
     # Turning all of them changes nothing, so the first has column 0.
     memory.allowed[0, 0] = np.arange(words) == 0
     memory.allowed[0, 1:] = all_columns
-    memory.turns[0] = all_columns
+    memory.turns[0] = memory.open[0] = all_columns
     return memory
 
 
 @njit(**ENTRY)
-def _explore(problem, floor, ceiling, improve, cells, memory):
-    """Do what `explore` does, in memory that `_new_memory` returned."""
+def _explore(problem, ruled_out, floor, ceiling, improve, best, memory, depth):
+    """Find the first best placement, or the next one.
+
+    Args:
+        problem: what is to be placed.
+        ruled_out: see `Table`.
+        floor: what the score must exceed.
+        ceiling: what the score must stay below.
+        improve: raise the floor to each score that is found, so that the last is the first of the best.
+        best: (n, 2) receives line and column of each hold.
+        memory: that `_new_memory` returned, or that the search has written to up to the placement before.
+        depth: 0, or what it returned then.
+
+    Returns:
+        Whether a placement was found, its score, and the depth to go on from, -1 at the end.
+    """
     holds, lines = problem.order.shape
-    sets, at, columns, allowed, turns, left, reached, place = memory
-    made = 0
-    count, score, depth = 0, floor, 0
+    sets, at, columns, allowed, turns, opened, left, reached, place = memory
+    made, found, score = 0, False, floor
+    depth = _resume(problem, ruled_out, memory, depth)
     while depth >= 0:
-        column = _take_first(columns[depth])
+        column = take_first(columns[depth])
         if column < 0:
             at[depth] += 1
             line = problem.order[depth, min(at[depth], lines - 1)]
@@ -156,12 +200,14 @@ def _explore(problem, floor, ceiling, improve, cells, memory):
                 at[depth] = -1  # the lines that follow are no better
                 depth -= 1
             else:
-                _copy(allowed[depth, depth, line], columns[depth])
+                copy_set(allowed[depth, depth, line], columns[depth])
             continue
         line = problem.order[depth, at[depth]]
         place[depth, 0], place[depth, 1] = line, column
         here = min(reached[depth], problem.alone[depth, line], _gap(problem, place, depth))
         if here <= floor or not _turn(problem, sets, made, floor, place, depth, turns, left):
+            continue
+        if not _is_open(problem, ruled_out, place, depth, opened):
             continue
         if depth < holds - 1:
             reached[depth + 1] = here
@@ -171,19 +217,53 @@ def _explore(problem, floor, ceiling, improve, cells, memory):
         here = min(here, _together(problem, place, turns[holds], left))
         if not floor < here < ceiling:
             continue
-        score = here
+        found, score = True, here
         for d in range(holds):
-            cells[count, d, 0], cells[count, d, 1] = place[d, 0], place[d, 1]
-        if improve:
-            floor = here
-            made += 1
-            for d in range(holds):  # above the new floor fewer turns are left
-                _turn(problem, sets, made, floor, place, d, turns, left)
-        else:
-            count += 1
-            if count == len(cells):
-                break
-    return max(count, min(made, 1)), score
+            best[d, 0], best[d, 1] = place[d, 0], place[d, 1]
+        if not improve:
+            break
+        floor = here
+        made += 1
+        for d in range(holds):  # above the new floor fewer turns are left
+            _turn(problem, sets, made, floor, place, d, turns, left)
+    return found, score, depth
+
+
+@njit(**STRICT)
+def _resume(problem, ruled_out, memory, depth):
+    """Return the depth to go on from: that of the first hold that meanwhile leaves a group no turn."""
+    for d in range(depth):
+        if not _is_open(problem, ruled_out, memory.place, d, memory.open):
+            for later in range(d + 1, len(memory.at)):
+                memory.at[later] = -1
+                for w in range(memory.columns.shape[1]):
+                    memory.columns[later, w] = 0
+            return d
+    return depth
+
+
+@njit(**STRICT)
+def _is_open(problem, ruled_out, place, depth, opened):
+    """Leave each group the turns at which the hold is feasible too, and goes with those before it.
+
+    Returns:
+        Whether all groups have a turn left.
+    """
+    line, column = place[depth, 0], place[depth, 1]
+    angles = problem.gaps.shape[1]
+    for g in range(opened.shape[1]):
+        after = opened[depth + 1, g]
+        any_left = intersect(opened[depth, g], problem.feasible[g, depth, line], column, after)
+        for other in range(depth):
+            table = ruled_out.pair[g, other, depth]
+            if any_left and table >= 0:
+                apart = (column - place[other, 1]) % angles
+                row = ruled_out.row[table, place[other, 0], line, apart]
+                if row >= 0:
+                    any_left = intersect(after, ruled_out.left[row], place[other, 1], after)
+        if not any_left:
+            return False
+    return True
 
 
 @njit(**STRICT)
@@ -211,15 +291,15 @@ def _turn(problem, sets, made, floor, place, depth, turns, left):
         part = problem.part[depth, s]
         if part < 0:
             for t in range(torsos):
-                _copy(turns[depth, s, t], turns[depth + 1, s, t])
+                copy_set(turns[depth, s, t], turns[depth + 1, s, t])
             continue
         any_left = False
         for t in range(torsos):
             i = (part * torsos + t) * lines + line
             if sets.margins_made[i] != made:
-                _fill(sets.margins[i], problem.margins[part, t, line], floor)
+                fill_above(sets.margins[i], problem.margins[part, t, line], floor)
                 sets.margins_made[i] = made
-            any_left |= _meet(turns[depth, s, t], sets.margins[i], column, turns[depth + 1, s, t])
+            any_left |= intersect(turns[depth, s, t], sets.margins[i], column, turns[depth + 1, s, t])
         if not any_left:
             return False
     for s in range(len(problem.group)):
@@ -258,14 +338,14 @@ def _narrow(problem, sets, made, floor, place, depth, allowed):
                 break
             before, after = allowed[depth, other, line], allowed[depth + 1, other, line]
             if table < 0:
-                _copy(before, after)
+                copy_set(before, after)
                 any_left = True
                 continue
             i = problem.row[table, place[depth, 0], line]
             if sets.gaps_made[i] != made:
-                _fill(sets.gaps[i], problem.gaps[i], floor)
+                fill_above(sets.gaps[i], problem.gaps[i], floor)
                 sets.gaps_made[i] = made
-            any_left |= _meet(before, sets.gaps[i], (angles - place[depth, 1]) % angles, after)
+            any_left |= intersect(before, sets.gaps[i], (angles - place[depth, 1]) % angles, after)
         if not any_left:
             return False
     return True
@@ -280,14 +360,14 @@ def _together(problem, place, turns, left):
             continue
         best = -np.inf
         _turns_left(problem, turns, problem.group[s], left)
-        turn = _take_first(left)
+        turn = take_first(left)
         while turn >= 0:
             margin = np.inf
             for other in range(s, len(problem.group)):
                 if problem.group[other] == problem.group[s]:
                     margin = min(margin, _station_margin(problem, place, other, turn))
             best = max(best, margin)
-            turn = _take_first(left)
+            turn = take_first(left)
         worst = min(worst, best)
     return worst
 
@@ -305,52 +385,3 @@ def _station_margin(problem, place, station, turn):
                 margin = min(margin, problem.margins[part, t, place[d, 0], column])
         best = max(best, margin)
     return best
-
-
-@njit(**STRICT)
-def _copy(bits, out):
-    """Copy a set."""
-    for w in range(len(bits)):
-        out[w] = bits[w]
-
-
-@njit(**STRICT)
-def _fill(bits, values, floor):
-    """Write the set of columns whose value is above the floor, twice in a row."""
-    for w in range(len(bits)):
-        bits[w] = 0
-    angles = len(values)
-    for j in range(angles):
-        if values[j] > floor:
-            for k in (j, j + angles):
-                bits[k // WORD] |= np.uint64(1) << np.uint64(k % WORD)
-
-
-@njit(**STRICT)
-def _meet(own, other, first, both):
-    """Write what a set shares with another one read from column ``first``; tell whether it is anything."""
-    i, shift = first // WORD, np.uint64(first % WORD)
-    anything = False
-    for w in range(len(own)):
-        bits = other[i + w] >> shift
-        if shift:
-            bits |= other[i + w + 1] << (np.uint64(WORD) - shift)
-        both[w] = own[w] & bits
-        anything |= both[w] != 0
-    return anything
-
-
-@njit(**STRICT)
-def _take_first(bits):
-    """Take the first column out of a set and return it, or -1 if the set is empty."""
-    for w in range(len(bits)):
-        if bits[w]:
-            low = bits[w] & (~bits[w] + np.uint64(1))
-            bits[w] ^= low
-            place = 0
-            for step in (32, 16, 8, 4, 2, 1):
-                if low >> np.uint64(step):
-                    low >>= np.uint64(step)
-                    place += step
-            return WORD * w + place
-    return -1

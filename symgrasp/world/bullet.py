@@ -209,6 +209,33 @@ class BulletWorld:
                 found += [c for query in queries for c in self._collisions(query)]
         return _deepest(found)
 
+    def robot_collides(self, robot: str, arms: Sequence[Arm]) -> bool:
+        """Whether a robot collides with itself, the object or an obstacle.
+
+        Together with `robots_meet` for all pairs of robots, this says whether there are any `collisions`.
+
+        Args:
+            robot: its name; where none of the arms is its own, it is parked.
+            arms: all arms that hold the object, whose touch links may touch it.
+        """
+        touch = _touch_links(arms)
+        own = [query for arm in arms if arm.robot.name == robot for query in self._queries[arm.name]]
+        return any(
+            not _touches(c, touch)
+            for query in own or self._parked_queries[robot]
+            if query.reason != Reason.ROBOT_COLLISION
+            for c in self._collisions(query)
+        )
+
+    def robots_meet(self, a: str, b: str) -> bool:
+        """Whether two robots, given by name, collide with each other, measured from either."""
+        return any(
+            self._collisions(query)
+            for name, other in ((a, b), (b, a))
+            for query in self._parked_queries[name]
+            if query.reason == Reason.ROBOT_COLLISION and query.key == other
+        )
+
     def object_contacts(self, margin: float = 0.0) -> list[Collision]:
         """Return the obstacles that the object is inside of, or within a margin (m) of, deepest first."""
         found = [

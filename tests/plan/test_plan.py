@@ -166,22 +166,22 @@ def test_hill_climbing_and_the_exact_search():
 def test_arms_that_always_meet(monkeypatch):
     """Prints apart but bodies never: every combination is tried, and that is said."""
     scene = load_small("log_two_robots", 4, 4, 1)
-    monkeypatch.setattr(ConfigurationFinder, "are_free_together", lambda self, configurations: False)
+    monkeypatch.setattr(ConfigurationFinder, "conflict", lambda self, configurations: (0, 1))
     with pytest.raises(NoPlanError, match=r"no placement exists on this grid: .* the arms meet"):
         plan_bimanual(scene)
 
 
 def test_other_configurations_than_the_witnesses_are_tried(monkeypatch):
     scene = load_small("log_two_robots", 20, 24, 6)
-    together = ConfigurationFinder.are_free_together
+    conflict = ConfigurationFinder.conflict
     first = plan_bimanual(scene)
     refused = [[hold.joints[n] for n in hold.joints] for hold in first.tasks[0].holds]
 
     def refuse_the_witnesses(self, configurations):
         same = [np.array_equal(p.q, q) for p, q in zip(configurations, refused, strict=True)]
-        return not all(same) and together(self, configurations)
+        return (0, 1) if all(same) else conflict(self, configurations)
 
-    monkeypatch.setattr(ConfigurationFinder, "are_free_together", refuse_the_witnesses)
+    monkeypatch.setattr(ConfigurationFinder, "conflict", refuse_the_witnesses)
     second = plan_bimanual(scene)
     assert second.planner.statistics["placements"] == 1
     for a, b in zip(first.tasks[0].holds, second.tasks[0].holds, strict=True):

@@ -345,6 +345,9 @@ class Picky(ConfigurationFinder):
         free = np.random.default_rng([self.seed, *chain(*cells)]).random() < 0.05
         return [ArmConfiguration(arm, np.zeros(7), 0.0) for arm in self.arms] if free else None
 
+    def excluding(self, cells, torso):
+        return iter(())
+
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, 0.3, 1.0]))
 @settings(max_examples=60, deadline=None)
