@@ -22,6 +22,7 @@ def test_robots_one_by_one_and_in_pairs(holding):
             pose = np.array(scene.task().T_world_object)
             pose[:3, 3] += rng.normal(0, 0.3 if k % 2 else 0.02, 3)
             world.set_object(pose)
+            world.margin = float(rng.choice([0.0, 0.4]))
             anywhere = [rng.uniform(arm.lower, arm.upper) for arm in arms]
             near_home = [arm.home + rng.normal(0, 0.2, arm.dof) for arm in arms]
             values = anywhere if k % 3 else near_home
