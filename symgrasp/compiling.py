@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import multiprocessing
-import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,6 +25,8 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.typed_passes import NopythonTypeInference
 from numba.extending import register_jitable
+
+from symgrasp.caching import cache_folder
 
 __all__ = ["COMPILING_MESSAGE", "ENTRY", "SOURCES", "njit", "notify_on_compile"]
 
@@ -223,11 +223,4 @@ def _cache_dir(chosen: str) -> str:
     Args:
         chosen: the folder that the user chose through ``NUMBA_CACHE_DIR``, if any.
     """
-    package = Path(__file__).parent
-    base = Path(chosen) if chosen else package / "__pycache__"
-    if not chosen and not os.access(base if base.is_dir() else package, os.W_OK):
-        base = Path.home() / ".cache" / "symgrasp"
-    stamp = hashlib.sha256()
-    for path in sorted(path for pattern in SOURCES for path in package.glob(pattern)):
-        stamp.update(path.read_bytes())
-    return str(base / f"compiled-{stamp.hexdigest()[:16]}")
+    return str(cache_folder("compiled", SOURCES, chosen=chosen))

@@ -84,7 +84,8 @@ def test_changed_sources_are_compiled_anew(tmp_path):
     """A function in one file that calls one in another does not keep the old one."""
     package = tmp_path / "symgrasp"
     (package / "engine").mkdir(parents=True)
-    shutil.copy(ROOT / "compiling.py", package)
+    for name in ("compiling.py", "caching.py", "files.py"):
+        shutil.copy(ROOT / name, package)
     for name in ("__init__.py", "engine/__init__.py"):
         (package / name).touch()
     caller = "from symgrasp.compiling import njit\nfrom symgrasp.engine.inner import inner\n"

@@ -11,7 +11,8 @@ from docs.imports import MODULES, imported, room_of
 
 ROOMS = [
     "symgrasp.errors", "symgrasp.progress", "symgrasp.files", "symgrasp.references", "symgrasp.page",
-    "symgrasp.compiling", "symgrasp.poses", "symgrasp.meshes", "symgrasp.reason", "symgrasp.object",
+    "symgrasp.caching", "symgrasp.compiling", "symgrasp.poses", "symgrasp.meshes", "symgrasp.reason",
+    "symgrasp.object",
     "symgrasp.descriptions", "symgrasp.robot", "symgrasp.hands", "symgrasp.survey",
     "symgrasp.ik", "symgrasp.scene", "symgrasp.world", "symgrasp.engine", "symgrasp.feasibility",
     "symgrasp.plan", "symgrasp.planners", "symgrasp.motion", "symgrasp.bench",

@@ -29,7 +29,8 @@ class Place(NamedTuple):
 
 
 PLACES = {
-    "symgrasp.compiling": Place(0, 0), "symgrasp.poses": Place(2, 0), "symgrasp.files": Place(1, 0),
+    "symgrasp.compiling": Place(0, 1.5), "symgrasp.caching": Place(0.5, 0.75), "symgrasp.poses": Place(2, 0),
+    "symgrasp.files": Place(1, 0),
     "symgrasp.errors": Place(4, 0), "symgrasp.progress": Place(6, 0), "symgrasp.meshes": Place(4.5, 1.15),
     "symgrasp.page": Place(5, 0.45), "symgrasp.references": Place(3, 0.75),
     "symgrasp.descriptions": Place(3, 1.55),

@@ -24,6 +24,9 @@ def balance_of(arm: Arm, joints: list[Joint], openings: Array) -> Balance:
         openings: (rows,) opening (m) of the hand at each row of the grid.
     """
     model, robot = arm.robot.model, arm.robot
+    between, hand = np.zeros((arm.dof, 4)), np.zeros((len(openings), 4))
+    if robot.support is None:  # then no weight matters
+        return Balance(support_edges(robot), np.zeros(4), between, hand, np.zeros((len(openings), 4)))
     mass, centre = model.masses()
     names = [joint.name for joint in joints]
     last = np.array(
@@ -34,19 +37,20 @@ def balance_of(arm: Arm, joints: list[Joint], openings: Array) -> Balance:
     )
     zero = model.forward(arm.robot_values(np.zeros(arm.dof)))
     points = _points(zero, centre)
-    between = np.zeros((arm.dof, 4))
     for k, joint in enumerate(joints[:-1]):
         frame = zero[joint.child]
         own = (points[last == k] - frame[:3, 3]) @ frame[:3, :3]
         between[k] = _weight(mass[last == k], own)
     world = points @ robot.T_world_base[:3, :3].T + robot.T_world_base[:3, 3]
-    hand = np.zeros((len(openings), 4))
     held = last == arm.dof - 1
-    for row, opening in enumerate(openings):
-        poses = model.forward(arm.robot_values(arm.home, float(opening)))
+    different, kind = np.unique(openings, return_inverse=True)
+    values = np.array([arm.robot_values(arm.home, float(opening)) for opening in different])
+    weights = np.zeros((len(different), 4))
+    for k, poses in enumerate(model.forward(values)):
         tool = poses[model.link_index(arm.tool)]
         own = (_points(poses, centre)[held] - tool[:3, 3]) @ tool[:3, :3]
-        hand[row] = _weight(mass[held], own)
+        weights[k] = _weight(mass[held], own)
+    hand = weights[kind]
     fixed = _weight(mass[last < 0], world[last < 0])
     return Balance(support_edges(robot), fixed, between, hand, np.zeros((len(openings), 4)))
 

@@ -12,6 +12,7 @@ the joints between two pieces drop out, so of up to three only one is left to be
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -97,22 +98,25 @@ def _furthest(
 
 def _core_part(part: _Part, axis: Array, pose: Array) -> _Part | None:
     """Return the core of a part about the z axis of a frame (4, 4), to be carried at another pose."""
-    T = inverse(axis) @ part.pose
-    inside = core(part.piece.vertices @ T[:3, :3].T + T[:3, 3], part.piece.rounding)
+    inside = core(part.piece.vertices, part.piece.rounding, inverse(axis) @ part.pose)
     return None if inside is None else _Part(inside, pose)
 
 
-def core(vertices: Array, rounding: float = 0.0) -> Piece | None:
+def core(vertices: Array, rounding: float = 0.0, pose: Array | None = None) -> Piece | None:
     """Return a solid of revolution about z inside a piece, or None if the axis misses the piece.
 
     Args:
         vertices: (n, 3) vertices of the piece.
         rounding: radius (m) of the ball that the piece is enlarged by.
+        pose: (4, 4) of the piece, in the frame of the z axis.
     """
-    try:
-        planes = np.unique(ConvexHull(vertices).equations, axis=0)
-    except QhullError:  # the vertices lie in a plane
+    planes = _planes(np.ascontiguousarray(vertices).tobytes())
+    if planes is None:
         return None
+    if pose is not None:
+        vertices = vertices @ pose[:3, :3].T + pose[:3, 3]
+        normals = planes[:, :3] @ pose[:3, :3].T
+        planes = np.column_stack([normals, planes[:, 3] - normals @ pose[:3, 3]])
     across, along, offset = np.hypot(planes[:, 0], planes[:, 1]), planes[:, 2], planes[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
         heights = -offset / along
@@ -126,6 +130,18 @@ def core(vertices: Array, rounding: float = 0.0) -> Piece | None:
     # The radius is concave in h, so the chords between the levels lie inside.
     radius = ((-offset[steep] - np.outer(h, along[steep])) / across[steep]).min(axis=1).clip(min=0.0)
     return Piece(np.column_stack([radius, np.zeros(LEVELS), h]), rounding, revolved=True)
+
+
+@lru_cache(maxsize=1024)
+def _planes(vertices: bytes) -> Array | None:
+    """Return the planes (., 4) of the convex hull of vertices, None where they lie in a plane.
+
+    Links look the same in every engine, and around all of their axes.
+    """
+    try:
+        return np.unique(ConvexHull(np.frombuffer(vertices).reshape(-1, 3)).equations, axis=0)
+    except QhullError:
+        return None
 
 
 def _sweep(moving: MovingPieces, limits: Array, near: _Part, far: _Part, joint: int, most: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
@@ -128,8 +129,9 @@ class MapMaker:
         known = self._engines.get((arm.name, torso))
         if known and not np.array_equal(known.manifold.h, grid.h):
             known = None
-        if known is None and ExactEngine.knows(arm):
-            known = ExactEngine(self.world, arm, grid)
+        if known is None:
+            with suppress(NotImplementedError):
+                known = ExactEngine(self.world, arm, grid)
         self._engines[arm.name, torso] = known
         return known
 

@@ -38,7 +38,11 @@ def joint_to_lock(arm: Arm) -> int | None:
         UrdfError: no inverse kinematics is known, whichever joint is locked.
     """
     choices = [None] if arm.dof == 6 else list(PITCHED_PREFERENCE if arm.pitched else LOCK_PREFERENCE)
-    kinds = [_kind(arm, joint) for joint in choices]
+    kinds: list[int] = []
+    for joint in choices:
+        kinds.append(_kind(arm, joint))
+        if kinds[-1] == CLOSED_FORM:
+            break
     if min(kinds) == UNKNOWN:
         raise UrdfError(
             arm.robot.model.path,

@@ -78,16 +78,15 @@ class PrintGaps:
 
     def _lines_of(self, a: int) -> tuple[np.ndarray, list[_Line]]:
         """Return which kind each line is (L,), and the kinds: lines that differ by their height alone."""
-        known: dict[tuple, int] = {}
+        known: dict[tuple[int, float], int] = {}
         kinds, ids = [], []
         for roll, row in np.ndindex(len(ROLLS), self.grid.heights):
-            p = self.arms[a].handprint(self.grid, row, roll)
             radius = float(self.grid.profile.radius(self.grid.h[row]))
-            key = (roll, radius, p.first_row - row, p.cells.shape, p.cells.tobytes())
-            if key not in known:
-                known[key] = len(kinds)
+            if (roll, radius) not in known:
+                known[roll, radius] = len(kinds)
+                p = self.arms[a].handprint(self.grid, row, roll)
                 kinds.append(_Line(roll, radius, p.first_row - row, p.cells))
-            ids.append(known[key])
+            ids.append(known[roll, radius])
         return np.array(ids), kinds
 
     def _pairs_of(self, a: int, b: int) -> tuple[np.ndarray, np.ndarray]:

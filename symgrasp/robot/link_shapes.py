@@ -11,6 +11,7 @@ import trimesh
 import yourdfpy
 from scipy.spatial import ConvexHull, QhullError
 
+from symgrasp.caching import kept
 from symgrasp.errors import MeshError, UrdfError
 from symgrasp.files import file_sha256
 from symgrasp.meshes import check_size, joined, read_groups, read_mesh
@@ -167,6 +168,18 @@ def collision_hulls(shape: CollisionShape, field: str) -> tuple[Array, ...]:
 @lru_cache(maxsize=1024)
 def _mesh_hulls(path: Path, sha256: str, size: tuple[float, ...], field: str) -> tuple[Array, ...]:
     """Return the vertices (n, 3) of the convex hulls of a mesh, scaled; the SHA-256 tells if it changed."""
+
+    def compute() -> tuple[Array, ...]:
+        hulls = _computed_hulls(path, size, field)
+        if file_sha256(path) != sha256:
+            raise MeshError(path, field, "changed since the robot was loaded", "a file that stays as it is")
+        return hulls
+
+    return kept(("hulls", sha256, path.suffix.lower(), size), compute)
+
+
+def _computed_hulls(path: Path, size: tuple[float, ...], field: str) -> tuple[Array, ...]:
+    """Return the vertices (n, 3) of the convex hulls of a mesh, scaled."""
     groups = [_scaled(group, size) for group in read_groups(path, field)]
     whole = joined(groups)
     check_size(path, field, whole, SIZES, float(np.abs(size).max()))

@@ -27,7 +27,7 @@ from symgrasp.world.collision import Collision
 from symgrasp.world.hand_pairs import always_in_hands
 from symgrasp.world.opening import open_world
 
-__all__ = ["check_homes", "with_free_homes"]
+__all__ = ["check_homes", "free_homes", "home_notes", "with_free_homes"]
 
 MOST_MOVES = 1000
 """Most random moves that are tried for a robot."""
@@ -48,16 +48,24 @@ def with_free_homes(scene: Scene) -> Scene:
     Raises:
         UrdfError, MeshError, SceneError: PyBullet cannot make a shape of the scene.
     """
-    entries = [entry for entry in scene.file.robots if _open_joints(scene, scene.robots[entry.name])]
-    if not entries:
+    if not any(_open_joints(scene, robot) for robot in scene.robots.values()):
         return scene
-    found: dict[str, _Home] = {}
     with open_world(scene) as world:
-        for entry in entries:
-            home = _Search(world, scene.robots[entry.name]).run()
-            if home:
-                found[entry.name] = home
-                world.set_robot(entry.name, home.values)
+        return free_homes(world)
+
+
+def free_homes(world: BulletWorld) -> Scene:
+    """Return what `with_free_homes` does for the scene of a world: the same one if it has free homes.
+
+    Where others were found, the world has the robots there.
+    """
+    scene, found = world.scene, dict[str, _Home]()
+    for entry in scene.file.robots:
+        robot = scene.robots[entry.name]
+        home = _Search(world, robot).run() if _open_joints(scene, robot) else None
+        if home:
+            found[entry.name] = home
+            world.set_robot(entry.name, home.values)
     if not found:
         return scene
     content = scene.file.model_dump(mode="json", exclude_none=True)
@@ -82,22 +90,27 @@ def check_homes(scene: Scene) -> tuple[str, ...]:
         SceneError: a pair of bodies collides whatever an arm does; the text names both, and what helps.
         UrdfError, MeshError: PyBullet cannot make a shape of the scene.
     """
-    notes: list[str] = []
     with open_world(scene) as world:
-        for i, robot in enumerate(scene.robots.values()):
-            arms = [arm for arm in scene.arms.values() if arm.robot is robot]
-            for (a, b), hand in always_in_hands(scene, robot.name):
-                text = f"{a} and {b} overlap at every opening of hand {hand}, and may touch"
-                notes.append(f"{robot.name}: {text}")
-            for c in _at_home(world.arm_collisions(arms[0])):
-                text = f"{c.a} and {c.b} are too close by {1e3 * c.depth:.1f} mm"
-                for arm in arms:
-                    if not _moves_apart(arm, c):
-                        expected = f"values at which {arm.name} is not barred from every grasp"
-                        if c.reason == Reason.SELF_COLLISION:
-                            expected += "; where it is no collision, disable_collisions in the SRDF"
-                        raise SceneError(scene.source, f"robots[{i}].home", text, expected)
-                notes.append(f"{robot.name}: at home, {text}")
+        return home_notes(world)
+
+
+def home_notes(world: BulletWorld) -> tuple[str, ...]:
+    """Check and return what `check_homes` does, in a world with robots at home."""
+    scene, notes = world.scene, list[str]()
+    for i, robot in enumerate(scene.robots.values()):
+        arms = [arm for arm in scene.arms.values() if arm.robot is robot]
+        for (a, b), hand in always_in_hands(scene, robot.name):
+            text = f"{a} and {b} overlap at every opening of hand {hand}, and may touch"
+            notes.append(f"{robot.name}: {text}")
+        for c in _at_home(world.arm_collisions(arms[0])):
+            text = f"{c.a} and {c.b} are too close by {1e3 * c.depth:.1f} mm"
+            for arm in arms:
+                if not _moves_apart(arm, c):
+                    expected = f"values at which {arm.name} is not barred from every grasp"
+                    if c.reason == Reason.SELF_COLLISION:
+                        expected += "; where it is no collision, disable_collisions in the SRDF"
+                    raise SceneError(scene.source, f"robots[{i}].home", text, expected)
+            notes.append(f"{robot.name}: at home, {text}")
     return tuple(notes)
 
 

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from symgrasp.caching import kept
 from symgrasp.poses import Array
 from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import link_names, load_urdf, pybullet
@@ -15,6 +16,9 @@ __all__ = ["checked_self_pairs"]
 
 SELF_SAMPLES = 2000
 """Number of random configurations that show which pairs of links always or never collide."""
+
+FIRST, PART = 16, 256
+"""Number of samples that are looked at first, which decide most pairs, and in each part after them."""
 
 NEVER_GAP = 0.02
 """Pairs that come closer than this (m) in some sample are checked, even if they collide in none."""
@@ -29,20 +33,22 @@ def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
 
     Left out are adjacent links, pairs that the SRDF lets touch, pairs that overlap in all of
     `SELF_SAMPLES` random configurations (a flange and the hand on it), and pairs that stay further apart
-    than `NEVER_GAP` in all of them.
+    than `NEVER_GAP` in all of them. They are kept on the disk: for a hand of many links it takes seconds.
     """
-    links = tuple(link for link in model.colliding_links() if model.hulls(link))
-    adjacent = model.neighbours() | model.allowed_pairs()
-    pairs = [
-        (a, b)
-        for a, b in combinations(range(len(links)), 2)
-        if frozenset((links[a], links[b])) not in adjacent
-    ]
+    (found,) = kept(("self pairs", model.sha256), lambda: (_sampled_pairs(model),))
+    return tuple((model.link_names[a], model.link_names[b]) for a, b in found.tolist())
+
+
+def _sampled_pairs(model: RobotModel) -> np.ndarray:
+    """Return the pairs (., 2) of `checked_self_pairs`, by the indices of the links."""
+    links = [link for link in model.colliding_links() if model.hulls(link)]
+    left_out = model.neighbours() | model.allowed_pairs()
+    names = [pair for pair in combinations(links, 2) if frozenset(pair) not in left_out]
+    pairs = np.array([[model.link_index(link) for link in pair] for pair in names], dtype=int).reshape(-1, 2)
     lower = np.where(np.isfinite(model.lower), model.lower, -np.pi)
     upper = np.where(np.isfinite(model.upper), model.upper, np.pi)
     samples = np.random.default_rng(0).uniform(lower, upper, (SELF_SAMPLES, len(lower)))
-    close = _boxes_close(model, links, np.array(pairs, dtype=int).reshape(-1, 2), samples)
-    near, always = np.zeros(len(pairs), dtype=bool), np.asarray(close.all(axis=0))
+    near, always = np.zeros(len(pairs), dtype=bool), np.ones(len(pairs), dtype=bool)
     client = pybullet.connect(pybullet.DIRECT)
     try:
         body = load_urdf(client, model, np.eye(4))
@@ -52,58 +58,62 @@ def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
             for j in model.joints
             if j.source >= 0 and (link := model.link_names[j.child]) in index
         ]
-        for q, asked in zip(samples, close, strict=True):
-            open_pairs = np.flatnonzero(asked & ~(near & ~always))
-            if not len(open_pairs):
-                continue
-            pybullet.resetJointStatesMultiDof(
-                body,
-                [j for j, _ in moving],
-                [[j.ratio * q[j.source] + j.offset] for _, j in moving],
-                physicsClientId=client,
-            )
-            for k in open_pairs:
-                a, b = pairs[k]
-                points = pybullet.getClosestPoints(
-                    body, body, NEVER_GAP, index[links[a]], index[links[b]], physicsClientId=client
+        for part in np.split(samples, [FIRST, *range(FIRST + PART, SELF_SAMPLES, PART)]):
+            undecided = np.flatnonzero(~near | always)
+            close = _boxes_close(model, pairs[undecided], part)
+            always[undecided] &= close.all(axis=0)
+            for q, row in zip(part, close, strict=True):
+                asked = undecided[row]
+                asked = asked[~near[asked] | always[asked]]
+                if not len(asked):
+                    continue
+                pybullet.resetJointStatesMultiDof(
+                    body,
+                    [j for j, _ in moving],
+                    [[j.ratio * q[j.source] + j.offset] for _, j in moving],
+                    physicsClientId=client,
                 )
-                near[k] |= bool(points)
-                always[k] &= any(p[8] < 0 for p in points)
+                for k in asked.tolist():
+                    a, b = names[k]
+                    points = pybullet.getClosestPoints(
+                        body, body, NEVER_GAP, index[a], index[b], physicsClientId=client
+                    )
+                    near[k] |= bool(points)
+                    always[k] &= any(p[8] < 0 for p in points)
     finally:
         pybullet.disconnect(client)
-    return tuple(
-        (links[a], links[b]) for (a, b), checked in zip(pairs, near & ~always, strict=True) if checked
-    )
+    return pairs[near & ~always]
 
 
-def _boxes_close(model: RobotModel, links: tuple[str, ...], pairs: np.ndarray, samples: Array) -> np.ndarray:
+def _boxes_close(model: RobotModel, pairs: np.ndarray, samples: Array) -> np.ndarray:
     """Return which pairs of links may be within `NEVER_GAP` of each other, by their bounding boxes.
 
     Args:
         model: the robot.
-        links: its links with shapes.
         pairs: (P, 2) indices of links.
         samples: (S, n) joint values.
 
     Returns:
         (S, P) bool; false where they are further apart for certain.
     """
-    low = np.array([np.min([hull.min(axis=0) for hull in model.hulls(link)], axis=0) for link in links])
-    high = np.array([np.max([hull.max(axis=0) for hull in model.hulls(link)], axis=0) for link in links])
+    used, index = np.unique(pairs, return_inverse=True)
+    a, b = index.reshape(-1, 2).T
+    points = [np.concatenate(model.hulls(model.link_names[link])) for link in used]
+    low, high = (np.array([end(p, axis=0) for p in points]).reshape(-1, 3) for end in (np.min, np.max))
     middle, half = 0.5 * (low + high), 0.5 * (high - low) + BOX_SLACK
-    poses = model.forward(samples)[:, [model.link_index(link) for link in links]]
+    poses = model.forward(samples)[:, used]
     turn = poses[..., :3, :3]
-    centre = np.einsum("slij,lj->sli", turn, middle) + poses[..., :3, 3]
-    reach = np.einsum("slij,lj->sli", np.abs(turn), half)
-    a, b = pairs.T
-    close = np.zeros((len(samples), len(pairs)), dtype=bool)
-    for row, R, c, r in zip(close, turn, centre, reach, strict=True):
-        k = np.flatnonzero((np.abs(c[a] - c[b]) - r[a] - r[b] <= NEVER_GAP).all(axis=1))
-        # Along the axes of each box the other one reaches as far as its half extents, turned.
-        for first, second in ((a, b), (b, a)):
-            i, j = first[k], second[k]
-            apart = np.einsum("kji,kj->ki", R[i], c[j] - c[i])
-            other = np.einsum("kil,kl->ki", np.abs(np.einsum("kji,kjl->kil", R[i], R[j])), half[j])
-            k = k[(np.abs(apart) - half[i] - other <= NEVER_GAP).all(axis=1)]
-        row[k] = True
+    centre = (turn @ middle[..., None])[..., 0] + poses[..., :3, 3]
+    reach = (np.abs(turn) @ half[..., None])[..., 0] + 0.5 * NEVER_GAP
+    close = np.ones((len(samples), len(pairs)), dtype=bool)
+    for c, r in zip(np.moveaxis(centre, -1, 0), np.moveaxis(reach, -1, 0), strict=True):
+        close &= np.abs(c[:, a] - c[:, b]) <= r[:, a] + r[:, b]
+    # Along the axes of each box the other one reaches as far as its half extents, turned.
+    for first, second in ((a, b), (b, a)):
+        s, k = np.nonzero(close)
+        i, j = first[k], second[k]
+        into = np.swapaxes(turn[s, i], -1, -2)
+        apart = np.abs(into @ (centre[s, j] - centre[s, i])[..., None])[..., 0]
+        other = (np.abs(into @ turn[s, j]) @ half[j][..., None])[..., 0]
+        close[s, k] = (apart <= half[i] + other + NEVER_GAP).all(axis=-1)
     return close

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from symgrasp.errors import SceneError
 from symgrasp.scene.scene import Scene
-from symgrasp.world.home import check_homes, with_free_homes
+from symgrasp.world.bullet import BulletWorld
+from symgrasp.world.home import free_homes, home_notes
 from symgrasp.world.opening import open_world
 
 __all__ = ["RESTING_DEPTH", "check_tasks", "prepared"]
@@ -22,9 +23,17 @@ def prepared(scene: Scene) -> Scene:
         SceneError: see `check_tasks` and `symgrasp.world.home.check_homes`.
         UrdfError, MeshError: PyBullet cannot make a shape of the scene.
     """
-    scene = with_free_homes(scene)
-    check_tasks(scene)
-    return replace(scene, notes=(*scene.notes, *check_homes(scene)))
+    with open_world(scene) as world:
+        found = free_homes(world)
+        if found is scene:
+            return _checked(world)
+    with open_world(found) as world:
+        return _checked(world)
+
+
+def _checked(world: BulletWorld) -> Scene:
+    _check_tasks(world)
+    return replace(world.scene, notes=(*world.scene.notes, *home_notes(world)))
 
 
 def check_tasks(scene: Scene) -> None:
@@ -36,15 +45,21 @@ def check_tasks(scene: Scene) -> None:
         SceneError: it is inside one; the text names both bodies and the depth.
     """
     with open_world(scene) as world:
-        for i, task in enumerate(scene.tasks.values()):
-            world.set_object(task.T_world_object)
-            holders = [scene.arm(name).robot.name for name in task.arms]
-            contacts = [*world.object_contacts(), *world.object_in_robots(holders)]
-            for c in sorted(contacts, key=lambda c: -c.depth)[:1]:
-                if c.depth > RESTING_DEPTH:
-                    raise SceneError(
-                        scene.source,
-                        f"tasks[{i}].pose",
-                        task.name,
-                        f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
-                    )
+        _check_tasks(world)
+
+
+def _check_tasks(world: BulletWorld) -> None:
+    scene = world.scene
+    for i, task in enumerate(scene.tasks.values()):
+        world.set_object(task.T_world_object)
+        holders = [scene.arm(name).robot.name for name in task.arms]
+        contacts = [*world.object_contacts(), *world.object_in_robots(holders)]
+        for c in sorted(contacts, key=lambda c: -c.depth)[:1]:
+            if c.depth > RESTING_DEPTH:
+                raise SceneError(
+                    scene.source,
+                    f"tasks[{i}].pose",
+                    task.name,
+                    f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
+                )
+    world.set_object(scene.task().T_world_object)
