@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench robots
+.PHONY: app test figures schemas bench robots grids
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -41,3 +41,6 @@ bench: $(VENV)/dev.stamp  ## measure, and write the README's table of times (min
 robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write the table of docs/robots.md (minutes)
 	$(BIN)/symgrasp bench robots --out docs/robots.json
 	$(BIN)/python -m docs.robots
+
+grids: $(VENV)/dev.stamp  ## measure coarse and fine grids of every shipped scene, and write docs/grids.md (minutes)
+	$(BIN)/python -m docs.grids

@@ -35,7 +35,7 @@ PLAIN = [name for name, path in shipped_scenes().items() if extra_of(path) is No
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add what `tests/fuzz` tries."""
     group = parser.getgroup("fuzz", "damaged input, see tests/fuzz")
-    group.addoption("--fuzz-cases", type=int, default=150, help="number of cases of each kind of input")
+    group.addoption("--fuzz-cases", type=int, default=50, help="number of cases of each kind of input")
     group.addoption("--fuzz-first", type=int, default=0, help="number of the first case")
     group.addoption("--fuzz-seed", type=int, default=0, help="seed of all cases")
 

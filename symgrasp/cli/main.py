@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from symgrasp.cli import app, bench, explain, export, hand, plan, robot, robots, scenes, schema, verify
+from symgrasp.cli import app, bench, explain, export, grid, hand, plan, robot, robots, scenes, schema, verify
 from symgrasp.cli import map as map_
 from symgrasp.cli import object as object_
 from symgrasp.cli.shared import LONGEST_LINE, warn
@@ -16,7 +16,22 @@ from symgrasp.errors import NoPlanError, SymgraspError, printable, shortened
 
 __all__ = ["main"]
 
-COMMANDS = (app, scenes, map_, explain, plan, verify, object_, hand, robot, robots, export, bench, schema)
+COMMANDS = (
+    app,
+    scenes,
+    map_,
+    explain,
+    grid,
+    plan,
+    verify,
+    object_,
+    hand,
+    robot,
+    robots,
+    export,
+    bench,
+    schema,
+)
 """The modules of the commands, in the order in which ``--help`` lists them."""
 
 

@@ -18,7 +18,7 @@ from symgrasp.reason import Reason
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_map", "draw_object", "draw_openings", "to_png", "to_svg"]
+__all__ = ["draw_errors", "draw_map", "draw_object", "draw_openings", "to_png", "to_svg"]
 
 
 def draw_map(
@@ -68,6 +68,33 @@ def draw_map(
     ]
     figure.legend(handles=patches, loc="outside right center", frameon=False)
     figure.suptitle(_plain(title))
+    return figure
+
+
+def draw_errors(
+    sizes: Sequence[tuple[int, int]], missed: Sequence[float], overstated: Sequence[float], title: str
+) -> Figure:
+    """Draw over the number of cells what maps get wrong.
+
+    Args:
+        sizes: heights and angles of n grids, in order of their cells.
+        missed: (n,) feasible area that is called infeasible (% of the feasible area).
+        overstated: (n,) infeasible area that is called feasible (% of the feasible area).
+        title: text above the picture.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    axes = figure.subplots()
+    cells = [heights * angles for heights, angles in sizes]
+    axes.plot(cells, np.add(missed, overstated), "k-o", label="all that is wrong")
+    axes.plot(cells, missed, "-s", color="#0072b2", label="feasible, called infeasible")
+    axes.plot(cells, overstated, "-^", color="#d55e00", label="infeasible, called feasible")
+    axes.set(xscale="log", ylim=(0, None), ylabel="% of the feasible area", title=_plain(title))
+    axes.set_xticks(cells, [f"{heights} × {angles}" for heights, angles in sizes])
+    axes.set_xlabel("cells along × around the object")
+    axes.minorticks_off()
+    axes.legend(frameon=False)
     return figure
 
 

@@ -29,7 +29,7 @@ class Hands:
     """
 
     def __init__(self, a: Sequence[Array], b: Sequence[Array]) -> None:
-        self._pieces = tuple(pack([Piece(_shrunk(points)) for points in (*a, *b)]))
+        self._pieces = pack([Piece(_shrunk(points)) for points in (*a, *b)])
         self._counts = len(a), len(b)
 
     def meet(self, T_a: Array, T_b: Array, asked: np.ndarray) -> np.ndarray:
