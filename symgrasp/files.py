@@ -1,9 +1,10 @@
-"""Files: parsing YAML, and writing atomically."""
+"""Files: parsing YAML and JSON, and writing atomically."""
 
 from __future__ import annotations
 
 import fcntl
 import hashlib
+import json
 import os
 import shutil
 import tempfile
@@ -26,6 +27,7 @@ __all__ = [
     "TEMPORARY",
     "check_size",
     "file_sha256",
+    "parse_json",
     "parse_yaml",
     "read_file",
     "temporary_folder",
@@ -106,6 +108,29 @@ def check_size(content: str | bytes, largest: int) -> None:
     """Raise ValueError if the content of a file has more than so many bytes or characters."""
     if len(content) > largest:
         raise ValueError(f"more than {largest / 1e6:g} MB")
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Parse a JSON document.
+
+    Raises:
+        ValueError: it is not one, has a key twice in one object, or a number that JSON does not have.
+        RecursionError: it is nested too deeply.
+    """
+    return json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant)
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twice!r} twice")
+    return found
+
+
+def _no_constant(name: str) -> Any:
+    raise ValueError(f"the number {name}")
 
 
 def parse_yaml(text: str) -> Any:

@@ -9,7 +9,6 @@ from html import escape
 from symgrasp.errors import printable
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan
-from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
 from ..compute.plan_service import plan_result
@@ -39,7 +38,7 @@ def map_document(m: FeasibilityMap, scene: Scene) -> str:
     """
     grid = m.manifold
     scene = scene.with_settings(heights=grid.heights, angles=grid.angles)
-    scene = scene.with_task(Task(m.task, scene.task(m.task).arms, m.T_world_object))
+    scene = scene.with_task(replace(scene.task(m.task), T_world_object=m.T_world_object))
     state = changes.choose_arm(changes.choose_task(State.of(scene, scene.name), m.task), m.arm)
     return _drawn(replace(state, result=MapResult(state.request, m)))
 

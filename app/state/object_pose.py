@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from symgrasp.poses import Array, axis_frame, rotation_z, spin
-from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
 __all__ = ["ObjectPose", "with_poses"]
@@ -53,5 +52,5 @@ class ObjectPose:
 def with_poses(scene: Scene, poses: Mapping[str, ObjectPose]) -> Scene:
     """Return the scene with some of its tasks at other poses: task → pose."""
     for name, pose in poses.items():
-        scene = scene.with_task(Task(name, scene.task(name).arms, pose.matrix()))
+        scene = scene.with_task(replace(scene.task(name), T_world_object=pose.matrix()))
     return scene

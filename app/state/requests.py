@@ -79,7 +79,7 @@ class MapRequest:
 
     def moved_task(self) -> Task:
         """Return the task, moved to the pose."""
-        return Task(self.task, self.scene.task(self.task).arms, self.T_world_object)
+        return replace(self.scene.task(self.task), T_world_object=self.T_world_object)
 
     def moved_scene(self) -> Scene:
         """Return the scene with the task moved to the pose."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 from symgrasp.errors import InputError, SceneError
@@ -85,8 +86,7 @@ class TaskList(NamedTuple):
         if name == self.task:
             return self
         tasks = [
-            Task(name, task.arms, task.T_world_object) if task.name == self.task else task
-            for task in self.scene.tasks.values()
+            replace(task, name=name) if task.name == self.task else task for task in self.scene.tasks.values()
         ]
         poses = {name if old == self.task else old: pose for old, pose in self.poses.items()}
         try:

@@ -21,6 +21,7 @@ from symgrasp.cli.shared import (
     whole,
 )
 from symgrasp.errors import InputError, one_of
+from symgrasp.plan.algorithms import ALGORITHMS
 
 if TYPE_CHECKING:
     from symgrasp.plan.plan import Plan
@@ -29,25 +30,18 @@ if TYPE_CHECKING:
 
 __all__ = ["add_parser", "run"]
 
-METHODS = {
-    "sequential": ("best", "first", "regrasp"),
-    "bimanual": ("exact", "hill_climb"),
-    "handover": ("exact",),
-}
-"""Kind of plan → the methods of its planner, the default first."""
-
 
 def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "plan", run, "Plan grasps: write a plan as JSON, or list all there are.")
-    command.add_argument("kind", choices=tuple(METHODS), help="which planner")
+    command.add_argument("kind", choices=tuple(ALGORITHMS), help="which planner")
     add_scene(command)
     add_out(command, "the plan file to write")
     command.add_argument("--list", metavar="N", type=whole(1), help="list the N best plans, one a line")
     text = "write the K-th best plan (default: 1), as numbered by --list"
     command.add_argument("--number", metavar="K", type=whole(1), default=1, help=text)
     command.add_argument("--arm", metavar="NAME", help="sequential: the arm (default: the first task's)")
-    text = "; ".join(f"{kind}: {', '.join(methods)}" for kind, methods in METHODS.items())
+    text = "; ".join(f"{kind}: {', '.join(methods)}" for kind, methods in ALGORITHMS.items())
     command.add_argument("--method", metavar="METHOD", help=f"{text}; the first is the default")
     command.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
     command.add_argument("--seed", type=whole(0), default=0, help="hill_climb: seed (default: %(default)s)")
@@ -59,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     method = _method(args)
     scene = checked_scene(args.scene)
     with progress_of(f"{args.kind} plan") as progress:
-        if method == METHODS[args.kind][0]:
+        if method == ALGORITHMS[args.kind][0]:
             plan = _listed(args, scene, progress)
         else:
             plan = _by_other_method(args, scene, method, progress)
@@ -78,7 +72,7 @@ def _method(args: argparse.Namespace) -> Any:
     """
     if not args.out and not args.list:
         raise InputError("command line", "--out", None, "the plan file to write, or --list")
-    methods = METHODS[args.kind]
+    methods = ALGORITHMS[args.kind]
     method = args.method or methods[0]
     if method not in methods:
         raise InputError("command line", "--method", method, one_of(methods, method))
@@ -131,7 +125,10 @@ def _print_holds(plan: Plan) -> None:
     """Print how the object is turned and held in every task."""
     from symgrasp.plan.listing import place_in_words
 
+    unsupported = {task["name"] for task in plan.scene.content["tasks"] if task.get("supported") is False}
     for task in plan.tasks:
         say(f"{task.name}: turn the object by {math.degrees(task.delta):.1f}°")
+        if task.name in unsupported:
+            say("  nothing holds the object up but the hands (supported: false)")
         for hold in task.holds:
             say(f"  {hold.arm} holds at {place_in_words(hold.grasp)}, {1e3 * hold.clearance:.1f} mm clear")

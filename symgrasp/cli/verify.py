@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from symgrasp.cli.shared import Commands, add_command, add_plan, progress_of, say
+from symgrasp.cli.shared import Commands, add_command, add_plan, checked_scene, progress_of, say
 
 __all__ = ["add_parser", "run"]
 
@@ -12,7 +12,12 @@ __all__ = ["add_parser", "run"]
 def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
     text = "Check a plan: 0 it holds, 1 it does not, 2 it cannot be read."
-    add_plan(add_command(commands, "verify", run, text))
+    command = add_command(commands, "verify", run, text)
+    add_plan(command)
+    text = "the scene that the plan must be for: a .yaml file, or the name of a shipped scene"
+    command.add_argument("--scene", metavar="FILE", help=text)
+    text = "let no number be overstated at all, not even by rounding"
+    command.add_argument("--strict", action="store_true", help=text)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -21,8 +26,9 @@ def run(args: argparse.Namespace) -> int:
     from symgrasp.plan.verify import verify
 
     plan = Plan.load(args.plan)
+    scene = checked_scene(args.scene) if args.scene else None
     with progress_of(f"verifying {args.plan.name}") as progress:
-        report = verify(plan, progress)
+        report = verify(plan, progress, scene=scene, strict=args.strict)
     for failure in report.failures:
         say(failure)
     result = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"

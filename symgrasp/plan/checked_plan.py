@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from symgrasp.plan.plan import Plan
-from symgrasp.plan.verify import Report, verify
+from symgrasp.plan.report import Report
+from symgrasp.plan.verify import verify
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 

@@ -9,19 +9,29 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictInt,
+    ValidationError,
+    model_validator,
+)
 
 from symgrasp import page
 from symgrasp.errors import PlanError, SymgraspError
 from symgrasp.feasibility.pictures import to_png
-from symgrasp.files import check_size, read_file, write_atomically
+from symgrasp.files import check_size, parse_json, read_file, write_atomically
 from symgrasp.plan.motion_record import MotionRecord
 from symgrasp.poses import Array, quat_wxyz
-from symgrasp.scene.format import MOST_TASKS, describe_error
+from symgrasp.scene.format import MOST_TASKS, WHOLE, describe_error
 
 __all__ = [
     "CLEARANCE_LIMIT",
+    "FRAMES",
     "LARGEST_PLAN",
+    "UNITS",
     "Grasp",
     "Hold",
     "Plan",
@@ -41,8 +51,32 @@ LARGEST_PLAN = 5_000_000
 NUMBERS = re.compile(r"\[\n\s*([-+\d.eE,\s]+?)\n\s*\]")
 """An array of numbers over several lines; in a string there is no line break."""
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+Count = Annotated[StrictInt, Field(ge=0)]
+Package = Literal["python", "symgrasp", "numpy", "pybullet"]
+VERSION = r"^[0-9][0-9A-Za-z.+_-]{0,99}$"
 Row = tuple[Finite, Finite, Finite, Finite]
+
+
+UNITS = {"length": "m", "angle": "rad", "quaternion": "wxyz"}
+FRAMES = {
+    "world": "the scene's frame, z up",
+    "object": "origin on the axis at the bottom, z along the axis of symmetry",
+    "tool": "between the finger tips, z = approach, y = closing direction",
+}
+"""What every plan says of its numbers."""
+
+
+def _just(expected: dict[str, str]) -> AfterValidator:
+    """Return a validator that lets one value pass."""
+
+    def check(value: dict[str, str]) -> dict[str, str]:
+        if value != expected:
+            raise ValueError(str(expected))
+        return value
+
+    return AfterValidator(check)
 
 
 class _Part(BaseModel):
@@ -86,10 +120,12 @@ class Hold(_Part):
     hand_joints: dict[str, Finite] = Field(description="hand joint name → value (m or rad)")
     opening: Finite = Field(description="distance between the finger pads (m)")
     clearance: Finite = Field(
-        description=f"smallest distance (m) of bodies that may not touch; {CLEARANCE_LIMIT} stands for more"
+        ge=0,
+        le=CLEARANCE_LIMIT,
+        description=f"smallest distance (m) of bodies that may not touch; {CLEARANCE_LIMIT} stands for more",
     )
-    margin_along: Finite = Field(description="distance along the axis to an infeasible cell (m)")
-    margin_around: Finite = Field(description="angle about the axis to an infeasible cell (rad)")
+    margin_along: Positive = Field(description="distance along the axis to an infeasible cell (m)")
+    margin_around: Positive = Field(description="angle about the axis to an infeasible cell (rad)")
 
 
 class PlanTask(_Part):
@@ -109,10 +145,10 @@ class PlanTask(_Part):
 class Planner(_Part):
     """What made the plan."""
 
-    algorithm: str
-    seed: int | None = None
-    settings: dict[str, int] = {}
-    statistics: dict[str, int] = {}
+    algorithm: Literal["best", "first", "regrasp", "exact", "hill_climb"]
+    seed: Count | None = None
+    settings: dict[Literal["restarts", "iterations"], Count] = {}
+    statistics: dict[Literal["placements", "restarts", "iterations", "counted", "body_checks"], Count] = {}
 
 
 class SceneRecord(_Part):
@@ -126,17 +162,13 @@ class SceneRecord(_Part):
 class Plan(_Part):
     """A plan, format version 2: version 1 has no motion."""
 
-    schema_version: Literal[1, 2] = 2
+    schema_version: Annotated[Literal[1, 2], WHOLE]
     kind: Literal["sequential", "bimanual", "handover"]
     scene: SceneRecord
-    versions: dict[str, str]
+    versions: dict[Package, Annotated[str, Field(pattern=VERSION)]]
     planner: Planner
-    units: dict[str, str] = {"length": "m", "angle": "rad", "quaternion": "wxyz"}
-    frames: dict[str, str] = {
-        "world": "the scene's frame, z up",
-        "object": "origin on the axis at the bottom, z along the axis of symmetry",
-        "tool": "between the finger tips, z = approach, y = closing direction",
-    }
+    units: Annotated[dict[str, str], _just(UNITS)]
+    frames: Annotated[dict[str, str], _just(FRAMES)]
     robots: dict[str, tuple[str, ...]] = Field(description="robot → names of all its joints")
     tasks: Annotated[tuple[PlanTask, ...], Field(max_length=MOST_TASKS, fail_fast=True)]
     motion: MotionRecord | None = Field(default=None, description="how the arms get from grasp to grasp")
@@ -215,7 +247,7 @@ class Plan(_Part):
         """
         try:
             check_size(content, LARGEST_PLAN)
-            data = json.loads(content)
+            data = parse_json(content)
         except (ValueError, RecursionError) as error:
             raise PlanError(source, "file", str(error), "a readable JSON file") from error
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -10,7 +11,18 @@ from typing import Literal, NamedTuple
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import ROLLS
-from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold, Plan, Planner, PlanTask, Pose, SceneRecord
+from symgrasp.plan.plan import (
+    CLEARANCE_LIMIT,
+    FRAMES,
+    UNITS,
+    Grasp,
+    Hold,
+    Plan,
+    Planner,
+    PlanTask,
+    Pose,
+    SceneRecord,
+)
 from symgrasp.poses import rotation_z
 from symgrasp.robot.configuration import ArmConfiguration
 from symgrasp.scene.balance import support_margins
@@ -19,6 +31,10 @@ from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 
 __all__ = ["Held", "write_plan", "write_task"]
+
+
+ERROR = 1e-5
+"""By how much (m) a clearance may differ in another world: PyBullet reads URDFs in single precision."""
 
 
 class Held(NamedTuple):
@@ -49,6 +65,8 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
     turned = task.T_world_object @ rotation_z(delta)
     world.set_object(turned)
     world.set_arms(h.configuration for h in held)
+    arms = [h.configuration.arm for h in held]
+    margins = support_margins(world.scene, turned, [h.configuration for h in held])
     entries = []
     for (arm, q, opening), m, cell, grasp in held:
         margin = m.margin(cell)
@@ -64,7 +82,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
                 joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
                 hand_joints=arm.hand.joint_values(opening),
                 opening=opening,
-                clearance=world.clearance(arm, CLEARANCE_LIMIT, [h.configuration.arm for h in held]),
+                clearance=_at_most(world.clearance(arm, CLEARANCE_LIMIT + ERROR, arms) - ERROR),
                 margin_along=margin.along,
                 margin_around=margin.around,
             )
@@ -75,8 +93,13 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
         delta=delta,
         object_pose_turned=Pose.of(turned),
         holds=tuple(entries),
-        balance=support_margins(world.scene, turned, [h.configuration for h in held]),
+        balance={robot: _at_most(margin - ERROR) for robot, margin in margins.items()},
     )
+
+
+def _at_most(value: float) -> float:
+    """Return a length (m) rounded down to micrometres, not below zero: no plan states more than there is."""
+    return max(0.0, math.floor(1e6 * value + 1e-6) / 1e6)
 
 
 def write_plan(
@@ -88,10 +111,13 @@ def write_plan(
     """Write the plan of a scene."""
     packages = ("symgrasp", "numpy", "pybullet")
     return Plan(
+        schema_version=2,
         kind=kind,
         scene=SceneRecord(name=scene.name, sha256=scene.sha256, content=scene.content),
         versions={"python": platform.python_version(), **{name: version(name) for name in packages}},
         planner=planner,
+        units=UNITS,
+        frames=FRAMES,
         robots={robot.name: robot.model.joint_names for robot in scene.robots.values()},
         tasks=tuple(tasks),
     )

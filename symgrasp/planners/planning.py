@@ -77,6 +77,7 @@ def plan_sequential(
         visits = _visits(world, tasks, maps, progress)
         planner = first_grasp if method == "first" else with_regrasps
         entries = planner(world, visits, name)
+        scene = _with_supports(world, tasks)
     return write_plan(scene, "sequential", Planner(algorithm=method), entries)
 
 
@@ -94,6 +95,7 @@ def sequential_plans(
     _, tasks = _tasks_alone(scene, arm)
     with open_world(scene) as world:
         visits = _visits(world, tasks, maps, progress)
+        scene = _with_supports(world, tasks)
         for entries, _ in holdings(world, visits, progress):
             yield write_plan(scene, "sequential", Planner(algorithm="best"), entries)
 
@@ -145,6 +147,7 @@ def plan_bimanual(
     with open_world(scene) as world:
         (visit,) = _visits(world, [the_task], maps, progress)
         entry, planner = climb(world, visit, seed, limits or Climb(), progress, trace)
+        scene = _with_supports(world, [the_task])
     return write_plan(scene, "bimanual", planner, [entry])
 
 
@@ -161,6 +164,7 @@ def bimanual_plans(
     the_task = _task_together(scene, task)
     with open_world(scene) as world:
         visits = _visits(world, [the_task], maps, progress)
+        scene = _with_supports(world, [the_task])
         for entries, planner in holdings(world, visits, progress):
             yield write_plan(scene, "bimanual", planner, entries)
 
@@ -182,7 +186,7 @@ def plan_handover(
 
     Raises:
         NoPlanError: no grasps exist on this grid.
-        SceneError: the object moves between two tasks that share no arm.
+        SceneError: the object moves between two tasks that share no arm, or there is one task or arm only.
     """
     return _best(handover_plans(scene, maps, progress))
 
@@ -197,6 +201,10 @@ def handover_plans(
     Arguments and errors are those of `plan_handover`.
     """
     tasks = list(scene.tasks.values())
+    arms = dict.fromkeys(arm for task in tasks for arm in task.arms)
+    if len(tasks) < 2 or len(arms) < 2:
+        names = [task.name for task in tasks]
+        raise SceneError(scene.source, "tasks", names, "several tasks, done by several arms")
     for before, after in pairwise(tasks):
         still = np.array_equal(before.T_world_object, after.T_world_object)
         if not still and not set(before.arms) & set(after.arms):
@@ -208,8 +216,26 @@ def handover_plans(
                 expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
                 raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
         visits = _visits(world, tasks, maps, progress)
+        scene = _with_supports(world, tasks)
         for entries, planner in holdings(world, visits, progress):
             yield write_plan(scene, "handover", planner, entries)
+
+
+def _with_supports(world: BulletWorld, tasks: Sequence[Task]) -> Scene:
+    """Return the scene, which says that the object is not supported where tasks begin or end without support.
+
+    Raises:
+        SceneError: nothing holds the object up in a task that says it is supported.
+    """
+    scene = world.scene
+    for task in (tasks[0], tasks[-1]):
+        if task.supported is False or world.object_rests(task.T_world_object):
+            continue
+        if task.supported:
+            expected = "false: nothing holds the object up there"
+            raise SceneError(scene.source, f"task {task.name}: supported", True, expected)
+        scene = scene.with_supported(task.name, supported=False)
+    return scene
 
 
 def _best(plans: Plans) -> Plan:

@@ -91,9 +91,11 @@ def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> 
     entries: list[PlanTask] = []
     entry: list[TaskVisit] = []
     for segment in segments:
-        leave = [] if segment.set_down is None else [visits[segment.set_down]]
-        part = [*entry, *visits[segment.first : segment.last + 1], *leave]
-        entry = leave
+        down = segment.set_down
+        own = visits[segment.first : segment.last + 1]
+        part = [*(v for v in entry if v is not own[0]), *own]
+        entry = [] if down is None else [visits[down]]
+        part += (v for v in entry if v is not own[-1])
         turned = entries[-1].delta if entries else 0.0  # the object stays as it was set down
         entries += next(holdings(world, part, None, turned))[0]
     return entries
@@ -143,11 +145,16 @@ def holdings(
             ]
             delta = float(wrap((step.turn + common) * grid.dtheta))
             entries.append(write_task(world, visit.task, delta, held))
-        statistics = {
-            "placements": placements.tried,
-            "body_checks": sum(finder.body_checks for finder in finders),
-        }
-        yield entries, Planner(algorithm="exact", statistics=statistics)
+        yield (
+            entries,
+            Planner(
+                algorithm="exact",
+                statistics={
+                    "placements": placements.tried,
+                    "body_checks": sum(finder.body_checks for finder in finders),
+                },
+            ),
+        )
     if not found:
         raise _why_not(world, visits, placements.tried)
 

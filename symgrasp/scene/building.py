@@ -192,4 +192,4 @@ class SceneBuilder:
             if name not in arms:
                 raise SceneError(self.source, f"tasks[{i}].arms", name, one_of(arms, name))
         self._unique(f"tasks[{i}].arms", names)
-        return Task(t.name, names, t.pose.matrix())
+        return Task(t.name, names, t.pose.matrix(), t.supported)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -26,6 +27,7 @@ from symgrasp.robot.assembly import Frame
 
 __all__ = [
     "SHAPES",
+    "WHOLE",
     "ArmFile",
     "HandFile",
     "MapSettings",
@@ -54,6 +56,17 @@ NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 Samples = Annotated[int, Field(ge=1, le=1024)]
 Vector = tuple[Number, Number, Number]
+
+
+def _whole(value: object) -> object:
+    """Refuse what Python takes for a 1: true, and 1.0."""
+    if type(value) is not int:
+        raise ValueError("a whole number")
+    return value
+
+
+WHOLE = BeforeValidator(_whole)
+"""Lets nothing but integers pass."""
 
 
 class _Strict(BaseModel):
@@ -274,11 +287,16 @@ SHAPES = ("box", "cylinder", "sphere", "mesh", "urdf")
 
 
 class TaskFile(_Strict):
-    """A pose of the object; its rotation about its own axis is free."""
+    """A pose of the object; its rotation about its own axis is free.
+
+    Where no arm has held the object before the task, or none holds it afterwards, something must hold it up
+    there, unless the task says ``supported: false``.
+    """
 
     name: Name
     arms: Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_ROBOTS * MOST_ARMS)] | None = None
     pose: PoseFile
+    supported: StrictBool | None = None
 
 
 class MapSettings(_Strict):
@@ -306,7 +324,7 @@ class MapSettings(_Strict):
 class SceneFile(_Strict):
     """A scene file, version 1."""
 
-    schema_version: Literal[1]
+    schema_version: Annotated[Literal[1], WHOLE]
     name: Name
     description: str = ""
     robots: Annotated[tuple[RobotFile, ...], Field(min_length=1, max_length=MOST_ROBOTS, fail_fast=True)]

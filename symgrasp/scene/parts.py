@@ -65,11 +65,14 @@ class Task:
         name: its name in the scene.
         arms: names of the arms that hold the object.
         T_world_object: object pose (4, 4); its rotation about the object's own z axis is free.
+        supported: whether something must hold the object up where no hand does; None where the scene does not
+            say so.
     """
 
     name: str
     arms: tuple[str, ...]
     T_world_object: Array
+    supported: bool | None = None
 
 
 class SceneParts(NamedTuple):

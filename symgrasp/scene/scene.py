@@ -197,12 +197,23 @@ class Scene:
             SceneError: there is no task of that name.
         """
         self.task(task.name)
-        file = TaskFile(name=task.name, arms=task.arms, pose=PoseFile.of(task.T_world_object))
+        file = _task_file(task)
         files = tuple(file if t.name == task.name else t for t in self.file.tasks)
         return replace(
             self,
             file=self.file.model_copy(update={"tasks": files}),
             tasks={**self.tasks, task.name: task},
+        )
+
+    def with_supported(self, task: str, *, supported: bool | None) -> Scene:
+        """Return the scene in which a task says, or does not say, whether something holds the object up."""
+        files = (
+            t.model_copy(update={"supported": supported}) if t.name == task else t for t in self.file.tasks
+        )
+        return replace(
+            self,
+            file=self.file.model_copy(update={"tasks": tuple(files)}),
+            tasks={**self.tasks, task: replace(self.task(task), supported=supported)},
         )
 
     def with_tasks(self, tasks: Iterable[Task]) -> Scene:
@@ -224,7 +235,7 @@ class Scene:
             for arm in task.arms:
                 self.arm(arm)
             try:
-                files.append(TaskFile(name=task.name, arms=task.arms, pose=PoseFile.of(task.T_world_object)))
+                files.append(_task_file(task))
             except ValidationError as error:
                 raise SceneError(f"tasks[{i}]", *describe_error(error, {"name": task.name})) from None
         return replace(
@@ -299,6 +310,12 @@ def load_scene(scene: str | Path | Mapping[str, Any]) -> Scene:
         UrdfError, MeshError, ProfileError: a file that the scene refers to is unusable.
     """
     return Scene.from_content(scene) if isinstance(scene, Mapping) else Scene.load(scene)
+
+
+def _task_file(task: Task) -> TaskFile:
+    """Return a task as a scene file has it; raise ValidationError if its name is empty or too long."""
+    pose = PoseFile.of(task.T_world_object)
+    return TaskFile(name=task.name, arms=task.arms, pose=pose, supported=task.supported)
 
 
 def _sha256(content: Mapping[str, Any]) -> str:

@@ -77,7 +77,8 @@ def test_a_plan_holds_in_a_fresh_world(make):
                 standoff = arm.hand.standoff(float(scene.profile.radius(g.h)))
                 expected = grasp_to_tool(turned, g.h, g.theta, g.roll, standoff)
                 np.testing.assert_allclose(hold.tool_pose.array(), expected, atol=1e-8)
-                assert hold.clearance == pytest.approx(world.clearance(arm, 0.1), abs=1e-6)
+                clearance = world.clearance(arm, 0.1)
+                assert clearance - 2e-5 < hold.clearance <= clearance
                 assert hold.clearance > 0
                 assert hold.margin_along > 0
 

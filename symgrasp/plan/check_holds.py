@@ -1,0 +1,125 @@
+"""Whether hands hold the object as a plan says, and nothing touches that must not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from symgrasp.plan.check_poses import TOLERANCE, check_pose, same_pose
+from symgrasp.plan.plan import CLEARANCE_LIMIT, Hold, PlanTask
+from symgrasp.plan.report import Report
+from symgrasp.poses import Array
+from symgrasp.robot.robot import Arm
+from symgrasp.scene.balance import support_margins
+from symgrasp.scene.scene import Scene
+from symgrasp.world import RESTING_DEPTH, BulletWorld
+
+__all__ = ["check_holds", "tool_of"]
+
+CLEARANCE_TOLERANCE = 1e-5
+"""By how much (m) a clearance may be overstated: PyBullet reads URDFs in single precision."""
+
+
+def check_holds(task: PlanTask, where: str, world: BulletWorld, report: Report) -> None:
+    """Check grasps, joints, balance, collisions and clearances of a task; the object is in no obstacle.
+
+    Args:
+        task: the task.
+        where: what it is called in failures.
+        world: a world of the scene; object and arms end where the plan puts them.
+        report: where what is found is noted.
+    """
+    scene = world.scene
+    T = task.object_pose_turned.array()
+    configurations = []
+    for hold in task.holds:
+        who = f"{where}: {hold.arm}"
+        arm = scene.arms.get(hold.arm)
+        if not report.expect(arm is not None, f"{who}: no such arm in the scene") or arm is None:
+            return
+        report.expect(hold.robot == arm.robot.name, f"{who}: belongs to {arm.robot.name}, not {hold.robot}")
+        names = tuple(hold.joints)
+        if not report.expect(names == arm.joint_names, f"{who}: joints {names}, not {arm.joint_names}"):
+            return
+        q = np.array([hold.joints[name] for name in arm.joint_names])
+        _check_arm(hold, arm, q, who, report)
+        _check_grasp(hold, arm, T, who, scene, report)
+        configurations.append((arm, q, hold.opening))
+    _check_torsos(configurations, where, report)
+    world.set_object(T)
+    world.set_arms(configurations)
+    margins = support_margins(scene, T, configurations)
+    names = sorted(task.balance), sorted(margins)
+    report.expect(names[0] == names[1], f"{where}: balance of {names[0]}, not {names[1]}")
+    for robot, margin in margins.items():
+        text = f"{where}: {robot}: the centre of mass is {1e3 * margin:.3f} mm inside of the support"
+        report.expect(margin >= 0, text)
+        stated = task.balance.get(robot, margin)
+        report.at_most(stated, margin, TOLERANCE, f"{text}, not {1e3 * stated:.3f} mm")
+    arms = [arm for arm, *_ in configurations]
+    for c in world.collisions(arms):
+        report.expect(False, f"{where}: {c.a} and {c.b} are {1e3 * c.depth:.2f} mm too close")
+    for c in world.object_contacts():
+        text = f"{where}: {c.a} is {1e3 * c.depth:.2f} mm inside {c.b}"
+        report.expect(c.depth <= RESTING_DEPTH, text)
+    for hold, arm in zip(task.holds, arms, strict=True):
+        real = world.clearance(arm, CLEARANCE_LIMIT, arms)
+        text = f"{where}: {arm.name}: clearance is {1e3 * real:.3f} mm, not {1e3 * hold.clearance:.3f} mm"
+        report.at_most(hold.clearance, real, CLEARANCE_TOLERANCE, text)
+
+
+def _check_torsos(configurations: Sequence[tuple[Arm, Array, float]], where: str, report: Report) -> None:
+    """Check that arms of one body have the same torso."""
+    for (arm, q, _), (other, p, _) in combinations(configurations, 2):
+        if arm.robot is other.robot and arm.robot.torso is not None:
+            names = arm.robot.torso.joint_names
+            text = f"{where}: {arm.name} and {other.name} of {arm.robot.name} differ in {', '.join(names)}"
+            report.expect(np.abs(q - p)[: len(names)].max() <= TOLERANCE, text)
+
+
+def _check_arm(hold: Hold, arm: Arm, q: Array, who: str, report: Report) -> None:
+    """Check limits, and the tool pose by the forward kinematics of the whole URDF."""
+    for name, value, lower, upper in zip(arm.joint_names, q, arm.lower, arm.upper, strict=True):
+        text = f"{who}: {name} is {value:.6f}, outside [{lower:g}, {upper:g}]"
+        report.expect(lower <= value <= upper, text)
+    expected = arm.hand.joint_values(hold.opening)
+    same = expected.keys() == hold.hand_joints.keys() and all(
+        abs(expected[n] - hold.hand_joints[n]) <= TOLERANCE for n in expected
+    )
+    report.expect(same, f"{who}: hand joints {hold.hand_joints}, but the opening takes {expected}")
+    if check_pose(hold.tool_pose, f"{who}: tool_pose", report):
+        reached = arm.robot.T_world_base @ arm.tool_pose(q)
+        same_pose(reached, hold.tool_pose.array(), f"{who}: forward kinematics and tool_pose", report)
+
+
+def _check_grasp(hold: Hold, arm: Arm, T: Array, who: str, scene: Scene, report: Report) -> None:
+    """Check that the tool is where the grasp puts it on the turned object, with a hand that fits."""
+    g, profile, hand = hold.grasp, scene.profile, arm.hand
+    inside = profile.h_min <= g.h <= profile.h_max
+    if not report.expect(inside, f"{who}: h = {g.h:g} m is not on the object"):
+        return
+    report.expect(-np.pi <= g.theta < np.pi, f"{who}: theta = {g.theta:g} is not in [-π, π)")
+    flipped = abs(g.roll - np.pi) <= TOLERANCE
+    report.expect(flipped or abs(g.roll) <= TOLERANCE, f"{who}: roll = {g.roll:g} is neither 0 nor π")
+    radius = float(profile.radius(g.h))
+    report.expect(hand.spans(radius), f"{who}: the hand does not span {2e3 * radius:.1f} mm")
+    report.expect(hand.palm_has_room(profile, g.h), f"{who}: no room for the palm at h = {g.h:g} m")
+    report.expect(hand.pads_rest(profile, g.h), f"{who}: the pads do not rest at h = {g.h:g} m")
+    wanted = hand.opening(radius)
+    text = f"{who}: opening is {1e3 * hold.opening:.3f} mm, but this height takes {1e3 * wanted:.3f} mm"
+    report.expect(abs(hold.opening - wanted) <= TOLERANCE, text)
+    expected = tool_of(arm, T, g.h, g.theta, flipped, radius)
+    same_pose(expected, hold.tool_pose.array(), f"{who}: grasp and tool_pose", report)
+
+
+def tool_of(arm: Arm, T: Array, h: float, theta: float, flipped: bool, radius: float) -> Array:
+    """Return the tool pose of a grasp, written out: z radially inwards, y along the tangent."""
+    out = np.array([np.cos(theta), np.sin(theta), 0.0])
+    tangent = np.array([-np.sin(theta), np.cos(theta), 0.0]) * (-1.0 if flipped else 1.0)
+    tool = np.eye(4)
+    tool[:3, :3] = np.column_stack([np.cross(tangent, -out), tangent, -out])
+    tool[:3, 3] = max(0.0, radius - arm.hand.finger_depth) * out + [0.0, 0.0, h]
+    tool[:3, 3] -= float(arm.hand.shift_at(radius)) * tangent
+    return T @ tool
