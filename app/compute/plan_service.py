@@ -11,6 +11,7 @@ import numpy as np
 
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.motion.record import from_plan
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.plan.checked_plan import check_plan
 from symgrasp.plan.plan import Hold, Plan, PlanTask
@@ -259,7 +260,8 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
 def plan_result(plan: Plan, scene: Scene) -> PlanResult:
     """Return a plan of a scene with the prints of its hands and the gaps between them."""
     prints = tuple({h.arm: _print(scene, h) for h in task.holds} for task in plan.tasks)
-    return PlanResult(plan, prints, tuple(_gap(scene, task) for task in plan.tasks))
+    gaps = tuple(_gap(scene, task) for task in plan.tasks)
+    return PlanResult(plan, prints, gaps, from_plan(plan, scene))
 
 
 def _print(scene: Scene, hold: Hold) -> np.ndarray:

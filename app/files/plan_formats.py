@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from symgrasp.motion.exports import MOTION_EXPORTS
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import LARGEST_PLAN, Plan
 
@@ -14,6 +15,8 @@ FORMATS: Mapping[str, tuple[str, Callable[[Plan], str]]] = {
     "CSV": (".csv", EXPORTS["csv"]),
     "Trajectory": (".trajectory.json", EXPORTS["trajectory"]),
     "TSR": (".tsr.yaml", EXPORTS["tsr"]),
+    "Motion": (".motion.json", MOTION_EXPORTS["motion"]),
+    "Motion CSV": (".motion.csv", MOTION_EXPORTS["motion-csv"]),
 }
 """Label of a format on the page → ending of its files, and the function that writes them."""
 

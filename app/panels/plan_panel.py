@@ -6,6 +6,7 @@ import viser
 
 from ..files.plan_formats import FORMATS, PLAN_LIMIT
 from ..html.conflicts import plan_file_html
+from ..html.motion import motion_html
 from ..html.readout import solution_html
 from ..html.solutions import solutions_html
 from ..state import plan_changes
@@ -15,10 +16,8 @@ from .panel import Panel
 
 __all__ = ["PlanFilePanel", "PlanPanel"]
 
-PLAYBACK_NOTE = (
-    '<div class="sg sg-faint">Between tasks the arms only move for show: '
-    "this is no motion checked for collisions.</div>"
-)
+SPEEDS = {"¼ ×": 0.25, "½ ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "4 ×": 4.0}
+"""Label → seconds of a motion that are played in a second."""
 
 
 class PlanPanel(Panel):
@@ -36,6 +35,10 @@ class PlanPanel(Panel):
         )
         self.step = gui.add_slider("Plan step", 1.0, 2.0, 0.02, 1.0, visible=False)
         self.on(self.step, lambda s, v: plan_changes.show_position(s, v - 1), "scrub")
+        self.time = gui.add_slider("Time (s)", 0.0, 1.0, 0.02, 0.0, visible=False)
+        self.on(self.time, plan_changes.show_position, "scrub")
+        self.speed = self.dropdown("Speed", tuple(SPEEDS), initial_value="1 ×", visible=False)
+        self.on(self.speed, lambda s, v: plan_changes.choose_speed(s, SPEEDS[v]))
         self.play = self.button(
             "Play",
             viser.Icon.PLAYER_PLAY,
@@ -43,7 +46,7 @@ class PlanPanel(Panel):
             color="gray",
             visible=False,
         )
-        self.note = self.html()
+        self.motion = self.html()
 
     def show(self, state: State) -> None:
         """List the plans and describe the one that is shown."""
@@ -55,20 +58,28 @@ class PlanPanel(Panel):
         self.more.visible = plan_results.more
         self.list.show(solutions_html(state))
         self.text.show(solution_html(state))
-        self.step.visible = self.play.visible = plan_results.last > 0
-        if plan_results.last:
+        moving = state.plan is not None and state.plan.motion is not None
+        self.play.visible = plan_results.end > 0
+        self.step.visible = plan_results.last > 0 and not moving
+        self.time.visible = self.speed.visible = moving
+        if moving:
+            self.time.max = plan_results.end
+        elif plan_results.last:
             self.step.max = float(plan_results.last + 1)
         playing = plan_results.playing == "arms"
         self.play.label = "Pause" if playing else "Play"
         self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
-        self.note.show(PLAYBACK_NOTE if plan_results.last else "")
+        self.motion.show(motion_html(state))
 
     def write_inputs(self, state: State) -> None:
         """Set the sliders to the plan and task that are shown."""
         plan_results = state.plan_results
         if len(plan_results.plans) > 1:
             self.solution.value = plan_results.index + 1
-        if plan_results.last:
+        self.speed.value = next(label for label, speed in SPEEDS.items() if speed == plan_results.speed)
+        if state.plan and state.plan.motion:
+            self.time.value = round(plan_results.position, 2)
+        elif plan_results.last:
             self.step.value = round(plan_results.position + 1, 2)
 
 

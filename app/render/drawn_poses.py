@@ -6,7 +6,7 @@ from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
 from ..state.state import State
-from .playback import plan_joint_values, playback_frame
+from .playback import motion_state, plan_joint_values
 
 __all__ = ["drawn_joint_values", "drawn_object_pose"]
 
@@ -14,14 +14,15 @@ __all__ = ["drawn_joint_values", "drawn_object_pose"]
 def drawn_joint_values(state: State) -> dict[str, Array]:
     """Return the joint values that the robots of a state are drawn at.
 
-    Robots park at home, except the arms that hold the object in the plan's task that is shown,
-    or the chosen arm at the chosen candidate of the picked cell, if that is feasible, or its witness.
+    Those of the plan's motion where one is shown. Else robots park at home, except the arms that hold the
+    object in the plan's task that is shown, or the chosen arm at the chosen candidate of the picked cell, if
+    that is feasible, or its witness.
 
     Returns:
         Robot name → values (n,) of all its joints, in rad or m.
     """
-    if frame := playback_frame(state):
-        return frame.joint_values
+    if moment := motion_state(state):
+        return dict(moment.values)
     if state.shown_task:
         return plan_joint_values(state.scene, state.shown_task)
     values = {robot.name: robot.home.copy() for robot in state.scene.robots.values()}
@@ -44,6 +45,6 @@ def drawn_joint_values(state: State) -> dict[str, Array]:
 
 
 def drawn_object_pose(state: State) -> Array:
-    """Return the pose (4, 4) that the object is drawn at; during a playback a hand may carry it."""
-    frame = playback_frame(state)
-    return frame.T_world_object if frame else state.T_world_object
+    """Return the pose (4, 4) that the object is drawn at; in a motion a hand may carry it."""
+    moment = motion_state(state)
+    return moment.T_world_object if moment else state.T_world_object

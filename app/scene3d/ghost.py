@@ -16,7 +16,6 @@ from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName
 
-from ..render.playback import playback_frame
 from ..state.state import State
 
 __all__ = ["Ghost", "body_mesh", "ghost", "link_mesh"]
@@ -53,7 +52,7 @@ def ghost(state: State) -> Ghost | None:
     candidate = state.shown_candidate
     if candidate is None or state.explanation is None or candidate.reason == Reason.FEASIBLE:
         return None
-    if state.shown_task or playback_frame(state) or state.climb_step:  # the arms show something else
+    if state.shown_task or state.climb_step:  # the arms show something else
         return None
     arm = state.scene.arm(state.arm)
     hits = frozenset(body for c in candidate.collisions for body in (c.a, c.b))

@@ -19,6 +19,7 @@ from .ghost_view import GhostView
 from .nodes import set_pose
 from .object_view import ObjectView
 from .robot_view import RobotView
+from .tool_path import ToolPath
 from .viewpoint import FIELD_OF_VIEW, choose_viewpoint
 
 __all__ = ["SceneView"]
@@ -84,6 +85,7 @@ class SceneView:
             if state.missing_request is None or not state.busy:
                 self.ghost.show(state)
             self.object.show(state, move_gizmo=move_gizmo)
+            self.tool_path.show(state)
             self.base_gizmo.visible = state.display.base_handles
             if move_gizmo:
                 set_pose(self.base_gizmo, state.robot.T_world_base)
@@ -120,6 +122,7 @@ class SceneView:
             name: RobotView(client, f"{root}/robot{k}", robot, visuals)
             for k, (name, robot) in enumerate(scene.robots.items())
         }
+        self.tool_path = ToolPath(client, root)
         self.base_gizmo = client.scene.add_transform_controls(
             f"{root}/base_gizmo", scale=0.3, line_width=3.0, depth_test=False, visible=False
         )

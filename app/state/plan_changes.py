@@ -13,7 +13,9 @@ from .state import Pick, State
 __all__ = [
     "change_plan_results",
     "choose_plan",
+    "choose_speed",
     "more_listed",
+    "motion_found",
     "play_arms",
     "play_climb",
     "played",
@@ -49,7 +51,7 @@ def choose_plan(state: State, index: int) -> State:
 
 def show_step(state: State, step: int) -> State:
     """Show a task of the plan by its index: the object turned by δᵢ and the grasp on its map."""
-    return show_position(state, step)
+    return show_position(state, state.plan_results.position_of(step)) if state.plan else state
 
 
 def show_position(state: State, position: float) -> State:
@@ -73,6 +75,16 @@ def show_position(state: State, position: float) -> State:
         result=results.maps[task.name, hold.arm],
         problem="",
     )
+
+
+def motion_found(state: State, plan: PlanResult) -> State:
+    """Put a plan with its motion in the place of the plan that is shown."""
+    return show_position(replace(state, plan_results=state.plan_results.with_plan(plan)), 0.0)
+
+
+def choose_speed(state: State, speed: float) -> State:
+    """Play motions at a speed: seconds of a motion in a second."""
+    return replace(state, plan_results=replace(state.plan_results, speed=speed))
 
 
 def show_frame(state: State, frame: int) -> State:

@@ -8,10 +8,13 @@ from typing import Literal
 
 import numpy as np
 
+from symgrasp.motion.segments import Motion
 from symgrasp.plan.plan import Plan
 from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.planners.conflicts import Conflict
 
+from .cached import cached
+from .motion_times import task_times
 from .requests import Maps
 
 __all__ = [
@@ -36,7 +39,7 @@ With most seeds they start apart, so that there is nothing to replay.
 """
 
 SECONDS_PER_TASK = 2.0
-"""Duration (s) of the playback from one task to the next."""
+"""Time (s) that the playback of a plan without a motion shows a task for."""
 
 STEPS_PER_SECOND = 10.0
 """Speed of the replay of a climb."""
@@ -54,11 +57,18 @@ class PlanResult:
         prints: for every task of the plan, in order, arm → the cells (H, A) under its hand.
         gaps: for every task of the plan the smallest gap (m) between two prints, negative where they
             overlap, None where one hand holds alone.
+        motion: the plan's motion, None where it has none.
     """
 
     plan: Plan
     prints: tuple[Mapping[str, np.ndarray], ...]
     gaps: tuple[float | None, ...]
+    motion: Motion | None = None
+
+    @cached
+    def times(self) -> list[tuple[float, float]]:
+        """See `task_times`; empty where there is no motion."""
+        return task_times(self.plan, self.motion) if self.motion else []
 
 
 @dataclass(frozen=True)
@@ -131,7 +141,8 @@ class PlanResults:
         climb: the hill climbing, if that was the method.
         frame: index of its step that is shown.
         slide: share of each task's δ by which its map is shifted, 0 to 1.
-        position: of the playback: k at task k, fractions between two tasks.
+        position: of the playback: time (s) of a plan with a motion, else k at task k.
+        speed: of the playback of a motion: seconds of it in a second.
         playing: what is being played.
         opened: the report on the file that was opened last.
     """
@@ -149,6 +160,7 @@ class PlanResults:
     frame: int | None = None
     slide: float = 1.0
     position: float = 0.0
+    speed: float = 1.0
     playing: Playing = ""
     opened: PlanFileReport | None = None
 
@@ -165,35 +177,38 @@ class PlanResults:
         return len(self.plan.plan.tasks) - 1 if self.plan else 0
 
     @property
+    def end(self) -> float:
+        """The last position of the playback."""
+        return self.plan.motion.duration if self.plan and self.plan.motion else float(self.last)
+
+    @property
     def nearest(self) -> int:
         """Index of the task that the playback is nearest to."""
+        if self.plan and self.plan.motion:
+            return max(sum(start <= self.position for start, _ in self.plan.times) - 1, 0)
         return int(np.clip(np.floor(self.position + 0.5), 0, self.last))
 
-    @property
-    def transition(self) -> tuple[int, float]:
-        """Index of the task that the playback comes from, and the share of the way to the next, eased."""
-        start = min(int(self.position), max(self.last - 1, 0))
-        share = self.position - start
-        return start, share * share * (3 - 2 * share)
-
-    @property
-    def is_between(self) -> bool:
-        """Whether the playback is between two tasks."""
-        return self.position != self.nearest
+    def position_of(self, step: int) -> float:
+        """Return the position of the playback at a task by its index."""
+        if self.plan and self.plan.motion:
+            return self.plan.times[int(np.clip(step, 0, self.last))][1]
+        return float(step)
 
     @property
     def input_values(self) -> tuple[object, ...]:
         """All values that widgets show and can change."""
         return (
             self.sequence_method, self.hands_method, self.seed, self.index, self.plans, self.frame,
-            self.slide, self.position, self.climb,
+            self.slide, self.position, self.speed, self.climb,
         )  # fmt: skip
 
     # -- changes ----------------------------------------------------------------------------
 
     def cleared(self) -> PlanResults:
         """Drop the results; methods, seed and slide are kept."""
-        return PlanResults(self.sequence_method, self.hands_method, self.seed, slide=self.slide)
+        return PlanResults(
+            self.sequence_method, self.hands_method, self.seed, slide=self.slide, speed=self.speed
+        )
 
     def found(
         self,
@@ -218,13 +233,18 @@ class PlanResults:
         """Add further plans to the list."""
         return replace(self, plans=(*self.plans, *plans), more=more)
 
+    def with_plan(self, plan: PlanResult) -> PlanResults:
+        """Put a plan in the place of that which is shown."""
+        plans = (*self.plans[: self.index], plan, *self.plans[self.index + 1 :])
+        return replace(self, plans=plans, position=0.0, playing="")
+
     def at_plan(self, index: int) -> PlanResults:
         """Show another plan of the list by its index."""
         return replace(self, index=int(np.clip(index, 0, len(self.plans) - 1))) if self.plans else self
 
     def at_position(self, position: float) -> PlanResults:
         """Move the playback to a position."""
-        position = float(np.clip(position, 0.0, self.last)) if np.isfinite(position) else self.position
+        position = float(np.clip(position, 0.0, self.end)) if np.isfinite(position) else self.position
         return replace(self, position=position, frame=None)
 
     def at_frame(self, frame: int) -> PlanResults:
@@ -235,9 +255,9 @@ class PlanResults:
 
     def play_arms(self) -> PlanResults:
         """Start or pause the playback of the plan; at its end it restarts."""
-        if self.playing == "arms" or not self.last:
+        if self.playing == "arms" or not self.end:
             return self.paused()
-        position = 0.0 if self.position >= self.last else self.position
+        position = 0.0 if self.position >= self.end else self.position
         return replace(self, playing="arms", position=position, frame=None)
 
     def play_climb(self) -> PlanResults:
@@ -254,8 +274,11 @@ class PlanResults:
     def advanced(self, seconds: float) -> PlanResults:
         """Advance the playback by a time (s); at its end it pauses."""
         if self.playing == "arms":
-            results = self.at_position(self.position + seconds / SECONDS_PER_TASK)
-            return results if results.position < results.last else results.paused()
+            moving = self.plan is not None and self.plan.motion is not None
+            results = self.at_position(
+                self.position + seconds * (self.speed if moving else 1 / SECONDS_PER_TASK)
+            )
+            return results if results.position < results.end else results.paused()
         if self.playing == "climb" and self.climb is not None:
             steps = max(1, round(seconds * self.climb.speed))
             results = self.at_frame((self.frame or 0) + steps)

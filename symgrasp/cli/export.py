@@ -8,8 +8,8 @@ from symgrasp.cli.shared import Commands, add_command, add_out, add_plan, check_
 
 __all__ = ["FORMATS", "add_parser", "run"]
 
-FORMATS = ("csv", "trajectory", "tsr")
-"""The keys of `symgrasp.plan.exports.EXPORTS`, which takes long to import."""
+FORMATS = ("csv", "trajectory", "tsr", "motion", "motion-csv")
+"""The keys of `EXPORTS` and `MOTION_EXPORTS` of the modules ``exports``, which take long to import."""
 
 
 def add_parser(commands: Commands) -> None:
@@ -24,8 +24,10 @@ def run(args: argparse.Namespace) -> int:
     """Write the plan in the other format; return the exit status."""
     check_out(args.out)
 
+    from symgrasp.motion.exports import MOTION_EXPORTS
     from symgrasp.plan.exports import EXPORTS
     from symgrasp.plan.plan import Plan
 
-    write_out(args.out, EXPORTS[args.format](Plan.load(args.plan)).encode())
+    write = {**EXPORTS, **MOTION_EXPORTS}[args.format]
+    write_out(args.out, write(Plan.load(args.plan)).encode())
     return 0

@@ -20,6 +20,7 @@ from symgrasp.cli import export
 from symgrasp.cli.main import main
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.files import SCENES_DIR
+from symgrasp.motion.exports import MOTION_EXPORTS
 from symgrasp.object.library import load_object
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan, plan_schema
@@ -41,7 +42,7 @@ def test_scenes_lists_what_ships(capsys):
 
 
 def test_every_format_of_plans_can_be_asked_for():
-    assert set(export.FORMATS) == set(EXPORTS)
+    assert set(export.FORMATS) == {*EXPORTS, *MOTION_EXPORTS}
 
 
 @pytest.mark.parametrize("ending", ["npz", "png", "svg", "json"])

@@ -18,7 +18,7 @@ from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest, PlanService
 from app.files.plan_formats import PLAN_LIMIT
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
-from app.render.playback import playback_frame
+from app.render.playback import plan_joint_values
 from app.render.prints import shown_prints
 from app.server.plan_actions import show_opened_plan
 from app.state import changes, job_changes, plan_changes
@@ -161,22 +161,16 @@ def test_a_plan_for_other_tasks_is_dropped():
 # -- the play -------------------------------------------------------------------------------
 
 
-@settings(deadline=None, max_examples=40)
-@given(st.floats(0, 2))
-def test_while_the_arms_are_played_the_object_stays_in_the_hand(position):
+@pytest.mark.parametrize("position", [0.0, 0.4, 0.6, 1.3, 2.0])
+def test_without_a_motion_the_play_shows_one_task_after_the_other(position):
+    """Nothing is shown between two tasks: nobody knows whether the arms can be there."""
     state = plan_changes.show_position(with_plan("pick_pour_place", "sequential"), position)
     step = min(int(position + 0.5), 2)
     assert (state.step, state.task) == (step, ["pick", "pour", "place"][step])
-    hold = state.shown_task.holds[0]
-    arm = state.scene.arm("panda")
-    names = arm.robot.model.joint_names
-    values = drawn_joint_values(state)["panda"]
-    q = np.array([values[names.index(name)] for name in arm.joint_names])
-    assert np.all(arm.lower <= q)
-    assert np.all(q <= arm.upper)
-    in_hand = np.linalg.inv(arm.world_tool_pose(q)) @ drawn_object_pose(state)
-    held = np.linalg.inv(hold.tool_pose.array()) @ state.shown_task.object_pose_turned.array()
-    assert np.allclose(in_hand, held, atol=1e-5)
+    task = state.shown_task
+    expected = plan_joint_values(state.scene, task)["panda"]
+    assert np.array_equal(drawn_joint_values(state)["panda"], expected)
+    assert np.allclose(drawn_object_pose(state), task.object_pose_turned.array())
 
 
 def test_the_play_passes_the_tasks_in_order_and_stops_at_the_end():
@@ -189,7 +183,6 @@ def test_the_play_passes_the_tasks_in_order_and_stops_at_the_end():
     assert list(dict.fromkeys(seen)) == ["pick", "pour", "place"]
     assert np.all(np.diff(positions) > 0)
     assert positions[-1] == 2
-    assert not playback_frame(state)
     assert np.allclose(drawn_object_pose(state), state.T_world_object)
     again = plan_changes.play_arms(state)
     assert (again.plan_results.playing, again.plan_results.position, again.step) == ("arms", 0.0, 0)
@@ -198,14 +191,13 @@ def test_the_play_passes_the_tasks_in_order_and_stops_at_the_end():
 
 def test_whoever_moves_on_stops_the_play():
     playing = plan_changes.played(plan_changes.play_arms(with_plan("pick_pour_place", "sequential")), 0.3)
-    assert playback_frame(playing)
     for move_on in (
         lambda s: changes.turn(s, 0.1),
         lambda s: changes.choose(s, 0.1, 0.0),
         lambda s: changes.choose_task(s, "place"),
     ):
         state = move_on(playing)
-        assert playback_frame(state) is None
+        assert state.step is None
         stopped = plan_changes.played(state, 0.1)
         assert not stopped.plan_results.playing
         assert (stopped.task, stopped.delta, stopped.pick) == (state.task, state.delta, state.pick)

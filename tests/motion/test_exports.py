@@ -1,0 +1,80 @@
+"""Exports of motions, read back and followed as a controller would."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from symgrasp.cli.main import main
+from symgrasp.motion.exports import to_actions, to_table
+from symgrasp.poses import from_position_quat, pose_error
+from tests.motion.recorded import recorded_motion, recorded_plan
+
+
+def seconds(stamp: dict[str, int]) -> float:
+    return stamp["sec"] + 1e-9 * stamp["nanosec"]
+
+
+def test_a_controller_that_follows_the_points_follows_the_motion():
+    """Cubics through positions and velocities, as ROS controllers make them, stay near the motion."""
+    motion = recorded_motion()
+    content = json.loads(to_actions(recorded_plan()))
+    assert list(content) == ["panda"]
+    trajectory = content["panda"]["trajectory"]
+    assert trajectory["joint_names"] == list(motion.scene.arm().joint_names)
+    times = np.array([seconds(p["time_from_start"]) for p in trajectory["points"]])
+    assert np.all(np.diff(times) > 0)
+    assert times[-1] == pytest.approx(motion.duration, abs=1e-8)
+    positions, velocities = (
+        np.array([p[key] for p in trajectory["points"]]) for key in ("positions", "velocities")
+    )
+    spline = CubicHermiteSpline(times, positions, velocities)
+    for t in np.linspace(0, motion.duration, 500):
+        q = motion.at(t).values["panda"][motion.scene.arm().indices]
+        np.testing.assert_allclose(spline(t), q, atol=2e-4)
+
+
+def test_hands_move_when_they_do_in_the_motion():
+    motion = recorded_motion()
+    commands = json.loads(to_actions(recorded_plan()))["panda"]["gripper"]
+    names = motion.scene.arm().robot.model.joint_names
+    assert [c["goal"]["command"]["position"] for c in commands] == [0.039, 0.029, 0.039]
+    for command in commands:
+        end = seconds(command["time_from_start"]) + seconds(command["duration"])
+        values = motion.at(end).values["panda"]
+        for joint, value in command["joints"].items():
+            assert values[names.index(joint)] == pytest.approx(value, abs=1e-6)
+
+
+def test_the_table_reads_back():
+    motion = recorded_motion()
+    rows = list(csv.DictReader(io.StringIO(to_table(recorded_plan()))))
+    times = np.array([float(row["time"]) for row in rows])
+    assert np.all(np.diff(times) > 0)
+    assert times[-1] == motion.duration
+    for row in rows[::10]:
+        state = motion.at(float(row["time"]))
+        names = motion.scene.arm().robot.model.joint_names
+        assert [float(row[f"panda/{name}"]) for name in names] == state.values["panda"].tolist()
+        x, y, z, *quat = (float(row[f"object/{part}"]) for part in ("x", "y", "z", "qw", "qx", "qy", "qz"))
+        distance, angle = pose_error(from_position_quat((x, y, z), quat), state.T_world_object)
+        assert distance < 1e-12
+        assert angle < 1e-7
+        assert row["kind"] == motion.segments[int(row["segment"]) - 1].kind
+
+
+@pytest.mark.parametrize("name", ["motion", "motion-csv"])
+def test_on_the_command_line(name, tmp_path, capsys):
+    path, out = tmp_path / "plan.json", tmp_path / "out"
+    recorded_plan().save(path)
+    assert main(["export", name, str(path), "--out", str(out)]) == 0
+    assert out.stat().st_size > 10_000
+    recorded_plan().model_copy(update={"motion": None}).save(path)
+    assert main(["export", name, str(path), "--out", str(tmp_path / "none")]) == 2
+    assert "motion: None: expected a plan with a motion" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
