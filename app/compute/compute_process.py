@@ -32,7 +32,7 @@ from ..state.requests import (
 )
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
 from .limits import MEMORY_LIMIT
-from .plan_service import OpenedPlan, PlanOutcome, PlanRequest
+from .plan_service import MotionOutcome, MotionRequest, OpenedPlan, PlanOutcome, PlanRequest
 from .process_pool import ProcessPool, WorkerProcess
 from .turns import Place
 
@@ -171,6 +171,10 @@ class ComputeProcess:
         if self._process is None or self._process is not self._planner:
             raise NoPlanError("the list of solutions ended with the process that made it: plan again")
         return self._call("more", progress)
+
+    def motion(self, request: MotionRequest, progress: Progress) -> MotionOutcome:
+        """Find the first of some plans that has a motion; see `PlanService.motion`."""
+        return self._call("motion", progress, request)
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
         """Read and verify a plan file; see `PlanService.open`."""

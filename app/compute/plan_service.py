@@ -11,7 +11,9 @@ import numpy as np
 
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.motion.record import from_plan
+from symgrasp.motion.planning import MotionPlanner
+from symgrasp.motion.record import from_plan, with_motion
+from symgrasp.motion.timing import timed
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.plan.checked_plan import check_plan
 from symgrasp.plan.plan import Hold, Plan, PlanTask
@@ -26,9 +28,10 @@ from symgrasp.planners.planning import (
     plan_sequential,
     sequential_plans,
 )
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+from symgrasp.world import open_world
 
 from ..choices.uploaded_scene import UploadedScene
 from ..files.scene_files import refuse_foreign_files
@@ -39,7 +42,15 @@ from ..state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResu
 from ..state.requests import MapRequest, Maps
 from .map_service import MapService
 
-__all__ = ["OpenedPlan", "PlanOutcome", "PlanRequest", "PlanService", "plan_result"]
+__all__ = [
+    "MotionOutcome",
+    "MotionRequest",
+    "OpenedPlan",
+    "PlanOutcome",
+    "PlanRequest",
+    "PlanService",
+    "plan_result",
+]
 
 PLANS_PER_BATCH = 10
 """How many plans are computed at a time."""
@@ -112,6 +123,36 @@ class PlanOutcome:
             return results.found(self.kind, self.plans, maps, more=self.more, climb=self.climb)
         assert self.refusal
         return results.refused(self.kind, self.refusal, maps, self.climb)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRequest:
+    """Plans of a scene, of which one is to get a motion.
+
+    Attributes:
+        scene: the scene as loaded.
+        poses: task → base pose, of the tasks that were moved.
+        plans: the plans, best first.
+    """
+
+    scene: Scene
+    poses: Mapping[str, ObjectPose]
+    plans: tuple[Plan, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionOutcome:
+    """A plan with a motion.
+
+    Attributes:
+        index: which of the plans that were asked for it is.
+        plan: the plan with its motion.
+        failures: why those before it have none.
+    """
+
+    index: int
+    plan: Plan
+    failures: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +233,25 @@ class PlanService:
         """Return the next plans of the last planner, and whether there may be more."""
         self._progress = progress
         return self._next_plans()
+
+    def motion(self, request: MotionRequest, progress: Progress) -> MotionOutcome:
+        """Find the first of some plans that has a motion.
+
+        Raises:
+            NoPlanError: none has one; says why.
+        """
+        scene = with_poses(request.scene, request.poses)
+        failures: list[str] = []
+        with open_world(scene) as world:
+            planner = MotionPlanner(scene, world)
+            for k, plan in enumerate(request.plans):
+                try:
+                    motion = timed(planner.plan(plan, progress=part_of(progress, k, len(request.plans))))
+                except NoPlanError as error:
+                    failures.append(str(error))
+                else:
+                    return MotionOutcome(k, with_motion(plan, motion), tuple(failures))
+        raise NoPlanError(f"no motion of {len(failures)} plans, of the last: {failures[-1]}")
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
         """Read and verify a plan file; if the plan holds, return all that is needed to show it but its maps.

@@ -73,7 +73,7 @@ class _Server:
         plans, uploads = PlanService(self._maps, folders), UploadService(folders)
         self._methods: dict[str, Callable[..., Any]] = {
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
-            "plan": plans.plan, "more": plans.more, "open": plans.open,
+            "plan": plans.plan, "more": plans.more, "motion": plans.motion, "open": plans.open,
             "read_scene": uploads.read_scene, "measure": uploads.measure, "mount": uploads.mount,
             "read_robot": uploads.read_robot, "put_robot": uploads.put_robot, "rearm": uploads.rearm,
         }  # fmt: skip

@@ -27,7 +27,15 @@ def motion_html(state: State) -> str:
         return f'<div class="sg sg-faint">{escape(NO_MOTION)}</div>'
     moment = motion_state(state)
     now = "" if moment is None else _now(state, plan.motion.segments[moment.segment], moment.segment)
-    return f'<div class="sg">{now}{_legend()}</div>'
+    return f'<div class="sg">{now}{_legend()}{_failures(state)}</div>'
+
+
+def _failures(state: State) -> str:
+    """Say why plans before this one have no motion."""
+    reasons = state.plan_results.motionless
+    first = state.plan_results.index + 1 - len(reasons)
+    lines = [f"solution {k} has no motion: {reason}" for k, reason in enumerate(reasons, start=first)]
+    return "".join(f'<div class="sg-faint">{escape(line)}</div>' for line in lines)
 
 
 def _now(state: State, segment: Segment, index: int) -> str:

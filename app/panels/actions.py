@@ -25,6 +25,9 @@ class PlanActions(Protocol):
     def list_more(self) -> None:
         """Compute further plans and add them to the list."""
 
+    def find_motion(self) -> None:
+        """Find the motion of the plan that is shown, or of the first one after it that has one."""
+
     def open_file(self, name: str, content: bytes) -> None:
         """Verify an uploaded plan file, and show the plan if it holds."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import viser
 
 from ..files.plan_formats import FORMATS, PLAN_LIMIT
@@ -47,6 +49,9 @@ class PlanPanel(Panel):
             visible=False,
         )
         self.motion = self.html()
+        self.with_motion = self.button(
+            "With motion", viser.Icon.ROUTE, plans.find_motion, color="gray", visible=False
+        )
 
     def show(self, state: State) -> None:
         """List the plans and describe the one that is shown."""
@@ -63,13 +68,14 @@ class PlanPanel(Panel):
         self.step.visible = plan_results.last > 0 and not moving
         self.time.visible = self.speed.visible = moving
         if moving:
-            self.time.max = plan_results.end
+            self.time.max = math.ceil(100 * plan_results.end) / 100
         elif plan_results.last:
             self.step.max = float(plan_results.last + 1)
         playing = plan_results.playing == "arms"
         self.play.label = "Pause" if playing else "Play"
         self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
         self.motion.show(motion_html(state))
+        self.with_motion.visible = state.plan is not None and not moving
 
     def write_inputs(self, state: State) -> None:
         """Set the sliders to the plan and task that are shown."""

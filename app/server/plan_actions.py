@@ -11,10 +11,10 @@ from symgrasp.progress import Progress
 
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
-from ..compute.plan_service import OpenedPlan, PlanRequest
+from ..compute.plan_service import MotionRequest, OpenedPlan, PlanRequest
 from ..files.plan_formats import FORMATS
 from ..state.changes import open_upload
-from ..state.plan_changes import more_listed, show_results
+from ..state.plan_changes import more_listed, motion_found, show_results
 from ..state.plan_results import PlanKind, PlanResults
 from ..state.requests import MapRequest, Maps
 from ..state.state import State
@@ -61,6 +61,20 @@ class PlanActions:
             return
         self._session.submit(
             "Listing more solutions", self._process.more, lambda state, result: more_listed(state, *result)
+        )
+
+    def find_motion(self) -> None:
+        """Find the motion of the plan that is shown, or of the first one after it that has one."""
+        state = self._session.state
+        if state is None or state.plan is None:
+            return
+        first = state.plan_results.index
+        plans = tuple(result.plan for result in state.plan_results.plans[first:])
+        request = MotionRequest(state.scene, state.poses, plans)
+        self._session.submit(
+            "Planning the motion",
+            lambda progress: self._process.motion(request, progress),
+            lambda state, found: motion_found(state, first + found.index, found.plan, found.failures),
         )
 
     def open_file(self, name: str, content: bytes) -> None:

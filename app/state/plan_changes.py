@@ -7,6 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from symgrasp.motion.record import from_plan
+from symgrasp.plan.plan import Plan
+
 from .plan_results import PlanResult, PlanResults
 from .state import Pick, State
 
@@ -77,9 +80,15 @@ def show_position(state: State, position: float) -> State:
     )
 
 
-def motion_found(state: State, plan: PlanResult) -> State:
-    """Put a plan with its motion in the place of the plan that is shown."""
-    return show_position(replace(state, plan_results=state.plan_results.with_plan(plan)), 0.0)
+def motion_found(state: State, index: int, plan: Plan, motionless: tuple[str, ...] = ()) -> State:
+    """Show a plan of the list with the motion that was found for it; see `PlanResults.with_motion`."""
+    if index >= len(state.plan_results.plans):
+        return state
+    old = state.plan_results.plans[index]
+    found = replace(old, plan=plan, motion=from_plan(plan, state.scene))
+    return show_position(
+        replace(state, plan_results=state.plan_results.with_motion(index, found, motionless)), 0.0
+    )
 
 
 def choose_speed(state: State, speed: float) -> State:

@@ -145,6 +145,7 @@ class PlanResults:
         speed: of the playback of a motion: seconds of it in a second.
         playing: what is being played.
         opened: the report on the file that was opened last.
+        motionless: why plans that were tried before the one with a motion have none.
     """
 
     sequence_method: str = "best"
@@ -163,6 +164,7 @@ class PlanResults:
     speed: float = 1.0
     playing: Playing = ""
     opened: PlanFileReport | None = None
+    motionless: tuple[str, ...] = ()
 
     # -- derived values ---------------------------------------------------------------------
 
@@ -233,10 +235,16 @@ class PlanResults:
         """Add further plans to the list."""
         return replace(self, plans=(*self.plans, *plans), more=more)
 
-    def with_plan(self, plan: PlanResult) -> PlanResults:
-        """Put a plan in the place of that which is shown."""
-        plans = (*self.plans[: self.index], plan, *self.plans[self.index + 1 :])
-        return replace(self, plans=plans, position=0.0, playing="")
+    def with_motion(self, index: int, plan: PlanResult, motionless: tuple[str, ...] = ()) -> PlanResults:
+        """Put a plan with its motion into the list, in the place of that without, and show it.
+
+        Args:
+            index: of the plan in the list.
+            plan: the same plan with its motion.
+            motionless: why plans that were tried before have none.
+        """
+        plans = (*self.plans[:index], plan, *self.plans[index + 1 :])
+        return replace(self, plans=plans, index=index, position=0.0, playing="", motionless=motionless)
 
     def at_plan(self, index: int) -> PlanResults:
         """Show another plan of the list by its index."""

@@ -38,7 +38,7 @@ PLACES = {
     "symgrasp.survey": Place(4, 4.5),
     "symgrasp.ik": Place(1, 4), "symgrasp.scene": Place(2, 4), "symgrasp.reason": Place(3, 4.5),
     "symgrasp.world": Place(2, 5), "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),
-    "symgrasp.plan": Place(2, 8), "symgrasp.planners": Place(2, 9), "symgrasp.motion": Place(1, 10),
+    "symgrasp.plan": Place(2, 8), "symgrasp.planners": Place(2, 9), "symgrasp.motion": Place(1, 9.5),
     "symgrasp.bench": Place(2, 10),
     "symgrasp.cli": Place(2, 11), "symgrasp.__main__": Place(1, 12),
     "app.choices": Place(5.75, 9), "app.state": Place(5, 10), "app.files": Place(6, 11),

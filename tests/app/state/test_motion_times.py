@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -71,18 +70,22 @@ def test_time_passes_at_the_chosen_speed_to_the_end(speed):
     assert passed == np.ceil(recorded_motion().duration / (0.2 * speed))
 
 
+def without_motion() -> State:
+    bare = recorded_plan().model_copy(update={"motion": None})
+    return plan_changes.motion_found(opened(), 0, bare)
+
+
 def test_a_motion_that_is_found_takes_the_place_of_the_plan_without():
-    shown = opened().plan
-    assert shown
-    plan = replace(shown, plan=recorded_plan().model_copy(update={"motion": None}), motion=None)
-    without = plan_changes.motion_found(opened(), plan)
+    without = without_motion()
     assert without.plan_results.end == 2
     played = plan_changes.played(plan_changes.play_arms(without), 0.5)
     assert played.plan_results.position == pytest.approx(0.5 / SECONDS_PER_TASK)
-    again = plan_changes.motion_found(played, shown)
+    again = plan_changes.motion_found(played, 0, recorded_plan(), ("the carry meets <crate>",))
     assert (again.plan_results.position, again.plan_results.playing) == (0.0, "")
     assert again.plan_results.end == recorded_motion().duration
     assert len(again.plan_results.plans) == 1
+    assert "the carry meets &lt;crate&gt;" in motion_html(again)
+    assert plan_changes.motion_found(again, 7, recorded_plan()) is again
 
 
 def test_words_tell_the_segment_and_whether_there_is_a_motion():
@@ -91,9 +94,7 @@ def test_words_tell_the_segment_and_whether_there_is_a_motion():
     text = motion_html(state)
     assert "carry, pick → pour, panda" in text
     assert f"part 5 of 9, {1e3 * motion.segments[4].clearance:.1f} mm clear" in text
-    assert state.plan
-    without = plan_changes.motion_found(state, replace(state.plan, motion=None))
-    assert "not planned" in motion_html(without)
+    assert "not planned" in motion_html(without_motion())
     assert "carry" not in motion_html(changes.turn(state, 0.3))
 
 
