@@ -34,7 +34,9 @@ SOURCES = (
     "engine/*.py",
     "feasibility/margins.py",
     "ik/*.py",
-    "motion/*.py",
+    "motion/linkage.py",
+    "motion/proof.py",
+    "motion/trees.py",
     "object/manifold.py",
     "planners/*.py",
 )

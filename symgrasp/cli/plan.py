@@ -44,7 +44,12 @@ def add_parser(commands: Commands) -> None:
     text = "; ".join(f"{kind}: {', '.join(methods)}" for kind, methods in ALGORITHMS.items())
     command.add_argument("--method", metavar="METHOD", help=f"{text}; the first is the default")
     command.add_argument("--task", metavar="NAME", help="bimanual: the task that several arms do")
-    command.add_argument("--seed", type=whole(0), default=0, help="hill_climb: seed (default: %(default)s)")
+    text = "with the motion of all arms: the first plan, from --number on, that has one"
+    command.add_argument("--motion", action="store_true", help=text)
+    text = "--motion: the fastest of the N first that have one (default: 1)"
+    command.add_argument("--best", metavar="N", type=whole(1), default=1, help=text)
+    text = "of hill_climb and --motion: seed (default: %(default)s)"
+    command.add_argument("--seed", type=whole(0), default=0, help=text)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,13 +58,16 @@ def run(args: argparse.Namespace) -> int:
     method = _method(args)
     scene = checked_scene(args.scene)
     with progress_of(f"{args.kind} plan") as progress:
-        if method == ALGORITHMS[args.kind][0]:
+        if args.motion:
+            plan = _moving(args, scene, method, progress)
+        elif method == ALGORITHMS[args.kind][0]:
             plan = _listed(args, scene, progress)
         else:
             plan = _by_other_method(args, scene, method, progress)
     if args.out:
         plan.save(args.out)
         _print_holds(plan)
+        _print_motion(plan)
         say(f"written to {args.out}")
     return 0
 
@@ -78,7 +86,32 @@ def _method(args: argparse.Namespace) -> Any:
         raise InputError("command line", "--method", method, one_of(methods, method))
     if method != methods[0] and (args.list or args.number > 1):
         raise InputError("command line", "--method", method, f"{methods[0]}: {method} finds one plan only")
+    if args.best > 1 and not args.motion:
+        raise InputError("command line", "--best", args.best, "--motion: its duration is compared")
+    if args.motion and args.list:
+        raise InputError("command line", "--motion", True, "no --list, which lists plans without motions")
     return method
+
+
+def _moving(args: argparse.Namespace, scene: Scene, method: Any, progress: Progress | None) -> Plan:
+    """Return the plan with a motion that is asked for, and print why others have none."""
+    from symgrasp.motion.choosing import best_motion, failures_in_words
+    from symgrasp.planners.planning import bimanual_plans, handover_plans, sequential_plans
+
+    if method != ALGORITHMS[args.kind][0]:
+        plans = (_by_other_method(args, scene, method, progress) for _ in range(1))
+    elif args.kind == "sequential":
+        plans = sequential_plans(scene, args.arm, progress=progress)
+    elif args.kind == "bimanual":
+        plans = bimanual_plans(scene, args.task, progress=progress)
+    else:
+        plans = handover_plans(scene, progress=progress)
+    if len(list(islice(plans, args.number - 1))) < args.number - 1:
+        raise InputError("command line", "--number", args.number, "fewer: there are no more plans")
+    plan, failures = best_motion(scene, plans, args.best, args.seed, progress)
+    for line in failures_in_words(failures):
+        say(line)
+    return plan
 
 
 def _by_other_method(args: argparse.Namespace, scene: Scene, method: Any, progress: Progress | None) -> Plan:
@@ -132,3 +165,14 @@ def _print_holds(plan: Plan) -> None:
             say("  nothing holds the object up but the hands (supported: false)")
         for hold in task.holds:
             say(f"  {hold.arm} holds at {place_in_words(hold.grasp)}, {1e3 * hold.clearance:.1f} mm clear")
+
+
+def _print_motion(plan: Plan) -> None:
+    """Print the parts of the motion of a plan that has one."""
+    if plan.motion is None:
+        return
+    for segment in plan.motion.segments:
+        where = dict.fromkeys((segment.task_from, segment.task_to))
+        what = f"{segment.kind} {', '.join(segment.joints)}: {' → '.join(where)}"
+        say(f"{what}, {segment.times[-1]:.2f} s, {1e3 * segment.clearance:.1f} mm clear")
+    say(f"motion of {plan.motion.duration:.1f} s in {len(plan.motion.segments)} parts")

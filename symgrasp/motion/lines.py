@@ -71,7 +71,7 @@ def follow(
     solver: Solver,
     poses: Sequence[Array],
     start: Array | None = None,
-    value: Array | None = None,
+    end: Array | None = None,
 ) -> LineTree:
     """Follow a path with the only arm that moves.
 
@@ -80,7 +80,7 @@ def follow(
         solver: the inverse kinematics of the arm.
         poses: ``T_world_tool`` (4, 4) at each sample.
         start: (m, n) configurations at the first sample to start from; all that are free if None.
-        value: (m,) clearance (m) with which they start.
+        end: (m, n) configurations at the last sample to arrive at; all of them if None.
 
     Raises:
         NoMotionError: the path cannot be followed to its end; says where and why it ends.
@@ -89,12 +89,11 @@ def follow(
     reached, hits = prove(situation, layer, layer, CLEAR)
     if not (reached >= 0).any():
         raise NoMotionError(f"its start is not free: {blockers(situation, hits)}")
-    if value is not None:
-        reached = np.where(reached >= 0, np.minimum(reached, value), reached)
     layer, reached = layer[reached >= 0], reached[reached >= 0]
     layers, befores = [layer], []
     for k, pose in enumerate(poses[1:], start=1):
-        following = configurations(solver, pose)
+        last = k == len(poses) - 1
+        following = end if last and end is not None else configurations(solver, pose)
         new = _following_turns(layer, following, situation.linkage.limits)
         a, b = _edges(layer, new)
         middle = _middle(poses[k - 1], pose)

@@ -11,7 +11,9 @@ from symgrasp.engine.geometry import PlacedPiece, link_piece, object_piece, obst
 from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.engine.tree import Tree, build
 from symgrasp.errors import NoPlanError
+from symgrasp.motion.joints import common_joint, joint_index, last_joint, moving_joints
 from symgrasp.motion.linkage import Linkage, Workspace, new_workspace
+from symgrasp.motion.state import State
 from symgrasp.poses import Array, inverse
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.robot import Arm, Robot
@@ -19,45 +21,11 @@ from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, own_pairs
 from symgrasp.world.bullet import BulletWorld
 
-__all__ = ["RESTING", "MotionScene", "Situation", "State"]
+__all__ = ["RESTING", "MotionScene", "Situation"]
 
 RESTING = 2e-3
 """How close (m) the object is to what it rests on, and by how much it counts as smaller while it is lifted
 off or put down: so much of it may be inside, see `symgrasp.world.tasks.RESTING_DEPTH`."""
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Where everything is.
-
-    Attributes:
-        values: robot → values (N,) of all its joints.
-        T_world_object: pose (4, 4) of the object.
-    """
-
-    values: Mapping[str, Array]
-    T_world_object: Array
-
-    def with_arm(self, arm: Arm, q: Array, opening: float | None = None) -> State:
-        """Return the state with an arm at joint values (dof,), and its hand at an opening (m) if given."""
-        values = self.values[arm.robot.name].copy()
-        values[arm.indices] = q
-        for joint, value in (arm.hand.joint_values(opening) if opening is not None else {}).items():
-            values[arm.robot.model.joint_names.index(joint)] = value
-        return State({**self.values, arm.robot.name: values}, self.T_world_object)
-
-    def with_object(self, T_world_object: Array) -> State:
-        """Return the state with the object at a pose (4, 4)."""
-        return State(self.values, T_world_object)
-
-    def joints(self, arm: Arm) -> Array:
-        """Return the joint values (dof,) of an arm."""
-        return self.values[arm.robot.name][arm.indices]
-
-    def tool(self, arm: Arm) -> Array:
-        """Return ``T_world_tool`` (4, 4) of an arm."""
-        links = arm.robot.model.forward(self.values[arm.robot.name])
-        return arm.robot.T_world_base @ links[arm.robot.model.link_index(arm.tool)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +135,7 @@ class MotionScene:
             resting_on: pieces on which the object rests, of which it may be inside a little.
             tilt: largest angle (rad) of the axis of the object from the vertical, while it is moved.
         """
-        joints = _moving_joints(arms, hands)
+        joints = moving_joints(arms, hands)
         joint_rows, parent, frames = self._joint_rows(state, joints)
         pose = self._pose.copy()
         links = {name: self._link_poses(state, robot) for name, robot in self.scene.robots.items()}
@@ -175,7 +143,7 @@ class MotionScene:
         for (name, link), indices in self._links.items():
             model = self.scene.robots[name].model
             pose[indices] = pose_rows(links[name][model.link_index(link)])
-            last = _last(joints, name, model.chain(link))
+            last = last_joint(joints, name, model.chain(link))
             if last >= 0:
                 carrier.update(dict.fromkeys(indices, last))
         carried = bool(held_by) and held_by[0] in arms
@@ -183,7 +151,7 @@ class MotionScene:
         pose[shapes] = pose_rows(state.T_world_object)
         holder = -1
         if carried:
-            holder = _last(joints, held_by[0].robot.name, held_by[0].robot.model.chain(held_by[0].tool))
+            holder = last_joint(joints, held_by[0].robot.name, held_by[0].robot.model.chain(held_by[0].tool))
             carrier.update(dict.fromkeys(self._object.tolist(), holder))
             if len(resting_on):
                 carrier.update(dict.fromkeys(self._core.tolist(), holder))
@@ -226,7 +194,7 @@ class MotionScene:
             pair=np.array([(place[a], b) for a, b, _ in pairs], dtype=np.int64).reshape(-1, 2),
             other=np.array([place.get(b, -1) for _, b, _ in pairs], dtype=np.int64),
             common=np.array(
-                [_common(parent, carrier[a], carrier.get(b, -1)) for a, b, _ in pairs], dtype=np.int64
+                [common_joint(parent, carrier[a], carrier.get(b, -1)) for a, b, _ in pairs], dtype=np.int64
             ),
             distance=np.array([d for _, _, d in pairs], dtype=float),
             tilted=holder if carried and tilt < np.pi else -1,
@@ -238,13 +206,18 @@ class MotionScene:
             tilt=float(min(tilt, np.pi)),
         )
         columns = {
-            arm.name: np.array([_index(joints, arm.robot.name, name) for name in arm.joint_names])
+            arm.name: np.array([joint_index(joints, arm.robot.name, name) for name in arm.joint_names])
             for arm in arms
         }
         tree = build(self.pieces.size, pose, np.array(standing, dtype=np.int64))
         work = new_workspace(linkage, self.pieces, pose)
         apart = np.array([self.names[a].body != self.names[b].body for a, b, _ in pairs], dtype=bool)
         return Situation(joints, columns, linkage, self.pieces, tree, work, apart, self.names)
+
+    def rests(self, T_world_object: Array) -> bool:
+        """Whether the object stands on something at a pose (4, 4)."""
+        with self._world.preserving_state():
+            return self._world.object_rests(T_world_object)
 
     def supports(self, T_world_object: Array) -> list[int]:
         """Return the pieces of the obstacles that the object touches at a pose (4, 4)."""
@@ -255,11 +228,11 @@ class MotionScene:
 
     def _links_moved_by(self, arms: Sequence[Arm]) -> set[int]:
         """Return the pieces that the joints of some arms move."""
-        joints = _moving_joints(arms, ())
+        joints = moving_joints(arms, ())
         return {
             piece
             for (name, link), own in self._links.items()
-            if _last(joints, name, self.scene.robots[name].model.chain(link)) >= 0
+            if last_joint(joints, name, self.scene.robots[name].model.chain(link)) >= 0
             for piece in own
         }
 
@@ -276,7 +249,7 @@ class MotionScene:
         origin = frames.copy()
         for j, (robot, joint) in enumerate(joints):
             before = [b for b in robot.model.chain(robot.model.link_names[joint.child]) if b is not joint]
-            parent[j] = _last(joints, robot.name, before)
+            parent[j] = last_joint(joints, robot.name, before)
             if parent[j] >= 0:
                 origin[j] = inverse(frames[parent[j]]) @ frames[j]
         rows = (
@@ -418,44 +391,6 @@ def _core(piece: Piece) -> Piece:
     low, high = h.min() + RESTING, max(h.min() + RESTING, h.max() - RESTING)
     inner = np.column_stack([np.maximum(r - RESTING, 0.0), np.zeros(len(r)), h.clip(low, high)])
     return Piece(inner, rounding=piece.rounding, slack=np.inf, revolved=True)
-
-
-def _moving_joints(arms: Sequence[Arm], hands: Sequence[Arm]) -> list[tuple[Robot, Joint]]:
-    """Return the joints of some arms and hands with their robots, in the order of their chains; each once."""
-    found: dict[tuple[str, str], tuple[Robot, Joint]] = {}
-    for arm in arms:
-        for joint in arm.robot.model.chain(arm.tool):
-            if joint.name in arm.joint_names:
-                found.setdefault((arm.robot.name, joint.name), (arm.robot, joint))
-    for arm in hands:
-        model = arm.robot.model
-        sources = {model.joint_names.index(name) for name in arm.hand.joints}
-        own = [joint for joint in model.joints if joint.source in sources]
-        for joint in sorted(own, key=lambda j: len(model.chain(model.link_names[j.child]))):
-            found.setdefault((arm.robot.name, joint.name), (arm.robot, joint))
-    return list(found.values())
-
-
-def _last(joints: Sequence[tuple[Robot, Joint]], robot: str, chain: Sequence[Joint]) -> int:
-    """Return which of the moving joints is the last in a chain of joints of a robot, -1 if none is."""
-    names = [joint.name for joint in chain]
-    own = [(names.index(j.name), k) for k, (r, j) in enumerate(joints) if r.name == robot and j.name in names]
-    return max(own)[1] if own else -1
-
-
-def _index(joints: Sequence[tuple[Robot, Joint]], robot: str, name: str) -> int:
-    return next(k for k, (own, joint) in enumerate(joints) if own.name == robot and joint.name == name)
-
-
-def _common(parent: np.ndarray, a: int, b: int) -> int:
-    """Return the last joint that carries what joints a and b carry, -1 if there is none."""
-    above = set()
-    while a >= 0:
-        above.add(a)
-        a = int(parent[a])
-    while b >= 0 and b not in above:
-        b = int(parent[b])
-    return b
 
 
 def _across(vectors: Array, axis: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symgrasp.ik import Solver
+from symgrasp.motion.lines import configurations
 from symgrasp.object.profile import Profile
 from symgrasp.plan.plan import Hold
 from symgrasp.poses import Array, from_rotation, pose_error, rotation_about, translation
@@ -33,7 +34,8 @@ class Grip:
 
     Attributes:
         arm: the arm.
-        solver: its inverse kinematics.
+        solver: its inverse kinematics at the samples of maps, which give its configurations.
+        fine: the same at more samples, those of maps among them, for straight paths.
         T_object_tool: pose (4, 4) of the tool in the object.
         open: opening (m) of the hand around the object.
         closed: opening (m) of the hand that holds it.
@@ -41,18 +43,27 @@ class Grip:
 
     arm: Arm
     solver: Solver
+    fine: Solver
     T_object_tool: Array
     open: float
     closed: float
 
     @staticmethod
-    def of(hold: Hold, arm: Arm, solver: Solver, profile: Profile) -> Grip:
-        """Return the grasp that a plan states."""
+    def of(hold: Hold, arm: Arm, solver: Solver, fine: Solver, profile: Profile) -> Grip:
+        """Return the grasp that a plan states; see `Grip` for the arguments."""
         g, hand = hold.grasp, arm.hand
         radius = float(profile.radius(g.h))
         closed = float(np.clip(2 * radius, hand.min_opening, hand.max_opening))
         tool = hand.tool_pose(np.eye(4), g.h, g.theta, g.roll, radius)
-        return Grip(arm, solver, tool, hold.opening, closed)
+        return Grip(arm, solver, fine, tool, hold.opening, closed)
+
+    def tool(self, T_world_object: Array) -> Array:
+        """Return ``T_world_tool`` (4, 4) with the object at a pose (4, 4)."""
+        return T_world_object @ self.T_object_tool
+
+    def configurations(self, T_world_object: Array) -> Array:
+        """Return its configurations (m, n) with the object at a pose (4, 4)."""
+        return configurations(self.solver, self.tool(T_world_object))
 
 
 def retreating(grip: Grip, T_world_object: Array, length: float, profile: Profile) -> list[Array]:
@@ -67,7 +78,7 @@ def retreating(grip: Grip, T_world_object: Array, length: float, profile: Profil
     tips = max(float(points[:, 2].max()) for points in grip.arm.hand_hulls(grip.open))
     standoff = float(np.hypot(*grip.T_object_tool[:2, 3]))
     length = max(length, float(profile.points[:, 1].max()) + APART + tips - standoff)
-    tool = T_world_object @ grip.T_object_tool
+    tool = grip.tool(T_world_object)
     return straight(tool, tool @ translation([0, 0, -length]))
 
 

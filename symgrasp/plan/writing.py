@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Literal, NamedTuple
 
@@ -23,14 +23,15 @@ from symgrasp.plan.plan import (
     Pose,
     SceneRecord,
 )
-from symgrasp.poses import rotation_z
+from symgrasp.poses import Array, rotation_z
 from symgrasp.robot.configuration import ArmConfiguration
+from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import support_margins
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 
-__all__ = ["Held", "write_plan", "write_task"]
+__all__ = ["Held", "with_configurations", "write_plan", "write_task"]
 
 
 ERROR = 1e-5
@@ -82,7 +83,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
                 joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
                 hand_joints=arm.hand.joint_values(opening),
                 opening=opening,
-                clearance=_at_most(world.clearance(arm, CLEARANCE_LIMIT + ERROR, arms) - ERROR),
+                clearance=_stated_clearance(world, arm, arms),
                 margin_along=margin.along,
                 margin_around=margin.around,
             )
@@ -95,6 +96,39 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
         holds=tuple(entries),
         balance={robot: _at_most(margin - ERROR) for robot, margin in margins.items()},
     )
+
+
+def with_configurations(
+    world: BulletWorld, plan: Plan, configurations: Sequence[Mapping[str, Array]]
+) -> Plan:
+    """Return a plan with other configurations of the same grasps.
+
+    Args:
+        world: a world of the scene, which stays as it is.
+        plan: the plan.
+        configurations: for each task, arm → joint values (dof,).
+    """
+    scene, tasks = world.scene, []
+    with world.preserving_state():
+        for task, chosen in zip(plan.tasks, configurations, strict=True):
+            turned = task.object_pose_turned.array()
+            held = [ArmConfiguration(scene.arm(h.arm), chosen[h.arm], h.opening) for h in task.holds]
+            arms = [own.arm for own in held]
+            world.set_object(turned)
+            world.set_arms(held)
+            holds = []
+            for hold, (arm, q, _) in zip(task.holds, held, strict=True):
+                joints = dict(zip(arm.joint_names, q.tolist(), strict=True))
+                clearance = _stated_clearance(world, arm, arms)
+                holds.append(hold.model_copy(update={"joints": joints, "clearance": clearance}))
+            margins = support_margins(scene, turned, held)
+            balance = {robot: _at_most(margin - ERROR) for robot, margin in margins.items()}
+            tasks.append(task.model_copy(update={"holds": tuple(holds), "balance": balance}))
+    return plan.model_copy(update={"tasks": tuple(tasks)})
+
+
+def _stated_clearance(world: BulletWorld, arm: Arm, holders: Sequence[Arm]) -> float:
+    return _at_most(world.clearance(arm, CLEARANCE_LIMIT + ERROR, holders) - ERROR)
 
 
 def _at_most(value: float) -> float:

@@ -1,0 +1,130 @@
+"""Motions of shipped scenes exist, are free in PyBullet, and do what the plans say."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+import pytest
+
+from symgrasp.errors import Cancelled
+from symgrasp.motion.choosing import Failure, best_motion, failures_in_words
+from symgrasp.motion.planning import plan_motion
+from symgrasp.motion.segments import Motion
+from symgrasp.plan.plan import Plan
+from symgrasp.plan.verify import verify
+from symgrasp.planners.planning import (
+    plan_bimanual,
+    plan_handover,
+    plan_sequential,
+    sequential_plans,
+)
+from symgrasp.poses import pose_error
+from symgrasp.world import open_world
+from tests.conftest import load_small
+from tests.motion.dense import collisions_of
+
+STEP = 5e-3
+"""Distance (m) that nothing moves further between two states of a motion that PyBullet looks at here."""
+
+
+def check(plan: Plan, motion: Motion) -> None:
+    scene = motion.scene
+    with open_world(scene) as world:
+        looked, found = collisions_of(world, motion, STEP)
+    assert looked > 100
+    assert not found, found[:3]
+    at = {name: arm.robot.home[arm.indices] for name, arm in scene.arms.items()}
+    for k, segment in enumerate(motion.segments):
+        for name, path in segment.joints.items():
+            arm = scene.arms[name]
+            np.testing.assert_array_equal(path[0], at[name])
+            assert ((path >= arm.lower) & (path <= arm.upper)).all()
+            at[name] = path[-1]
+        if segment.kind == "carry" and segment.task_from != segment.task_to:
+            count = len(next(iter(segment.joints.values())))
+            end = motion.state(k, count - 1, 1.0).T_world_object
+            distance, angle = pose_error(end, motion.poses[segment.task_to])
+            assert distance < 1e-5
+            assert angle < 1e-5
+    for task in plan.tasks:
+        for hold in task.holds:
+            q = np.array(list(hold.joints.values()))
+            rows = np.concatenate([s.joints[hold.arm] for s in motion.segments if hold.arm in s.joints])
+            assert (rows == q).all(axis=1).any()
+
+
+def kinds(motion: Motion) -> list[str]:
+    return [kind for kind, _ in groupby(segment.kind for segment in motion.segments)]
+
+
+def test_pick_pour_place():
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    plan, motion = plan_motion(scene, plan_sequential(scene))
+    assert kinds(motion) == ["open", "reach", "approach", "close", "carry", "open", "retreat", "home"]
+    carries = [(s.task_from, s.task_to) for s in motion.segments if s.kind == "carry"]
+    assert carries == [("pick", "pour"), ("pour", "place")]
+    check(plan, motion)
+
+
+def test_two_arms_lift_a_log():
+    scene = load_small("log_two_robots", 20, 24, 6)
+    plan, motion = plan_motion(scene, plan_bimanual(scene))
+    assert kinds(motion)[-1] == "carry"
+    last = motion.segments[-1]
+    assert last.held_by == ("left", "right")
+    check(plan, motion)
+    # Both hands stay where they are on the log: what one does with it, the other one does too.
+    before = motion.state(len(motion.segments) - 1, 0, 0.0).values
+    end = motion.state(len(motion.segments) - 1, len(last.joints["left"]) - 1, 1.0).values
+    moved = []
+    for name in last.held_by:
+        arm = scene.arms[name]
+        tools = [arm.world_tool_pose(values[arm.robot.name][arm.indices]) for values in (before, end)]
+        moved.append(tools[1] @ np.linalg.inv(tools[0]))
+    np.testing.assert_allclose(moved[0], moved[1], atol=1e-5)
+    assert moved[0][2, 3] > 0.05
+
+
+def test_handover():
+    scene = load_small("handover_between_robots", 12, 24, 8)
+    plan, motion = plan_motion(scene, plan_handover(scene))
+    held = [s.held_by for s in motion.segments]
+    assert ("left",) in held
+    assert held.index(("right",)) > held.index(("left",))
+    check(plan, motion)
+
+
+def test_the_same_seed_gives_the_same_motion():
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    plan = plan_sequential(scene)
+    (_, first), (_, second) = plan_motion(scene, plan, seed=3), plan_motion(scene, plan, seed=3)
+    for a, b in zip(first.segments, second.segments, strict=True):
+        for name in a.joints:
+            np.testing.assert_array_equal(a.joints[name], b.joints[name])
+
+
+def test_the_first_plan_with_a_motion_is_chosen_and_holds():
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    plan, failures = best_motion(scene, sequential_plans(scene))
+    numbers = [failure.number for failure in failures]
+    assert numbers == list(range(1, len(numbers) + 1))
+    report = verify(plan)
+    assert report, report.failures
+
+
+def test_planning_can_be_cancelled():
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    plan = plan_sequential(scene)
+
+    def stop(share: float) -> None:
+        assert 0 <= share <= 1
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        plan_motion(scene, plan, progress=stop)
+
+
+def test_what_failed_is_told_together():
+    failures = [Failure(1, "a"), Failure(2, "a"), Failure(3, "b"), Failure(4, "a")]
+    assert failures_in_words(failures) == ["plans 1–2: a", "plan 3: b", "plan 4: a"]
