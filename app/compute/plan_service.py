@@ -246,11 +246,12 @@ class PlanService:
             planner = MotionPlanner(scene, world)
             for k, plan in enumerate(request.plans):
                 try:
-                    motion = timed(planner.plan(plan, progress=part_of(progress, k, len(request.plans))))
+                    moving, motion = planner.plan(plan, progress=part_of(progress, k, len(request.plans)))
+                    motion = timed(motion)
                 except NoPlanError as error:
                     failures.append(str(error))
                 else:
-                    return MotionOutcome(k, with_motion(plan, motion), tuple(failures))
+                    return MotionOutcome(k, with_motion(moving, motion), tuple(failures))
         raise NoPlanError(f"no motion of {len(failures)} plans, of the last: {failures[-1]}")
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
