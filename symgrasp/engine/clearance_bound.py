@@ -139,7 +139,7 @@ def _planes(vertices: bytes) -> Array | None:
     Links look the same in every engine, and around all of their axes.
     """
     try:
-        return np.unique(ConvexHull(np.frombuffer(vertices).reshape(-1, 3)).equations, axis=0)
+        return ConvexHull(np.frombuffer(vertices).reshape(-1, 3)).equations
     except QhullError:
         return None
 

@@ -101,7 +101,9 @@ def hull_edges(points: Array) -> np.ndarray:
     """Return the index pairs (m, 2) of the edges of the triangulated convex hull of points (n, 3)."""
     triangles = ConvexHull(points).simplices
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    return np.unique(np.sort(pairs, axis=1), axis=0)
+    low, high = np.sort(pairs, axis=1).astype(np.int64).T
+    numbers = np.unique(low * len(points) + high)  # which is faster than of rows
+    return np.stack(np.divmod(numbers, len(points)), axis=1)
 
 
 @lru_cache(maxsize=1024)
