@@ -67,6 +67,8 @@ class FeasibilityMap:
             collision, of the candidate that came closest to being free; -1 elsewhere.
         depth: (R, H, A) how much closer (m) than allowed that pair is, NaN elsewhere.
         shown_in: the scene, for `show`; it is not saved, so a map from a file has None.
+        ease: (R, H, A) how easily the arm stands at each witness, see `symgrasp.robot.posture.ease`, where
+            planners have asked for it; it is not saved.
     """
 
     scene: str
@@ -85,6 +87,7 @@ class FeasibilityMap:
     pair: np.ndarray
     depth: Array
     shown_in: Scene | None = None
+    ease: Array | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
@@ -160,6 +163,8 @@ class FeasibilityMap:
             name: np.roll(getattr(self, name), -k, axis=2)
             for name in ("reason", "q", "sample", "branch", "clearance", "pair", "depth")
         }
+        if self.ease is not None:
+            rolled["ease"] = np.roll(self.ease, -k, axis=2)
         turned = self.T_world_object @ rotation_z(delta)
         return replace(self, T_world_object=turned, manifold=manifold, **rolled)
 

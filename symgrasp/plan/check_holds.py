@@ -11,6 +11,7 @@ from symgrasp.plan.check_poses import TOLERANCE, check_pose, same_pose
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Hold, PlanTask
 from symgrasp.plan.report import Report
 from symgrasp.poses import Array
+from symgrasp.robot.posture import conditioning, limit_slack
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import support_margins
 from symgrasp.scene.scene import Scene
@@ -84,6 +85,13 @@ def _check_arm(hold: Hold, arm: Arm, q: Array, who: str, report: Report) -> None
     for name, value, lower, upper in zip(arm.joint_names, q, arm.lower, arm.upper, strict=True):
         text = f"{who}: {name} is {value:.6f}, outside [{lower:g}, {upper:g}]"
         report.expect(lower <= value <= upper, text)
+    slack, condition = float(limit_slack(arm, q)), float(conditioning(arm, q))
+    if hold.limit_slack is not None:
+        text = f"{who}: {np.rad2deg(slack):.4f}° from a limit, not {np.rad2deg(hold.limit_slack):.4f}°"
+        report.at_most(hold.limit_slack, slack, TOLERANCE, text)
+    if hold.conditioning is not None:
+        text = f"{who}: conditioning is {condition:.6f}, not {hold.conditioning:.6f}"
+        report.at_most(hold.conditioning, condition, TOLERANCE, text)
     expected = arm.hand.joint_values(hold.opening)
     same = expected.keys() == hold.hand_joints.keys() and all(
         abs(expected[n] - hold.hand_joints[n]) <= TOLERANCE for n in expected

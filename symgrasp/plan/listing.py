@@ -10,14 +10,16 @@ __all__ = ["place_in_words", "plan_in_words"]
 
 
 def plan_in_words(plan: Plan) -> str:
-    """Say where each arm holds, and what is the least of the margins and clearances."""
+    """Say where each arm holds, and the least of the margins, clearances and distances from limits."""
     holds = [hold for task in plan.tasks for hold in task.holds]
     grasps = dict.fromkeys((hold.arm, place_in_words(hold.grasp)) for hold in holds)
     along = 1e3 * min(hold.margin_along for hold in holds)
     around = math.degrees(min(hold.margin_around for hold in holds))
     clear = 1e3 * min(hold.clearance for hold in holds)
     where = "; ".join(f"{arm} at {place}" for arm, place in grasps)
-    return f"{where}: margins {along:.1f} mm, {around:.1f}°; {clear:.1f} mm clear"
+    text = f"{where}: margins {along:.1f} mm, {around:.1f}°; {clear:.1f} mm clear"
+    slacks = [hold.limit_slack for hold in holds if hold.limit_slack is not None]
+    return f"{text}; {math.degrees(min(slacks)):.1f}° from limits" if slacks else text
 
 
 def place_in_words(grasp: Grasp) -> str:

@@ -126,6 +126,15 @@ class Hold(_Part):
     )
     margin_along: Positive = Field(description="distance along the axis to an infeasible cell (m)")
     margin_around: Positive = Field(description="angle about the axis to an infeasible cell (rad)")
+    limit_slack: Finite | None = Field(
+        default=None, ge=0, description="distance (rad) of the nearest joint from its limit, at most π"
+    )
+    conditioning: Finite | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="smallest over largest singular value of the Jacobian, lengths over that of the arm",
+    )
 
 
 class PlanTask(_Part):

@@ -25,6 +25,7 @@ from symgrasp.plan.plan import (
 )
 from symgrasp.poses import Array, rotation_z
 from symgrasp.robot.configuration import ArmConfiguration
+from symgrasp.robot.posture import conditioning, limit_slack
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import support_margins
 from symgrasp.scene.parts import Task
@@ -36,6 +37,9 @@ __all__ = ["Held", "with_configurations", "write_plan", "write_task"]
 
 ERROR = 1e-5
 """By how much (m) a clearance may differ in another world: PyBullet reads URDFs in single precision."""
+
+LAST_DIGIT = 1e-6
+"""Numbers are rounded down to this (m, rad or a ratio)."""
 
 
 class Held(NamedTuple):
@@ -83,9 +87,9 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
                 joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
                 hand_joints=arm.hand.joint_values(opening),
                 opening=opening,
-                clearance=_stated_clearance(world, arm, arms),
                 margin_along=margin.along,
                 margin_around=margin.around,
+                **_of_configuration(world, arm, q, arms),
             )
         )
     return PlanTask(
@@ -119,20 +123,25 @@ def with_configurations(
             holds = []
             for hold, (arm, q, _) in zip(task.holds, held, strict=True):
                 joints = dict(zip(arm.joint_names, q.tolist(), strict=True))
-                clearance = _stated_clearance(world, arm, arms)
-                holds.append(hold.model_copy(update={"joints": joints, "clearance": clearance}))
+                update = {"joints": joints, **_of_configuration(world, arm, q, arms)}
+                holds.append(hold.model_copy(update=update))
             margins = support_margins(scene, turned, held)
             balance = {robot: _at_most(margin - ERROR) for robot, margin in margins.items()}
             tasks.append(task.model_copy(update={"holds": tuple(holds), "balance": balance}))
     return plan.model_copy(update={"tasks": tuple(tasks)})
 
 
-def _stated_clearance(world: BulletWorld, arm: Arm, holders: Sequence[Arm]) -> float:
-    return _at_most(world.clearance(arm, CLEARANCE_LIMIT + ERROR, holders) - ERROR)
+def _of_configuration(world: BulletWorld, arm: Arm, q: Array, holders: Sequence[Arm]) -> dict[str, float]:
+    """Return what a hold states of its arm's joint values (n,), at which the arm stands in the world."""
+    return {
+        "clearance": _at_most(world.clearance(arm, CLEARANCE_LIMIT + ERROR, holders) - ERROR),
+        "limit_slack": _at_most(float(limit_slack(arm, q)) - LAST_DIGIT),
+        "conditioning": _at_most(float(conditioning(arm, q)) - LAST_DIGIT),
+    }
 
 
 def _at_most(value: float) -> float:
-    """Return a length (m) rounded down to micrometres, not below zero: no plan states more than there is."""
+    """Return a number rounded down to six digits, not below zero: no plan states more than there is."""
     return max(0.0, math.floor(1e6 * value + 1e-6) / 1e6)
 
 

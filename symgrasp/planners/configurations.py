@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, cached_property
-from itertools import combinations
+from itertools import combinations, islice
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from symgrasp.engine.robot_pairs import COLLIDING, PlacedRobot, RobotPairs
 from symgrasp.feasibility.candidates import CandidateChecker
-from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.object.manifold import ROLLS
@@ -22,6 +22,7 @@ from symgrasp.planners.combinations import first_combination, members
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.configuration import ArmConfiguration
+from symgrasp.robot.posture import ease
 from symgrasp.robot.robot import Arm
 from symgrasp.world import BulletWorld
 
@@ -56,6 +57,10 @@ class _Choices:
     ) -> None:
         self.configurations, self.samples, self.placed = configurations, samples, placed
         self.left, self.checked = (1 << len(configurations)) - 1, 0
+
+
+EASIEST = 8
+"""Feasible configurations of a cell, the easiest first, of which one takes the place of its witness."""
 
 
 class _At(NamedTuple):
@@ -109,15 +114,19 @@ class ConfigurationFinder:
     ) -> list[ArmConfiguration] | None:
         """Return configurations, one an arm, that are free together, or None if there are none.
 
+        An arm whose witness stands near a limit or a singular pose takes another one, see `_easier`.
+
         Args:
             cells: a feasible cell for every arm.
             torso: arm → sample of its torso, for those that share one.
             every: try all combinations of feasible configurations, not the witnesses alone.
         """
+        at = [_At(k, cells[k], torso.get(arm.name)) for k, arm in enumerate(self.arms)]
         found = witnesses(self.arms, self.maps_at(torso), cells)
+        if every:
+            found = [self._easier(*pair) for pair in zip(at, found, strict=True)]
         if self.conflict(found) is None:
             return found
-        at = [_At(k, cells[k], torso.get(arm.name)) for k, arm in enumerate(self.arms)]
         return self._first_free(at) if every else None
 
     def excluding(self, cells: Sequence[Cell], torso: Mapping[str, int]) -> Iterator[tuple[int, int]]:
@@ -150,6 +159,26 @@ class ConfigurationFinder:
     @cached_property
     def _robot_pairs(self) -> RobotPairs:
         return RobotPairs(self.world)
+
+    def _easier(self, at: _At, witness: ArmConfiguration) -> ArmConfiguration:
+        """Return the one of the easiest configurations that has the largest product of ease and clearance.
+
+        The witness of the map has the largest clearance, so where its ease is 1 it is the best.
+        """
+        arm = witness.arm
+        if ease(arm, witness.q) >= 1:
+            return witness
+        configurations = self._choices(at).configurations
+        eases = ease(arm, np.reshape([c.q for c in configurations], (-1, arm.dof)))
+        order = (int(i) for i in np.argsort(-eases, kind="stable") if eases[i] > ease(arm, witness.q))
+        free = [configurations[i] for i in islice((i for i in order if self._is_feasible(at, i)), EASIEST)]
+        self.world.set_object(self.maps[0].T_world_object)
+
+        def worth(c: ArmConfiguration) -> float:
+            self.world.set_arms([c])
+            return float(ease(arm, c.q)) * self.world.clearance(arm, CLEARANCE_LIMIT, self.arms)
+
+        return max([witness, *free], key=worth)
 
     def _first_free(self, at: Sequence[_At]) -> list[ArmConfiguration] | None:
         """Return the first free combination of the arms' feasible configurations, as a product lists them.

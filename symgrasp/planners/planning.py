@@ -22,6 +22,7 @@ from symgrasp.plan.writing import write_plan
 from symgrasp.planners.bimanual import Climb, ClimbStep
 from symgrasp.planners.solving import TaskVisit, climb, first_grasp, holdings, with_regrasps
 from symgrasp.progress import Progress, part_of
+from symgrasp.robot.posture import ease
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world
@@ -286,14 +287,19 @@ def _visits(
             step = part_of(progress, done, total)
             given = (known or {}).get((task.name, arm))
             if body.name in shared:
-                by_torso = _by_torso(maker, arm, task, given, step)
+                by_torso = [_rated(world, m) for m in _by_torso(maker, arm, task, given, step)]
                 torsos[body.name][arm] = by_torso
-                maps[arm] = given or merged(by_torso)
+                maps[arm] = _rated(world, given or merged(by_torso))
             else:
-                maps[arm] = given or maker.map(arm, task, progress=step)
+                maps[arm] = _rated(world, given or maker.map(arm, task, progress=step))
             done += 1
         visits.append(TaskVisit(task, maps, tuple(torsos.values())))
     return visits
+
+
+def _rated(world: BulletWorld, m: FeasibilityMap) -> FeasibilityMap:
+    """Return a map that knows how easily the arm stands at its witnesses."""
+    return replace(m, ease=ease(world.scene.arm(m.arm), m.q))
 
 
 def _by_torso(

@@ -110,11 +110,13 @@ def common_grasps(maps: Sequence[FeasibilityMap]) -> list[CommonGrasp]:
 def surface_margin(m: FeasibilityMap) -> Array:
     """Return (R, H, A) how far (m) the hand may be off on the surface, either way, 0 where infeasible.
 
-    Angles count by the arc that they cover at the cell's radius.
+    Angles count by the arc that they cover at the cell's radius. Where the arm stands near a limit or a
+    singular pose only a part counts, the ease of the map.
     """
     radius = m.manifold.profile.radius(m.manifold.h)
     along, around = np.moveaxis(m.margins, -1, 0)
-    return np.minimum(along, around * radius[None, :, None])
+    margin = np.minimum(along, around * radius[None, :, None])
+    return margin if m.ease is None else margin * m.ease
 
 
 def check_same_grid(maps: Sequence[FeasibilityMap]) -> None:

@@ -24,6 +24,9 @@ STEP = 1e-3
 MAKING = ("versions", "planner")
 """What a plan says about its making, which says nothing about the world."""
 
+LESS = ("clearance", "margin_along", "margin_around", "limit_slack", "conditioning")
+"""What a plan says of a hold that is still true when it is smaller."""
+
 GONE = object()
 """In place of a value that is left out."""
 
@@ -103,10 +106,10 @@ def is_harmless(plan: Plan, other: Plan) -> bool:
         return other.model_copy(update={"scene": plan.scene}) == plan and is_true(other)
     for task, now in zip(plan.tasks, other.tasks, strict=True):
         for hold, held in zip(task.holds, now.holds, strict=True):
-            if held.clearance > hold.clearance or held.margin_along > hold.margin_along:
-                return False
-            if held.margin_around > hold.margin_around:
-                return False
+            for name in LESS:
+                stated = getattr(held, name)
+                if stated is not None and stated > getattr(hold, name):
+                    return False
     if _without(plan) != _without(other):
         return False
     turns = [a.delta - b.delta for a, b in zip(plan.tasks, other.tasks, strict=True)]
@@ -121,7 +124,7 @@ def _without(plan: Plan) -> dict:
     for task in content["tasks"]:
         del task["object_pose"], task["object_pose_turned"], task["delta"]
         for hold in task["holds"]:
-            for name in ("tool_pose", "clearance", "margin_along", "margin_around"):
+            for name in ("tool_pose", *LESS):
                 del hold[name]
     return content
 

@@ -73,7 +73,8 @@ def test_a_plan_for_every_height_and_roll_that_serves_the_sequence():
         radius = float(scene.profile.radius(holds[0].grasp.h))
         assert scene.manifold.cell(holds[0].grasp.h, 0.0)[0] == grasp.row
         assert holds[0].grasp.roll == ROLLS[grasp.roll]
-        assert min(min(h.margin_along, h.margin_around * radius) for h in holds) == grasp.margin
+        margin = min(min(h.margin_along, h.margin_around * radius) for h in holds)
+        assert margin >= grasp.margin  # of which only a part counts near a limit
         for task, runs in zip(plan.tasks, grasp.intervals, strict=True):
             theta = task.holds[0].grasp.theta + task.delta  # where on the map of the pose as given
             _, column = scene.manifold.cell(holds[0].grasp.h, theta)
