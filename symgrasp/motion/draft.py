@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symgrasp.errors import SceneError
 from symgrasp.motion.lines import LineTree, follow
 from symgrasp.motion.search import STATED, NoMotionError, blockers, connect, prove
 from symgrasp.motion.segments import Kind, Motion, Opening, Segment
@@ -63,6 +64,11 @@ class MotionDraft:
         progress: Progress | None,
     ) -> None:
         self._bodies, self._scene, self._grips = bodies, bodies.scene, grips
+        falling = [hold.robot for task in plan.tasks for hold in task.holds if task.balance]
+        if falling:
+            raise NoMotionError(
+                f"motions of robots that can fall are not planned: {falling[0]} has a support"
+            )
         self._tasks, self._seed, self._progress = plan.tasks, seed, progress
         self._lifts = plan.kind == "bimanual"
         self._state = self._bodies.home().with_object(plan.tasks[0].object_pose_turned.array())
@@ -268,6 +274,8 @@ class MotionDraft:
         poses = [start]
         for pose in (lifted(start, height), *(() if before is task else (lifted(end, height), end))):
             poses += straight(poses[-1], pose)[1:]
+        if before is not task and max(map(_tilt_of, poses)) > self._tilt(before, task):
+            raise NoMotionError(f"{what}: the object would be tilted too far")
         arms = [self._held[name].arm for name in names]
         resting = sorted({piece for own in supports.values() for piece in own})
         trees: list[LineTree] = []
@@ -308,8 +316,25 @@ class MotionDraft:
         self._state = self._state.with_object(poses[-1])
 
     def _tilt(self, before: PlanTask, task: PlanTask) -> float:
-        """Return the largest tilt (rad) of the object on the way from a task to the next."""
-        return np.inf
+        """Return the largest tilt (rad) of the object on the way from a task to the next.
+
+        Raises:
+            SceneError: it is tilted further in one of them.
+        """
+        carries = self._scene.file.carries()
+        own = [c.tilt_deg for c in carries if c.tasks == (before.name, task.name)]
+        limits = own or [c.tilt_deg for c in carries if c.tasks is None]
+        if not limits:
+            return np.inf
+        limit = np.deg2rad(min(limits))
+        for end in (before, task):
+            tilt = _tilt_of(end.object_pose_turned.array())
+            if tilt >= limit:
+                expected = (
+                    f"more than the {np.rad2deg(tilt):.1f}° of task {end.name}, or limits of pairs of tasks"
+                )
+                raise SceneError(self._scene.source, "carry: tilt_deg", min(limits), expected)
+        return limit
 
     # -- segments ----------------------------------------------------------------------------
 
@@ -410,6 +435,12 @@ def _kept(before: PlanTask, task: PlanTask) -> list[str]:
     """Return the arms that hold the object in both tasks, by the same grasp."""
     grasps = {hold.arm: hold.grasp for hold in task.holds}
     return [hold.arm for hold in before.holds if grasps.get(hold.arm) == hold.grasp]
+
+
+def _tilt_of(T_world_object: Array) -> float:
+    """Return the tilt (rad) of the axis of an object at a pose (4, 4)."""
+    x, y, z = T_world_object[:3, 2]
+    return float(np.arctan2(np.hypot(x, y), z))
 
 
 def _row(rows: Array, row: Array) -> int:

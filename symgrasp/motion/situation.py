@@ -198,11 +198,7 @@ class MotionScene:
             ),
             distance=np.array([d for _, _, d in pairs], dtype=float),
             tilted=holder if carried and tilt < np.pi else -1,
-            upright=(
-                np.ascontiguousarray((inverse(frames[holder]) @ state.T_world_object)[:3, 2])
-                if carried
-                else np.zeros(3)
-            ),
+            upright=local[place[int(self._object[0])], 2:9:3].copy() if carried else np.zeros(3),
             tilt=float(min(tilt, np.pi)),
         )
         columns = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -299,6 +300,16 @@ class TaskFile(_Strict):
     supported: StrictBool | None = None
 
 
+class CarryFile(_Strict):
+    """How the object is carried in motions: ``tilt_deg`` limits the tilt of its axis from the vertical.
+
+    ``tasks`` are two that follow each other; without them it is meant for the way between any two.
+    """
+
+    tilt_deg: Annotated[float, Field(gt=0, le=180, allow_inf_nan=False)]
+    tasks: tuple[Name, Name] | None = None
+
+
 class MapSettings(_Strict):
     """How finely maps are computed."""
 
@@ -332,6 +343,21 @@ class SceneFile(_Strict):
     obstacles: Annotated[tuple[ObstacleFile, ...], Field(max_length=MOST_OBSTACLES, fail_fast=True)] = ()
     tasks: Annotated[tuple[TaskFile, ...], Field(min_length=1, max_length=MOST_TASKS, fail_fast=True)]
     map: MapSettings = MapSettings()
+    carry: CarryFile | Annotated[tuple[CarryFile, ...], Field(max_length=MOST_TASKS)] | None = None
+
+    @model_validator(mode="after")
+    def _known_carries(self) -> SceneFile:
+        names = [task.name for task in self.tasks]
+        for carry in self.carries():
+            if carry.tasks is not None and carry.tasks not in pairwise(names):
+                raise ValueError(f"carry: tasks that follow each other, not {list(carry.tasks)}")
+        return self
+
+    def carries(self) -> tuple[CarryFile, ...]:
+        """Return what is said of carrying, as a list."""
+        if isinstance(self.carry, CarryFile):
+            return (self.carry,)
+        return self.carry or ()
 
     @model_validator(mode="after")
     def _not_too_many(self) -> SceneFile:

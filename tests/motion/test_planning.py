@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 import pytest
 
-from symgrasp.errors import Cancelled
+from symgrasp.errors import Cancelled, SceneError
 from symgrasp.motion.choosing import Failure, best_motion, failures_in_words
 from symgrasp.motion.planning import plan_motion
 from symgrasp.motion.segments import Motion
@@ -20,6 +20,7 @@ from symgrasp.planners.planning import (
     sequential_plans,
 )
 from symgrasp.poses import pose_error
+from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 from tests.conftest import load_small
 from tests.motion.dense import collisions_of
@@ -93,6 +94,35 @@ def test_handover():
     assert ("left",) in held
     assert held.index(("right",)) > held.index(("left",))
     check(plan, motion)
+
+
+def carried(tilt_deg: float, **more) -> Scene:
+    content = load_small("pick_pour_place", 12, 24, 8).content
+    tasks = [task for task in content["tasks"] if task["name"] != "pour"]
+    return Scene.from_content({**content, "tasks": tasks, "carry": {"tilt_deg": tilt_deg, **more}})
+
+
+def test_a_full_glass_is_kept_upright():
+    scene = carried(10.0)
+    plan, motion = plan_motion(scene, plan_sequential(scene))
+    (k,) = (k for k, segment in enumerate(motion.segments) if segment.kind == "carry")
+    count = len(next(iter(motion.segments[k].joints.values())))
+    rows = np.linspace(0, count - 1, 400)
+    z = np.array([motion.state(k, row, row / (count - 1)).T_world_object[2, 2] for row in rows])
+    assert np.rad2deg(np.arccos(z.clip(-1, 1))).max() <= 10.0
+    check(plan, motion)
+
+
+def test_a_limit_of_the_tilt_that_a_task_exceeds_is_refused():
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    scene = Scene.from_content({**scene.content, "carry": {"tilt_deg": 15}})
+    with pytest.raises(SceneError, match=r"carry: tilt_deg.*task pour"):
+        plan_motion(scene, plan_sequential(scene))
+
+
+def test_a_limit_between_tasks_that_do_not_follow_each_other_is_refused():
+    with pytest.raises(SceneError, match="carry"):
+        carried(15.0, tasks=["place", "pick"])
 
 
 def test_the_same_seed_gives_the_same_motion():
