@@ -18,6 +18,7 @@ from symgrasp.compiling import njit
 from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
 from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.simplex import FAST
+from symgrasp.engine.walk import next_near
 
 __all__ = ["FREE_BAND", "HIT_BAND", "UNDECIDED", "check_arm", "check_hand", "check_row"]
 
@@ -146,18 +147,15 @@ def _pairs(pieces, scratch, pairs, first, end, gap, best):
 @njit(**FAST)
 def _against_static(pieces, tree, scratch, k, margin, gap, best):
     """Check piece k against the static pieces."""
-    own, box, skip, piece = scratch.box, tree.box, tree.skip, tree.piece
-    node = 0
-    while node < len(skip):
-        if boxes_apart(own, k, node, box, max(gap, margin + FREE_BAND)):
-            node = skip[node]
-            continue
-        if piece[node] >= 0:
-            gap = _pair(pieces, scratch, k, piece[node], margin, gap, best)
-            if gap == -math.inf:
-                return gap
-        node += 1
-    return gap
+    waiting, sure = min(1, len(tree.skip)), margin + FREE_BAND
+    scratch.stack[0] = 0
+    while True:
+        i, waiting, lower = next_near(pieces, tree, scratch, k, sure, max(gap, sure), waiting)
+        if i < 0:
+            return gap
+        gap = min(gap, lower) if lower >= sure else _pair(pieces, scratch, k, i, margin, gap, best)
+        if gap == -math.inf:
+            return gap
 
 
 @njit(**FAST)

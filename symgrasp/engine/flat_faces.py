@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from symgrasp.poses import Array
 
-__all__ = ["convex_faces"]
+__all__ = ["convex_faces", "fills_hull"]
 
 FLATNESS = 1e-7
 """Vertices within this distance (m) of a plane lie in it. It is far below the bands of
@@ -16,6 +16,10 @@ FLATNESS = 1e-7
 
 AREA_TOLERANCE = 1e-9
 """Relative difference of the areas of triangles and of their hull below which they fill it."""
+
+
+HULL_TOLERANCE = 1e-6
+"""Relative difference of volume, and of area, from those of its hull below which a mesh is its surface."""
 
 
 def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
@@ -33,6 +37,22 @@ def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
             faces.append(polygon)
             single[group] = False
     return [*faces, *np.asarray(mesh.triangles)[single]]
+
+
+def fills_hull(mesh: trimesh.Trimesh) -> bool:
+    """Whether a mesh is the surface of its convex hull."""
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    mesh.merge_vertices()
+    if not mesh.is_watertight:
+        return False
+    try:
+        hull = ConvexHull(mesh.vertices)
+    except QhullError:
+        return False
+    return bool(
+        abs(abs(mesh.volume) - hull.volume) <= HULL_TOLERANCE * hull.volume
+        and abs(mesh.area - hull.area) <= HULL_TOLERANCE * hull.area
+    )
 
 
 def _polygon(triangles: Array) -> Array | None:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from symgrasp.engine.balance import balance_of
-from symgrasp.engine.flat_faces import convex_faces
+from symgrasp.engine.flat_faces import convex_faces, fills_hull
+from symgrasp.engine.hulls import with_hulls
 from symgrasp.engine.kinematics import MovingPieces
-from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
+from symgrasp.engine.pieces import PackedPieces, Piece, joined, pack, pose_rows
 from symgrasp.engine.search_types import Balance
-from symgrasp.engine.tree import Tree, build
+from symgrasp.engine.tree import Tree, build, grafted
 from symgrasp.object.profile import COLLISION_FACETS
 from symgrasp.poses import Array, inverse
 from symgrasp.robot.joint import Joint
@@ -40,8 +41,8 @@ class ArmGeometry(NamedTuple):
     Attributes:
         names: (P,) names of the body and link of each piece.
         pieces: those that the arm moves, the rest of the robot's, the object's, and the static ones (the
-            obstacles and the other robots at home), in this order.
-        pose: (P, 12) their poses; placeholders for the moving ones and the object's.
+            obstacles and the other robots at home), in this order; then H hulls of some of these.
+        pose: (P + H, 12) their poses; placeholders for the moving ones and the object's.
         moving: the pieces that the arm moves, and their pairs.
         tree: the boxes of the static pieces.
         pairs: the two links of each pair of the robot's own pieces, in the order of `mark_near`.
@@ -69,11 +70,16 @@ class ArmGeometry(NamedTuple):
 
 
 class PlacedPiece(NamedTuple):
-    """A piece with the name of its body and its pose (4, 4) in the world."""
+    """A piece with the name of its body and its pose (4, 4) in the world.
+
+    Attributes:
+        mesh: which mesh it is a face of, if it is: the same for all of them; and whether that fills its hull.
+    """
 
     name: BodyName
     piece: Piece
     pose: Array
+    mesh: tuple[BodyName, int, bool] | None = None
 
 
 def supports(arm: Arm) -> bool:
@@ -140,6 +146,9 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
         origins, axes = [*origins, np.eye(4)], [*axes, np.array([0.0, 0.0, 1.0])]
     pieces = pack([p.piece for p in placed])
     pose = pose_rows(np.array([p.pose for p in placed]))
+    tree, hulls = _tree(placed, pieces, pose, len(own) + len(objects))
+    pieces = joined(pieces, pack(hulls))
+    pose = np.concatenate([pose, pose_rows(np.tile(np.eye(4), (len(hulls), 1, 1)))])
     pairs = _own_pairs(own_pairs(world.scene, arm.robot.name), links, moving_count)
     together = (pairs < tool_count).all(axis=1)
     base = (pairs[:, 0] < tool_count) & (pairs[:, 1] >= moving_count)
@@ -161,7 +170,7 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
             arm_pair_start=start,
             objects=np.arange(len(own), len(own) + len(objects), dtype=np.int64),
         ),
-        tree=build(pieces.size, pose, np.arange(len(own) + len(objects), len(placed))),
+        tree=tree,
         pairs=[
             frozenset((links[a], links[b]))
             for a, b in np.concatenate([pairs[together], pairs[base], arm_pairs]).tolist()
@@ -171,6 +180,23 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
         balance=balance_of(arm, joints, openings),
         local=of_rows,
     )
+
+
+def _tree(
+    placed: Sequence[PlacedPiece], pieces: PackedPieces, pose: Array, first: int
+) -> tuple[Tree, list[Piece]]:
+    """Return the tree over the static pieces, from index first on, and its hulls, to be put after all."""
+    trees, hulls = [], []
+    for mesh, group in groupby(range(first, len(placed)), lambda k: placed[k].mesh):
+        if mesh is None:
+            trees += [build(pieces.size, pose, np.array([k])) for k in group]
+        else:
+            tree = build(pieces.size, pose, np.array(list(group)))
+            tree, own = with_hulls(tree, pieces, pose, mesh[2])
+            tree.hull[tree.hull >= 0] += len(placed) + len(hulls)
+            trees.append(tree)
+            hulls += own
+    return grafted(trees), hulls
 
 
 def _poses(arm: Arm, links: list[str], into_frames: Array, openings: Sequence[float | None]) -> Array:
@@ -266,23 +292,24 @@ def object_piece(vertices: Array) -> Piece:
 def obstacle_pieces(scene: Scene) -> Iterator[PlacedPiece]:
     """Yield the pieces of the obstacles; those of a mesh are its flat faces."""
     for o in scene.obstacles:
-        for link, shape in o.shapes():
+        for k, (link, shape) in enumerate(o.shapes()):
             name, pose = BodyName(o.name, link), o.T_world_obstacle @ shape.pose
-            for piece in _exact(shape, name):
-                yield PlacedPiece(name, piece, pose)
+            if shape.kind == "mesh":
+                mesh = shape.mesh(f"obstacle {name}")
+                faces = (name, k, fills_hull(mesh))
+                yield from (PlacedPiece(name, Piece(face), pose, faces) for face in convex_faces(mesh))
+            else:
+                yield PlacedPiece(name, _exact(shape), pose)
 
 
-def _exact(shape: CollisionShape, name: BodyName) -> Iterator[Piece]:
-    """Yield the pieces of a shape in its own frame."""
+def _exact(shape: CollisionShape) -> Piece:
+    """Return a box, cylinder or sphere in its own frame."""
     if shape.kind == "box":
-        yield Piece((np.array(list(np.ndindex(2, 2, 2))) - 0.5) * shape.size)
-    elif shape.kind == "cylinder":
+        return Piece((np.array(list(np.ndindex(2, 2, 2))) - 0.5) * shape.size)
+    if shape.kind == "cylinder":
         radius, height = shape.size
-        yield Piece(np.array([[radius, 0.0, -0.5 * height], [radius, 0.0, 0.5 * height]]), revolved=True)
-    elif shape.kind == "sphere":
-        yield Piece(np.zeros((1, 3)), rounding=shape.size[0])
-    else:
-        yield from map(Piece, convex_faces(shape.mesh(f"obstacle {name}")))
+        return Piece(np.array([[radius, 0.0, -0.5 * height], [radius, 0.0, 0.5 * height]]), revolved=True)
+    return Piece(np.zeros((1, 3)), rounding=shape.size[0])
 
 
 def _other_robots(world: BulletWorld, arm: Arm) -> Iterator[PlacedPiece]:

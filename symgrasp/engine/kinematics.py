@@ -10,6 +10,7 @@ import numpy as np
 from symgrasp.compiling import njit
 from symgrasp.engine.boxes import box_of, boxes_of
 from symgrasp.engine.simplex import FAST
+from symgrasp.engine.walk import WAITING
 from symgrasp.poses import Array
 
 __all__ = [
@@ -70,6 +71,7 @@ class Scratch(NamedTuple):
         frames: (n, 12) present joint frames in the world.
         tool: (4, 4) present pose of the tool in the world.
         simplex: (4, 3) for `distance_bounds`.
+        stack: (WAITING,) nodes of the tree, for `next_near`.
         hit: (4,) the pair that was found colliding last, then the pair that ruled out the last rejected
             candidate (-1 where there is none).
         depth: (2,) by how much (m) the first pair is closer than allowed at least, then the margin (m)
@@ -82,6 +84,7 @@ class Scratch(NamedTuple):
     frames: Array
     tool: Array
     simplex: Array
+    stack: np.ndarray
     hit: np.ndarray
     depth: Array
     last_pose: Array
@@ -101,6 +104,7 @@ def new_scratch(pose: Array, size: Array, joints: int) -> Scratch:
         frames=np.empty((joints, 12)),
         tool=np.empty((4, 4)),
         simplex=np.empty((4, 3)),
+        stack=np.empty(WAITING, dtype=np.int64),
         hit=np.full(4, -1, dtype=np.int64),
         depth=np.zeros(2),
         last_pose=np.empty((2, 12)),

@@ -19,6 +19,7 @@ from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED
 from symgrasp.engine.distance import between_centres, distance_bounds_from
 from symgrasp.engine.kinematics import compose, place_pieces
 from symgrasp.engine.simplex import FAST
+from symgrasp.engine.walk import next_near
 
 __all__ = ["check_path_of_arm", "check_path_of_hand", "write_tool"]
 
@@ -97,17 +98,15 @@ def _bound_motion(moving, size, scratch, path):
 @njit(**FAST)
 def _against_static(moving, pieces, tree, scratch, path, row, k, margin):
     """Check piece k against the static pieces."""
-    gap, node, reach = 0.0, 0, margin + FREE_BAND + path.motion[k]
-    while node < len(tree.skip):
-        if boxes_apart(scratch.box, k, node, tree.box, reach):
-            node = tree.skip[node]
-            continue
-        if tree.piece[node] >= 0:
-            gap = min(gap, _pair(moving, pieces, scratch, path, row, k, tree.piece[node], margin))
-            if gap == -math.inf:
-                return gap
-        node += 1
-    return gap
+    gap, reach, waiting = 0.0, margin + FREE_BAND + path.motion[k], min(1, len(tree.skip))
+    scratch.stack[0] = 0
+    while True:
+        i, waiting, _ = next_near(pieces, tree, scratch, k, reach, reach, waiting)
+        if i < 0:
+            return gap
+        gap = min(gap, _pair(moving, pieces, scratch, path, row, k, i, margin))
+        if gap == -math.inf:
+            return gap
 
 
 @njit(**FAST)

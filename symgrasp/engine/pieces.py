@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from symgrasp.poses import Array
 
-__all__ = ["SEEDS", "PackedPieces", "Piece", "pack", "pose_rows"]
+__all__ = ["SEEDS", "PackedPieces", "Piece", "joined", "pack", "pose_rows"]
 
 BRUTE = 12
 """Hulls of at most this many vertices are searched vertex by vertex for their extreme point; larger ones by
@@ -97,6 +97,22 @@ def pack(pieces: Sequence[Piece]) -> PackedPieces:
         np.array(seeds, dtype=np.uint32).reshape(-1, SEEDS),
         index,
         size,
+    )
+
+
+def joined(first: PackedPieces, second: PackedPieces) -> PackedPieces:
+    """Return the pieces of two in one, in this order."""
+    vertices, edges = np.uint32(len(first.vertices)), np.uint32(len(first.edges))
+    ranges = second.ranges.copy()
+    ranges[:, :2] += len(first.vertices)
+    ranges[ranges[:, 2] >= 0, 2] += len(first.seeds)
+    return PackedPieces(
+        np.concatenate([first.vertices, second.vertices]),
+        np.concatenate([first.edge_start[:-1], second.edge_start + edges]),
+        np.concatenate([first.edges, second.edges + vertices]),
+        np.concatenate([first.seeds, second.seeds + vertices]),
+        np.concatenate([first.ranges, ranges]),
+        np.concatenate([first.size, second.size]),
     )
 
 

@@ -13,14 +13,16 @@ The result of a cell depends on its tool pose alone, not on the other cells.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
+from queue import SimpleQueue
 
 import numpy as np
 
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm, check_row
-from symgrasp.engine.kinematics import MovingPieces, Scratch, copied, place_arm, place_hand
+from symgrasp.engine.kinematics import MovingPieces, Scratch, place_arm, place_hand
 from symgrasp.engine.pieces import PackedPieces
 from symgrasp.engine.retreat_search import arm_retreats, copy_row, moved_along, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
@@ -33,6 +35,7 @@ from symgrasp.engine.search_types import (
     UNDECIDED_KEPT,
     UNREACHABLE,
     Balance,
+    BranchScratch,
     RowChecks,
     SearchInput,
     SearchResult,
@@ -69,7 +72,7 @@ def search(
     moving: MovingPieces,
     pieces: PackedPieces,
     tree: Tree,
-    scratch: Scratch,
+    scratches: Sequence[Scratch],
     inputs: SearchInput,
     balance: Balance,
     joints: int,
@@ -81,7 +84,8 @@ def search(
         moving: the pieces that the arm moves.
         pieces: all P pieces.
         tree: the boxes of the static pieces.
-        scratch: the poses of all pieces and the boxes around them; those of moving ones do not matter.
+        scratches: the poses of all pieces and the boxes around them, for each thread that is to run; those of
+            moving ones do not matter.
         inputs: the cells and what applies to all of them.
         balance: what decides whether the robot stands.
         joints: number n of joints.
@@ -104,14 +108,17 @@ def search(
         hit=np.full((runs, steps, 2), -1, dtype=np.int64),
         depth=np.full((runs, steps), np.nan),
     )
-    own = [
-        (copied(scratch), new_branches(chain, joints, steps - 1, len(moving.frame)))
-        for _ in range(inputs.parts)
-    ]
+    idle: SimpleQueue[tuple[Scratch, BranchScratch]] = SimpleQueue()
+    for scratch in scratches:
+        idle.put((scratch, new_branches(chain, joints, steps - 1, len(moving.frame))))
 
     # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
     def search_part(part: int, wants_rows: bool) -> None:
-        _search_part(chain, moving, pieces, tree, *own[part], inputs, balance, rows, result, part, wants_rows)
+        own = idle.get()
+        try:
+            _search_part(chain, moving, pieces, tree, *own, inputs, balance, rows, result, part, wants_rows)
+        finally:
+            idle.put(own)
 
     search_part(0, wants_rows=True)  # here, where Ctrl-C can interrupt its compiling
     in_parallel(partial(search_part, wants_rows=True), range(1, inputs.parts))
@@ -128,8 +135,8 @@ def _search_part(
     Parts are interleaved, so that each has its share of easy and of hard cells.
 
     Args:
-        scratch: `Scratch` of this part alone.
-        branches: `BranchScratch` of this part alone.
+        scratch: `Scratch` of this thread alone.
+        branches: `BranchScratch` of this thread alone.
         rows: receives the row checks, of all parts before the first cell is searched.
         result: receives what is found.
         part: index of the part.

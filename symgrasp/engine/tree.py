@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from symgrasp.engine.boxes import boxes_of
 from symgrasp.poses import Array
 
-__all__ = ["Tree", "build"]
+__all__ = ["Tree", "build", "grafted"]
 
 
 class Tree(NamedTuple):
@@ -21,11 +22,16 @@ class Tree(NamedTuple):
         box: (N, 6) lower and upper corner of each node.
         skip: (N,) index of the node after the whole subtree.
         piece: (N,) index of the piece of a leaf, -1 for inner nodes.
+        hull: (N,) index of a piece that is the hull of all pieces of a node, -1 where there is none.
+        solid: (N,) whether these pieces are all of the hull's surface, so that they are as near as it is to
+            what is outside.
     """
 
     box: Array
     skip: np.ndarray
     piece: np.ndarray
+    hull: np.ndarray
+    solid: np.ndarray
 
 
 def build(size: Array, pose: Array, indices: np.ndarray) -> Tree:
@@ -36,9 +42,30 @@ def build(size: Array, pose: Array, indices: np.ndarray) -> Tree:
         pose: (P, 12) poses of all P pieces.
         indices: indices of the pieces to put into the tree.
     """
-    boxes, count = boxes_of(size[indices], pose[indices]), len(indices)
+    return _build(boxes_of(size[indices], pose[indices]), indices)
+
+
+def grafted(trees: Sequence[Tree]) -> Tree:
+    """Return a tree over the pieces of several, none of which is empty, with these as its branches."""
+    top = _build(np.array([tree.box[0] for tree in trees]).reshape(-1, 6), np.arange(len(trees)))
+    length = np.array([len(trees[k].skip) if k >= 0 else 1 for k in top.piece], dtype=np.int64)
+    start = np.concatenate([[0], np.cumsum(length)]).astype(np.int64)
+    parts = []
+    for node, k in enumerate(top.piece):
+        if k >= 0:
+            parts.append(trees[k]._replace(skip=trees[k].skip + start[node]))
+        else:
+            row = Tree(*(values[node : node + 1] for values in top))
+            parts.append(row._replace(skip=start[row.skip]))
+    return Tree(*(np.concatenate(values) for values in zip(*parts, strict=True))) if parts else top
+
+
+def _build(boxes: Array, indices: np.ndarray) -> Tree:
+    """Build the tree over pieces of some indices with boxes (n, 6)."""
+    count = len(indices)
     nodes = max(2 * count - 1, 0)
-    tree = Tree(np.empty((nodes, 6)), np.empty(nodes, dtype=np.int64), np.full(nodes, -1, dtype=np.int64))
+    none = np.full(nodes, -1, dtype=np.int64)
+    tree = Tree(np.empty((nodes, 6)), np.empty(nodes, dtype=np.int64), none, none.copy(), none >= 0)
     middles = boxes[:, :3] + boxes[:, 3:]
     order = np.arange(count)
     # Level by level: the nodes of a level have all pieces between them, leaves of earlier levels included.

@@ -18,7 +18,7 @@ from symgrasp.engine.broad_phase import mark_near
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
-from symgrasp.engine.kinematics import new_scratch
+from symgrasp.engine.kinematics import Scratch, copied, new_scratch
 from symgrasp.engine.pieces import pose_rows
 from symgrasp.engine.threads import core_count
 from symgrasp.feasibility.batches import Batch, batches, compiled_parts
@@ -77,6 +77,7 @@ class ExactEngine:
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
         self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces.size, arm.dof)
+        self._copies: list[Scratch] = []
         # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.pairs_within(arm, self._reach)
@@ -147,6 +148,15 @@ class ExactEngine:
         objects = geometry.moving.objects
         scratch.pose[objects] = pose_rows(axis_frame(T_world_object))
         scratch.box[objects] = boxes_of(geometry.pieces.size[objects], scratch.pose[objects])
+
+    def _scratches(self) -> list[Scratch]:
+        """Return scratch for each thread: copied once, because of the static pieces, of which many may be."""
+        while len(self._copies) < core_count():
+            self._copies.append(copied(self._scratch))
+        objects = self._geometry.moving.objects
+        for copy in self._copies:
+            copy.pose[objects], copy.box[objects] = self._scratch.pose[objects], self._scratch.box[objects]
+        return self._copies[: core_count()]
 
     def _search_rows(self, draft: MapDraft, part: int, T_base_tool: Array, progress: Progress | None) -> None:
         """Fill the rows at which the hand fits, some at a time so that progress is told often enough.
@@ -236,7 +246,7 @@ class ExactEngine:
             batch.moving,
             self._geometry.pieces,
             self._geometry.tree,
-            self._scratch,
+            self._scratches(),
             inputs,
             self._balance,
             self.arm.dof,
