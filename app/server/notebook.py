@@ -44,7 +44,9 @@ def map_document(m: FeasibilityMap, scene: Scene) -> str:
 
 
 def plan_document(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap]) -> str:
-    """Return the HTML document of every task of a plan: the turned object and the arms that hold it.
+    """Return the HTML document of a plan, which plays its motion.
+
+    Where it has none, there is a view for each task: of the turned object and the arms that hold it.
 
     Args:
         plan: the plan.
@@ -54,6 +56,8 @@ def plan_document(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], Feasi
     map_results = {(task, arm): MapResult(MapRequest(scene, arm, task), m) for (task, arm), m in maps.items()}
     results = PlanResults().found(plan.kind, (plan_result(plan, scene),), map_results, more=False)
     state = show_results(State.of(scene, scene.name), results)
+    if plan.motion:
+        return _drawn(state)
     views = [
         f"<h3>{escape(printable(task.name))}</h3>"
         f'<iframe srcdoc="{escape(_drawn(show_step(state, step)))}" width="100%" height="{HEIGHT}"></iframe>'

@@ -13,12 +13,13 @@ import numpy as np
 from symgrasp.errors import PlanError
 from symgrasp.motion.record import from_plan
 from symgrasp.motion.segments import Motion
+from symgrasp.page import page_module
 from symgrasp.plan.motion_record import MotionRecord
 from symgrasp.plan.plan import Plan
 from symgrasp.poses import quat_wxyz
 from symgrasp.scene.scene import Scene
 
-__all__ = ["MOTION_EXPORTS", "to_actions", "to_table"]
+__all__ = ["MOTION_EXPORTS", "to_actions", "to_html", "to_table"]
 
 
 def to_actions(plan: Plan) -> str:
@@ -115,11 +116,27 @@ def _moments(motion: Motion) -> list[tuple[float, int]]:
     return [*found, (motion.duration, len(motion.segments) - 1)]
 
 
+def to_html(plan: Plan) -> str:
+    """Return an HTML document that plays the motion in 3D; it needs no server and no network.
+
+    Raises:
+        PlanError: the plan has no motion.
+        SymgraspError: the page is not installed.
+    """
+    _record(plan)
+    scene = Scene.from_content(plan.scene.content, "plan: scene.content")
+    return page_module("server.notebook").plan_document(plan, scene, plan.maps(scene))
+
+
 def _record(plan: Plan) -> MotionRecord:
     if plan.motion is None:
         raise PlanError("plan", "motion", None, "a plan with a motion: symgrasp plan … --motion")
     return plan.motion
 
 
-MOTION_EXPORTS: Mapping[str, Callable[[Plan], str]] = {"motion": to_actions, "motion-csv": to_table}
+MOTION_EXPORTS: Mapping[str, Callable[[Plan], str]] = {
+    "motion": to_actions,
+    "motion-csv": to_table,
+    "html": to_html,
+}
 """Name of the format → what writes it."""

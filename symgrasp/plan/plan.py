@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,10 @@ from symgrasp.files import check_size, parse_json, read_file, write_atomically
 from symgrasp.plan.motion_record import MotionRecord
 from symgrasp.poses import Array, quat_wxyz
 from symgrasp.scene.format import MOST_TASKS, WHOLE, describe_error
+
+if TYPE_CHECKING:  # reading plans takes neither
+    from symgrasp.feasibility.map import FeasibilityMap
+    from symgrasp.scene.scene import Scene
 
 __all__ = [
     "CLEARANCE_LIMIT",
@@ -203,6 +207,16 @@ class Plan(_Part):
         with write_atomically(Path(path)) as file:
             file.write(self.to_json().encode())
 
+    def maps(self, scene: Scene) -> dict[tuple[str, str], FeasibilityMap]:
+        """Compute the maps of all holds: (task, arm) → map of the scene, which must be the plan's."""
+        from symgrasp.feasibility.create import MapMaker  # reading plans takes no physics
+        from symgrasp.world import open_world
+
+        with open_world(scene) as world:
+            maker = MapMaker(world)
+            keys = dict.fromkeys((task.name, hold.arm) for task in self.tasks for hold in task.holds)
+            return {(task, arm): maker.map(arm, task) for task, arm in keys}
+
     def show(self) -> None:
         """Show on the maps of its tasks where the arms hold, and the arms at the object in 3D.
 
@@ -212,15 +226,10 @@ class Plan(_Part):
         Raises:
             SymgraspError: the scene in the plan is unusable.
         """
-        from symgrasp.feasibility.create import MapMaker  # reading plans takes no physics
         from symgrasp.scene.scene import Scene
-        from symgrasp.world import open_world
 
         scene = Scene.from_content(self.scene.content, "plan: scene.content")
-        with open_world(scene) as world:
-            maker = MapMaker(world)
-            keys = dict.fromkeys((task.name, hold.arm) for task in self.tasks for hold in task.holds)
-            maps = {(task, arm): maker.map(arm, task) for task, arm in keys}
+        maps = self.maps(scene)
         for task in self.tasks:
             for hold in task.holds:
                 seen = maps[task.name, hold.arm].shift(task.delta)

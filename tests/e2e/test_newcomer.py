@@ -28,13 +28,14 @@ SLIDERS = {
     "Slide by δ (%)": (0, 100),
     "Solution": (1, 10),
     "Plan step": (1, 3),
+    "Time (s)": (0, 10),
 }
 NUMBERS = {"h (cm)": (-2, 23), "θ (°)": (-180, 180)}
-CHOICES = ("Scene", "Task", "Arm", "Roll", "Colours show", "Object", "Method")
+CHOICES = ("Scene", "Task", "Arm", "Roll", "Colours show", "Object", "Method", "Speed")
 SWITCHES = ("Flat map", "Drag handles", "Handprint", "Compare", "Dark")
 BUTTONS = (
     "Undo", "Redo", "Cancel", "Compute the map", "Put it back", "Let go", "One grasp for all tasks",
-    "List more solutions", "Play", "Pause", "Plan with 1 regrasp", "Make a link", "PNG",
+    "List more solutions", "With motion", "Play", "Pause", "Plan with 1 regrasp", "Make a link", "PNG",
     "Save the scene (YAML)", "Add a task with the object here", "Earlier", "Later", "Remove",
 )  # fmt: skip
 KEYS = ("m", "r", "b", "l", "f", "g", "t", "p", "j", "k", "1", "2", "3", "PageDown", "PageUp", "Escape",

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import json
+import re
 
+import msgspec
 import numpy as np
 import pytest
+import zstandard
 from scipy.interpolate import CubicHermiteSpline
 
 from symgrasp.cli.main import main
-from symgrasp.motion.exports import to_actions, to_table
+from symgrasp.motion.exports import to_actions, to_html, to_table
 from symgrasp.poses import from_position_quat, pose_error
 from tests.motion.recorded import recorded_motion, recorded_plan
 
@@ -66,6 +70,26 @@ def test_the_table_reads_back():
         assert distance < 1e-12
         assert angle < 1e-7
         assert row["kind"] == motion.segments[int(row["segment"]) - 1].kind
+
+
+def test_the_document_plays_the_motion_without_a_network():
+    """What the recording in it does to the nodes of the robot's links, read as viser's player does."""
+    motion = recorded_motion()
+    document = to_html(recorded_plan())
+    (embedded,) = re.findall(r'__VISER_EMBED_DATA__="([^"]+)"', document)
+    assert not re.findall(r"""(?:src|href)\s*=\s*["']https?:""", document)
+    packed = base64.b64decode(embedded)
+    content = zstandard.ZstdDecompressor().decompress(packed[8:], int.from_bytes(packed[:8], "little"))
+    length = int.from_bytes(content[:8], "little")
+    recording = msgspec.msgpack.decode(content[8 : 8 + length])
+    assert recording["durationSeconds"] == pytest.approx(motion.duration, abs=0.06)
+    times = [t for t, message in recording["messages"] if message["type"] == "SetPositionMessage"]
+    assert times == sorted(times)
+    assert len(set(times)) > 0.8 * motion.duration / 0.05
+    last = {m["name"]: m["position"] for _, m in recording["messages"] if m["type"] == "SetPositionMessage"}
+    placed = [position for name, position in last.items() if name.endswith("/object")]
+    goal = motion.at(motion.duration).T_world_object[:3, 3]
+    assert any(np.allclose(position, goal, atol=1e-6) for position in placed)
 
 
 @pytest.mark.parametrize("name", ["motion", "motion-csv"])
