@@ -8,7 +8,7 @@ from symgrasp.cli.shared import Commands, add_command, add_out, add_plan, check_
 
 __all__ = ["FORMATS", "add_parser", "run"]
 
-FORMATS = ("csv", "trajectory", "tsr", "motion", "motion-csv", "html")
+FORMATS = ("csv", "trajectory", "tsr", "motion", "motion-csv", "html", "moveit-scene", "srdf")
 """The keys of `EXPORTS` and `MOTION_EXPORTS` of the modules ``exports``, which take long to import."""
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from symgrasp.errors import PlanError
+from symgrasp.motion.moveit import to_planning_scene, to_srdf
 from symgrasp.motion.record import from_plan
 from symgrasp.motion.segments import Motion
 from symgrasp.page import page_module
@@ -138,5 +139,7 @@ MOTION_EXPORTS: Mapping[str, Callable[[Plan], str]] = {
     "motion": to_actions,
     "motion-csv": to_table,
     "html": to_html,
+    "moveit-scene": to_planning_scene,
+    "srdf": to_srdf,
 }
 """Name of the format → what writes it."""
