@@ -79,7 +79,7 @@ def test_pinocchio_reads_the_srdf(tmp_path):
     model = pinocchio.buildModelFromUrdf(str(urdf))
     pinocchio.loadReferenceConfigurations(model, str(srdf), False)
     states = {"panda_home": scene.arm().joint_names, "panda_hand_home": tuple(scene.arm().hand.joints)}
-    assert {*model.referenceConfigurations.todict()} == {*states}
+    assert {entry.key() for entry in model.referenceConfigurations} == {*states}
     assert {name for names in states.values() for name in names} == {*robot.model.joint_names}
     for name, value in zip(robot.model.joint_names, robot.home, strict=True):
         home = model.referenceConfigurations[next(state for state, names in states.items() if name in names)]
