@@ -25,6 +25,9 @@ each arm follows its own straight line in joint space."""
 FINEST = 5e-4
 """Shortest distance (m) between two states that are checked, where the stated clearance is shorter."""
 
+TILT_TOLERANCE = 0.5
+"""By how much (degrees) the object may tilt beyond its limit where the corners of a path are rounded."""
+
 TOUCHING, SUNK = 2e-3, 2e-3
 """How near (m) the object is to what it rests on, and by how much (m) it may sink into it when it is
 lifted off or put down."""
@@ -114,6 +117,10 @@ def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Ex
     poses, (slip, twist) = states.objects(fine)
     text = f"{where}: the object slips by {1e3 * slip:.2f} mm and {np.rad2deg(twist):.2f}° in the hands"
     expect(slip <= RIGID[0] and twist <= RIGID[1], text)
+    if segment.kind == "carry" and segment.task_from != segment.task_to:
+        tilt = float(np.rad2deg(np.arccos(np.clip(poses[:, 2, 2], -1.0, 1.0)).max()))
+        limit = _largest_tilt(states.scene, segment)
+        expect(tilt <= limit + TILT_TOLERANCE, f"{where}: the object tilts by {tilt:.2f}°, not {limit:g}°")
     near = _NearBodies(states, world, fine, poses)
     for k, pose in enumerate(poses):
         for name, values in fine.items():
@@ -124,6 +131,13 @@ def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Ex
             expect(False, f"{text}, not {1e3 * segment.clearance:.3f} mm beyond the margin")
             return
     expect(True, where)
+
+
+def _largest_tilt(scene: Scene, segment: SegmentRecord) -> float:
+    """Return the largest tilt (degrees) that the scene allows on the way of a segment."""
+    carries = scene.file.carries()
+    own = [carry.tilt_deg for carry in carries if carry.tasks == (segment.task_from, segment.task_to)]
+    return min(own or [carry.tilt_deg for carry in carries if carry.tasks is None], default=180.0)
 
 
 class _NearBodies:

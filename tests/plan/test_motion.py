@@ -207,3 +207,15 @@ def test_a_path_through_an_obstacle_is_named(content):
     with open_world(blocked) as world:
         found = failures(content, world)
     assert any("post" in failure and "(carry)" in failure for failure in found)
+
+
+@pytest.mark.parametrize(
+    ("limit", "tasks", "holds"), [(100.0, None, False), (112.0, None, True), (5.0, 1, False)]
+)
+def test_a_tilt_beyond_the_limit_of_the_scene_is_told(limit, tasks, holds, content):
+    """The bottle is tipped by 110 degrees to pour."""
+    carry = {"tilt_deg": limit} | ({"tasks": ["pour", "place"]} if tasks else {})
+    limited = Scene.from_content({**recorded_plan().scene.content, "carry": carry})
+    with open_world(limited) as world:
+        found = failures(content, world)
+    assert any("the object tilts by 110" in failure for failure in found) == (not holds)
