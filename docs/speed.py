@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from docs.pages import put_between
+from symgrasp.bench.figures import Figure, keyed
 
-__all__ = ["BEGIN", "BENCH", "END", "ROWS", "keyed", "table", "write"]
+__all__ = ["BEGIN", "BENCH", "END", "ROWS", "table", "write"]
 
 ROOT = Path(__file__).parent.parent
 
@@ -20,40 +21,40 @@ BENCH = ROOT / "docs" / "bench.json"
 
 BEGIN, END = "<!-- measured: make bench -->", "<!-- end -->"
 
+ARMS = "every arm: "
+"""How the figures of all arms begin, which are rows too."""
+
 NEXT = "## Security"
 """The section that the table's own stands before."""
 
 ROWS: Mapping[str, str] = {
     "map of bottle_on_table": "the map of `bottle_on_table`: 9,216 cells, 32 redundancy samples",
     "map of bottle_on_table: built once for its arm and obstacles": "… what is built once for it",
+    "the same map with an approach of 0.05 m": "… with an approach of 5 cm, against it",
+    "the same map with an approach of 0.1 m": "… with an approach of 10 cm, against it",
     "maps of all shipped scenes: reference takes": "Algorithm 1 with PyBullet, against our map",
     "maps of all shipped scenes: Pinocchio and Coal takes": "Pinocchio and Coal, against our map",
     "the same boxes, 4 cut into 400": "the map among 400 boxes, against 4",
+    "the same boxes as meshes of 49,152 triangles": "the map among meshes of 49,152 triangles, against boxes",
     "turning the object about its axis": "the map when the object has turned",
+    "symgrasp --help, whole process": "`symgrasp --help`, from start to end",
     "symgrasp map bottle_on_table, whole process": "`symgrasp map bottle_on_table`, from start to end",
     "symgrasp map bottle_on_table, whole process: memory at most": "… memory at most",
+    "a first map, with all that it compiles": "a first map on a machine, with all that it compiles",
+    "a first map, with all that it compiles: a first plan of one arm after it": "… a first plan after it",
+    "a first map, with all that it compiles: a first plan of two arms after it": "… of two arms after it",
+    "maps in two processes at once, over one": "maps in two processes at once, over one",
+    "maps in two processes at once, over one: in CPU time": "… by CPU time, as with a core each",
     "one grasp for 50 tasks on 48 × 96 maps, once the maps exist": "one grasp for 50 tasks, maps given",
     "two hands, complete search with whole robots": "the best placement of two hands, maps given",
     "two hands, hill climbing as printed: climbing takes, on average of all": "hill climbing (Algorithm 3), "
     "average time against it",
+    "four hands on a log, 51 random parts of their maps": "the best placement of four hands, maps given",
 }
 """Name of a figure of the benchmark → what the table calls it.
 
 A figure that belongs to another one is named ``that one: it``.
 """
-
-
-def keyed(figures: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
-    """Return figures by name; indented ones belong to the one above them."""
-    found, above = {}, ""
-    for figure in figures:
-        name = figure["name"]
-        if name.startswith(" "):
-            name = f"{above}: {name.strip()}"
-        else:
-            above = name
-        found[name] = figure
-    return found
 
 
 def table(content: Mapping[str, Any]) -> str:
@@ -62,19 +63,21 @@ def table(content: Mapping[str, Any]) -> str:
     Raises:
         KeyError: a row's figure was not measured.
     """
-    figures = keyed(content["figures"])
+    figures = keyed(map(Figure.from_dict, content["figures"]))
     machine = content["machine"]
     lines = [
         f"Median and spread, measured by `symgrasp bench` on {machine['cpus']} cores ({machine['machine']}), "
-        f"Python {machine['python']}.",
+        f"Python {machine['python']}. CPU time is that of all threads together, and what ratios compare.",
         "",
-        "| what | median | from | to |",
-        "|---|---:|---:|---:|",
+        "| what | median | from | to | CPU |",
+        "|---|---:|---:|---:|---:|",
     ]
-    for name, words in ROWS.items():
-        figure = figures[name]
-        low, middle, high = (_short(v) for v in np.quantile(figure["values"], [0.0, 0.5, 1.0]))
-        lines.append(f"| {words} | {middle} {figure['unit']} | {low} | {high} |")
+    arms = [f for name, f in figures.items() if name.startswith(ARMS)]
+    rows = [(words, figures[name]) for name, words in ROWS.items()]
+    for words, figure in [*rows, *((f"map of {f.name.removeprefix(ARMS)}", f) for f in arms)]:
+        low, middle, high = (_short(v) for v in np.quantile(figure.values, [0.0, 0.5, 1.0]))
+        cpu = f"{_short(float(np.median(figure.cpu)))} {figure.unit}" if figure.cpu else ""
+        lines.append(f"| {words} | {middle} {figure.unit} | {low} | {high} | {cpu} |")
     return "\n".join(lines) + "\n"
 
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +14,7 @@ import trimesh
 import yaml
 
 from symgrasp.bench.figures import Figure
+from symgrasp.bench.timing import Time, ratios, time_of, times
 from symgrasp.feasibility.algorithm1 import furthest
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
@@ -26,11 +25,12 @@ from symgrasp.files import SCENES_DIR
 from symgrasp.ik import solver_for
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
+from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.scene.shipped import extra_of, shipped_scenes
+from symgrasp.scene.shipped import extra_of, missing_extra, shipped_scenes
 from symgrasp.world import BulletWorld, open_world
 
-__all__ = ["against_others", "boxes", "growth", "process", "run", "turning"]
+__all__ = ["against_others", "approach", "boxes", "every_arm", "growth", "run", "turning"]
 
 GRID = {"heights": 48, "angles": 96, "redundancy": 32}
 """The resolution that the figures are for; with two rolls, 9216 cells."""
@@ -50,44 +50,35 @@ FINE = 12288
 CUTS = 10
 """Number of parts that a box is cut into along each of two sides, to make a hundred of one."""
 
-MEASURE_PROCESS = """
-import resource, subprocess, sys, time
-start = time.perf_counter()
-subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
-peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-print(time.perf_counter() - start, peak / (1e6 if sys.platform == "darwin" else 1e3))
-"""
-"""Program that runs a command and prints its time (s) and its peak memory (MB).
-
-It runs as a small process of its own, because the peak of a child includes the memory of its parent that
-it has between fork and exec.
-"""
-
 WITHOUT_COAL = "maps against Pinocchio and Coal: not measured, needs pip install 'symgrasp[bench]'"
 
 
 def run() -> Iterator[Figure]:
     """Run the benchmarks of maps and yield their figures as they are measured."""
-    plain = [name for name, path in shipped_scenes().items() if extra_of(path) is None]
-    yield from against_others(plain, ROUNDS)
+    shipped = shipped_scenes()
+    yield from against_others([name for name, path in shipped.items() if extra_of(path) is None], ROUNDS)
+    here = [name for name, path in shipped.items() if missing_extra(path) is None]
+    yield from every_arm(here, ROUNDS)
+    for name in sorted(set(shipped) - set(here)):
+        yield Figure(f"arms of {name}: not measured, needs pip install 'symgrasp[robots]'", "", ())
+    yield from approach(ROUNDS)
     yield from growth(ROUNDS)
     yield from boxes(ROUNDS)
     yield from turning(20 * ROUNDS)
-    yield from process(3)
 
 
 class _SceneTimes(NamedTuple):
     """Times of one scene.
 
     Attributes:
-        build: to build the engine (s), one value a run.
-        map: to compute a map (s), one value a run.
-        others: slow method → its times as multiples of that of a map, one value a round.
+        build: to build the engine, one time a run.
+        map: to compute a map, one time a run.
+        others: slow method → its time and that of a map, once a round.
     """
 
-    build: list[float]
-    map: list[float]
-    others: dict[str, list[float]]
+    build: list[Time]
+    map: list[Time]
+    others: dict[str, list[tuple[Time, Time]]]
 
 
 Decide = Callable[[Array, float], Any]
@@ -100,17 +91,18 @@ def against_others(scenes: Sequence[str], rounds: int) -> Iterator[Figure]:
     The slow methods decide a random sample of the cells that fit the hand; their time is scaled to all of
     these.
     """
-    times: list[_SceneTimes] = []
+    medians: dict[str, list[float]] = {other: [] for other in SECONDS}
     for name in scenes:
-        times.append(_time_scene(Scene.load(name).with_settings(**GRID), rounds))
-        yield Figure(f"map of {name}", "ms", _ms(times[-1].map))
-        yield Figure("  built once for its arm and obstacles", "ms", _ms(times[-1].build))
-        for other, ratios in times[-1].others.items():
-            yield Figure(f"  {other}, from a random sample of its cells", "×", tuple(ratios))
-    for other in SECONDS:
-        medians = [float(np.median(scene.others[other])) for scene in times if other in scene.others]
-        if medians:
-            yield Figure(f"maps of all shipped scenes: {other} takes", "×", tuple(medians))
+        scene = _time_scene(Scene.load(name).with_settings(**GRID), rounds)
+        yield times(f"map of {name}", "ms", scene.map)
+        yield times("  built once for its arm and obstacles", "ms", scene.build)
+        for other, pairs in scene.others.items():
+            figure = ratios(f"  {other}, from a random sample of its cells", pairs)
+            medians[other].append(float(np.median(figure.values)))
+            yield figure
+    for other, values in medians.items():
+        if values:
+            yield Figure(f"maps of all shipped scenes: {other} takes", "×", tuple(values))
         else:
             yield Figure(WITHOUT_COAL, "", ())
 
@@ -121,33 +113,33 @@ def _time_scene(scene: Scene, rounds: int) -> _SceneTimes:
     with open_world(scene) as world:
         maker = MapMaker(world)
         m = maker.map(arm.name, task)  # compiles what is not compiled yet
-        build = [_time(lambda: ExactEngine(world, arm, scene.manifold)) for _ in range(3)]
+        build = [time_of(lambda: ExactEngine(world, arm, scene.manifold)) for _ in range(3)]
         tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, task.T_world_object)
         world.margin = scene.settings.margin
         methods = dict(_slow_methods(world, scene))
         cells = [Cell(*cell) for cell in np.argwhere(m.reason >= Reason.UNREACHABLE)]
         rng = np.random.default_rng(0)
 
-        def sample(decide: Decide, count: int) -> float:
-            """Return the time (s) for all cells, estimated from a sample."""
+        def sample(decide: Decide, count: int) -> Time:
+            """Return the time for all cells, estimated from a sample."""
             picks = [cells[k] for k in rng.choice(len(cells), min(count, len(cells)), replace=False)]
             world.set_arms(())
             world.set_object(task.T_world_object)
-            time = _time(lambda: [decide(tools[cell], float(m.opening[cell.row])) for cell in picks])
-            return time / len(picks) * len(cells)
+            time = time_of(lambda: [decide(tools[cell], float(m.opening[cell.row])) for cell in picks])
+            share = len(picks) / len(cells)
+            return Time(time.wall / share, time.cpu / share)
 
         counts = {
-            name: max(1, round(SECONDS[name] * len(cells) / sample(decide, CALIBRATION)))
+            name: max(1, round(SECONDS[name] * len(cells) / sample(decide, CALIBRATION).cpu))
             for name, decide in methods.items()
         }
-        times, others = [], {name: [] for name in methods}
+        quick, others = [], {name: [] for name in methods}
         for _ in range(rounds):
             for name, decide in methods.items():
                 slow = sample(decide, counts[name])
-                quick = [_time(lambda: maker.map(arm.name, task)) for _ in range(3)]
-                times += quick
-                others[name].append(slow / float(np.median(quick)))
-    return _SceneTimes(build, times, others)
+                quick += [time_of(lambda: maker.map(arm.name, task)) for _ in range(3)]
+                others[name].append((slow, Time(*np.median(quick[-3:], axis=0).tolist())))
+    return _SceneTimes(build, quick, others)
 
 
 def _slow_methods(world: BulletWorld, scene: Scene) -> Iterator[tuple[str, Decide]]:
@@ -178,8 +170,9 @@ def growth(rounds: int) -> Iterator[Figure]:
     ):
         small, large = settings[min(settings)], settings[max(settings)]
         with _MapTimer(small) as few, _MapTimer(large) as many:
-            ratios = [many.time() / most(large) / (few.time() / most(small)) for _ in range(rounds)]
-        yield Figure(f"time for {what}", "×", tuple(ratios))
+            share = most(small) / most(large)
+            found = ratios("", [(many.time(), few.time()) for _ in range(rounds)]).values
+        yield Figure(f"time for {what}", "×", tuple(share * ratio for ratio in found))
 
 
 def boxes(rounds: int) -> Iterator[Figure]:
@@ -197,15 +190,46 @@ def boxes(rounds: int) -> Iterator[Figure]:
 
     with TemporaryDirectory() as folder, _MapTimer(scene=among(few)) as quick:
 
-        def against(obstacles: list[dict[str, Any]]) -> tuple[float, ...]:
+        def against(name: str, obstacles: list[dict[str, Any]]) -> Figure:
             with _MapTimer(scene=among(obstacles)) as slow:
                 assert np.array_equal(quick.map().feasible, slow.map().feasible)
-                return tuple(slow.time() / quick.time() for _ in range(rounds))
+                return ratios(name, [(slow.time(), quick.time()) for _ in range(rounds)])
 
-        cut = [part for box in few for part in _cut(box)]
-        yield Figure("the same boxes, 4 cut into 400", "×", against(cut))
+        yield against("the same boxes, 4 cut into 400", [part for box in few for part in _cut(box)])
         fine = [_fine_mesh(box, Path(folder)) for box in few]
-        yield Figure(f"the same boxes as meshes of {4 * FINE:,} triangles", "×", against(fine))
+        yield against(f"the same boxes as meshes of {4 * FINE:,} triangles", fine)
+
+
+def every_arm(scenes: Sequence[str], rounds: int) -> Iterator[Figure]:
+    """Time a map of every arm of each scene, and in scenes with several, of each against the quickest."""
+    for name in scenes:
+        scene = Scene.load(name).with_settings(**GRID)
+        tasks: dict[str, Task] = {}
+        for task in scene.tasks.values():
+            for arm in task.arms:
+                tasks.setdefault(arm, task)
+        medians: list[float] = []
+        with open_world(scene) as world:
+            maker = MapMaker(world)
+            for arm, task in tasks.items():
+                compute = partial(maker.map, arm, task)
+                compute()  # builds its engine, and compiles what is not compiled yet
+                figure = times(f"every arm: {name}, {arm}", "ms", [time_of(compute) for _ in range(rounds)])
+                medians.append(float(np.median(figure.cpu)))
+                yield figure
+        if len(medians) > 1:
+            against = tuple(value / min(medians) for value in medians)
+            yield Figure(f"arms of {name}, against the quickest", "×", against)
+
+
+def approach(rounds: int) -> Iterator[Figure]:
+    """Time maps whose grasps are approached along a straight line, against the same without."""
+    with _MapTimer(GRID) as quick:
+        for length in (0.05, 0.1):
+            scene = Scene.load("bottle_on_table").with_settings(**GRID, approach=length)
+            with _MapTimer(scene=scene) as slow:
+                found = [(slow.time(), quick.time()) for _ in range(rounds)]
+            yield ratios(f"the same map with an approach of {length:g} m", found)
 
 
 def _fine_mesh(box: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -236,23 +260,8 @@ def turning(rounds: int) -> Iterator[Figure]:
     with _MapTimer(GRID) as quick:
         m = quick.map()
         angles = np.random.default_rng(0).uniform(-np.pi, np.pi, rounds)
-        times = [1e6 * _time(lambda angle=angle: m.shift(angle)) for angle in angles]
-    yield Figure("turning the object about its axis", "µs", tuple(times))
-
-
-def process(runs: int) -> Iterator[Figure]:
-    """Time ``symgrasp map`` as a process, and its memory, with the compiled code cached."""
-    command = [sys.executable, "-m", "symgrasp", "map", "bottle_on_table"]
-    subprocess.run(command, check=True, capture_output=True)
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", MEASURE_PROCESS, *command], check=True, capture_output=True, text=True
-        ).stdout
-        for _ in range(runs)
-    ]
-    times, peaks = zip(*(map(float, line.split()) for line in outputs), strict=True)
-    yield Figure("symgrasp map bottle_on_table, whole process", "s", times)
-    yield Figure("  memory at most", "MB", peaks)
+        found = [time_of(lambda angle=angle: m.shift(angle)) for angle in angles]
+    yield times("turning the object about its axis", "µs", found)
 
 
 class _MapTimer:
@@ -273,16 +282,6 @@ class _MapTimer:
     def map(self) -> FeasibilityMap:
         return self._maker.map()
 
-    def time(self) -> float:
-        """Return the median time (s) of three maps."""
-        return float(np.median([_time(self.map) for _ in range(3)]))
-
-
-def _time(work: Callable[[], Any]) -> float:
-    start = perf_counter()
-    work()
-    return perf_counter() - start
-
-
-def _ms(seconds: Sequence[float]) -> tuple[float, ...]:
-    return tuple(1e3 * s for s in seconds)
+    def time(self) -> Time:
+        """Return the median time of three maps."""
+        return time_of(self.map, runs=3)

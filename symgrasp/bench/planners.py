@@ -1,15 +1,15 @@
-"""Times and success rates of the planners against sampling and hill climbing, as ratios within one run."""
+"""Times and success rates of the planners against sampling and hill climbing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 from symgrasp.bench.figures import Figure
+from symgrasp.bench.timing import Time, ratios, time_of, times
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
@@ -20,7 +20,7 @@ from symgrasp.ik import solver_for
 from symgrasp.object.manifold import ROLLS
 from symgrasp.planners.bimanual import Climb, hill_climb
 from symgrasp.planners.configurations import ConfigurationFinder, witnesses
-from symgrasp.planners.free import FreePlacements
+from symgrasp.planners.free import FreePlacement, FreePlacements
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch
 from symgrasp.planners.planning import plan_sequential
@@ -32,7 +32,7 @@ from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, Collision, NearBodies, open_world
 
-__all__ = ["long_sequence", "run", "several_hands", "without_the_manifold"]
+__all__ = ["four_hands", "long_sequence", "run", "several_hands", "without_the_manifold"]
 
 
 LIMITS = Climb(restarts=10, iterations=50)
@@ -42,11 +42,16 @@ Twice as many of both find 2 % more, in three times the time.
 """
 
 
+FIRST_FOUR = 4
+"""Parts of maps that are searched twice, since the search compiles on their account."""
+
+
 def run() -> Iterator[Figure]:
     """Run the benchmarks of planners and yield their figures as they are measured."""
     yield from long_sequence(tasks=50, runs=10)
     yield from without_the_manifold(runs=10)
     yield from several_hands(pairs=500)
+    yield from four_hands(windows=51)
 
 
 def long_sequence(tasks: int, runs: int) -> Iterator[Figure]:
@@ -54,17 +59,19 @@ def long_sequence(tasks: int, runs: int) -> Iterator[Figure]:
     scene = Scene.load("pick_pour_place").with_settings(heights=48, angles=96, redundancy=4)
     maps = [create_map(scene, task=name) for name in scene.tasks]
     rng = np.random.default_rng(0)
-    times = []
+    found = []
     for _ in range(runs):
         turns = rng.integers(0, 96, tasks) * scene.manifold.dtheta
         visits = [{"arm": maps[k % len(maps)].shift(turn)} for k, turn in enumerate(turns)]
-        start = perf_counter()
-        search = HoldingSearch(visits, PrintGaps([], scene.manifold))
-        found = next(search.best_first())
-        for k in range(tasks):
-            search.turns(found.cells, k)[0]
-        times.append(1e3 * (perf_counter() - start))
-    yield Figure(f"one grasp for {tasks} tasks on 48 × 96 maps, once the maps exist", "ms", tuple(times))
+
+        def search(visits=visits) -> None:
+            search = HoldingSearch(visits, PrintGaps([], scene.manifold))
+            found = next(search.best_first())
+            for k in range(tasks):
+                search.turns(found.cells, k)[0]
+
+        found.append(time_of(search))
+    yield times(f"one grasp for {tasks} tasks on 48 × 96 maps, once the maps exist", "ms", found)
 
 
 class _CountingWorld(BulletWorld):
@@ -84,27 +91,25 @@ def without_the_manifold(runs: int) -> Iterator[Figure]:
     tasks = list(scene.tasks.values())
     with _CountingWorld(scene) as world:
         maker = MapMaker(world)
-        start = perf_counter()
-        visits = [{"arm": maker.map(None, task, method="reference")} for task in tasks]
-        search = HoldingSearch(visits, PrintGaps([], scene.manifold))
-        next(search.best_first())
-        with_maps = perf_counter() - start
+
+        def with_maps() -> None:
+            visits = [{"arm": maker.map(None, task, method="reference")} for task in tasks]
+            next(HoldingSearch(visits, PrintGaps([], scene.manifold)).best_first())
+
+        by_maps = time_of(with_maps)
         budget = world.checks
-        successes, times = [], []
-        for seed in range(runs):
-            start = perf_counter()
+        successes: list[float] = []
+
+        def sample(seed: int) -> None:
             successes.append(float(_sample_grasps(scene, tasks, world, budget, seed)))
-            times.append(perf_counter() - start)
+
+        sampled = [time_of(lambda seed=seed: sample(seed)) for seed in range(runs)]
     plan_sequential(scene)  # compiles what is not compiled yet
-    start = perf_counter()
-    plan_sequential(scene)
-    with_engine = perf_counter() - start
+    by_engine = time_of(lambda: plan_sequential(scene))
     name = "pick, pour, place by sampling, same budget of collision checks"
     yield Figure(f"{name}: success", "", tuple(successes))
-    yield Figure("  time against maps of Algorithm 1 and planner", "×", tuple(t / with_maps for t in times))
-    yield Figure(
-        "  time against the best plan, world and maps made anew", "×", tuple(t / with_engine for t in times)
-    )
+    yield ratios("  time against maps of Algorithm 1 and planner", [(t, by_maps) for t in sampled])
+    yield ratios("  time against the best plan, world and maps made anew", [(t, by_engine) for t in sampled])
 
 
 def _sample_grasps(
@@ -144,16 +149,16 @@ class _Pair(NamedTuple):
 
     Attributes:
         exact: cells that the complete search found, None for none.
-        exact_time: its time (s).
+        exact_time: its time.
         climbed: cells that hill climbing found, None for none.
-        climb_time: its time (s).
+        climb_time: its time.
         gained: by how much (m) the objective of the complete search exceeds that of hill climbing.
     """
 
     exact: tuple[Cell, ...] | None
-    exact_time: float
+    exact_time: Time
     climbed: tuple[Cell, ...] | None
-    climb_time: float
+    climb_time: Time
     gained: float
 
 
@@ -171,22 +176,39 @@ def several_hands(pairs: int) -> Iterator[Figure]:
         scene = Scene.load(name).with_settings(redundancy=8)
         with open_world(scene) as world:
             arms = [world.scene.arm(arm) for arm in scene.task(task).arms]
-            start = perf_counter()
             gaps = PrintGaps(arms, scene.manifold)
-            gaps.table(0, 1)
-            prints.append(1e3 * (perf_counter() - start))
+            prints.append(time_of(lambda gaps=gaps: gaps.table(0, 1)))
             rng = np.random.default_rng(seed)
             drawn = _random_pairs(world, scene.task(task), rng)
             _compare(world, arms, next(drawn), gaps, 0)  # compiles what is not compiled yet
             results += [_compare(world, arms, maps, gaps, k) for k, maps in zip(range(pairs), drawn)]  # noqa: B905
-    yield Figure("handprints and gaps of two hands, once a scene", "ms", tuple(prints))
+    yield times("handprints and gaps of two hands, once a scene", "ms", prints)
     yield from _pair_figures(results)
+
+
+def four_hands(windows: int) -> Iterator[Figure]:
+    """Time the complete search for four hands on a log, on random parts of its maps.
+
+    In a few of them the robots are in each other's way, which the search does not know before it tries.
+    """
+    scene = Scene.load("log_four_robots")
+    with open_world(scene) as world:
+        task = scene.task()
+        arms = [scene.arm(name) for name in task.arms]
+        gaps = PrintGaps(arms, scene.manifold)
+        drawn = _random_pairs(world, task, np.random.default_rng(0))
+        parts = [maps for _, maps in zip(range(windows), drawn)]  # noqa: B905
+        for maps in parts[:FIRST_FOUR]:  # computes prints, and compiles what is not compiled yet
+            _find(world, arms, maps, gaps)
+        found = [_find(world, arms, maps, gaps)[1] for maps in parts]
+    yield times(f"four hands on a log, {windows} random parts of their maps", "ms", found)
 
 
 def _pair_figures(results: Sequence[_Pair]) -> Iterator[Figure]:
     """Yield success rates and times of both searches over all pairs of maps."""
     solved = [r for r in results if r.climbed]
-    exact, climb = (np.array([getattr(r, name) for r in results]) for name in ("exact_time", "climb_time"))
+    exact = np.array([r.exact_time.cpu for r in results])
+    climb = np.array([r.climb_time.cpu for r in results])
     where = np.array([r.climbed is not None for r in results])
     share = lambda found: (100 * sum(found) / len(results),)  # noqa: E731
     pairs = f"success in {len(results)} pairs"
@@ -194,8 +216,8 @@ def _pair_figures(results: Sequence[_Pair]) -> Iterator[Figure]:
     yield Figure(f"two hands, hill climbing as printed: {pairs}", "%", share(where.tolist()))
     missed = [r.climbed is not None and r.exact is None for r in results]
     yield Figure("  climbing alone finds something", "%", share(missed))
-    yield Figure("two hands, complete search with whole robots", "ms", tuple(1e3 * exact))
-    yield Figure("two hands, hill climbing as printed", "ms", tuple(1e3 * climb))
+    yield times("two hands, complete search with whole robots", "ms", [r.exact_time for r in results])
+    yield times("two hands, hill climbing as printed", "ms", [r.climb_time for r in results])
     yield Figure("  climbing takes, on average of all", "×", (float(climb.mean() / exact.mean()),))
     if solved:
         ratio = float(climb[where].mean() / exact[where].mean())
@@ -236,16 +258,28 @@ def _part(m: FeasibilityMap, rng: np.random.Generator) -> FeasibilityMap:
 def _compare(
     world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap], gaps: PrintGaps, seed: int
 ) -> _Pair:
-    start = perf_counter()
-    search = HoldingSearch([{arm.name: m for arm, m in zip(arms, maps, strict=True)}], gaps)
-    found = next(iter(FreePlacements(search, [ConfigurationFinder(world, arms, maps)])), None)
-    exact_time = perf_counter() - start
-    start = perf_counter()
-    climbed = _climb_as_printed(world, arms, maps, seed)
-    climb_time = perf_counter() - start
+    found, exact_time = _find(world, arms, maps, gaps)
+    climbed: list[tuple[Cell, ...] | None] = []
+    climb_time = time_of(lambda: climbed.append(_climb_as_printed(world, arms, maps, seed)))
+    (climb,) = climbed
     exact = tuple(found.steps[0].cells) if found else None
-    gained = _reached(gaps, maps, exact) - _reached(gaps, maps, climbed) if exact and climbed else 0.0
-    return _Pair(exact, exact_time, climbed, climb_time, gained)
+    gained = _reached(gaps, maps, exact) - _reached(gaps, maps, climb) if exact and climb else 0.0
+    return _Pair(exact, exact_time, climb, climb_time, gained)
+
+
+def _find(
+    world: BulletWorld, arms: Sequence[Arm], maps: Sequence[FeasibilityMap], gaps: PrintGaps
+) -> tuple[FreePlacement | None, Time]:
+    """Return the best placement for which the whole robots are free, and how long that took."""
+    found: list[FreePlacement | None] = []
+
+    def search() -> None:
+        placements = HoldingSearch([{arm.name: m for arm, m in zip(arms, maps, strict=True)}], gaps)
+        finder = ConfigurationFinder(world, arms, maps)
+        found.append(next(iter(FreePlacements(placements, [finder])), None))
+
+    taken = time_of(search)
+    return found[0], taken
 
 
 def _climb_as_printed(

@@ -63,6 +63,23 @@ def test_maps_are_measured_against_the_slow_ways(monkeypatch):
         assert min(total.values) > 0
 
 
+def test_every_arm_of_a_scene_and_the_approach(monkeypatch):
+    monkeypatch.setattr(maps, "GRID", {"heights": 6, "angles": 8, "redundancy": 4})
+    found = list(maps.every_arm(["soda_can", "log_iiwa_and_panda"], rounds=2))
+    assert [len(f.values) for f in found] == [2, 2, 2, 2]
+    assert [len(f.cpu) for f in found] == [2, 2, 2, 0]
+    assert sorted(found[-1].values)[0] == 1.0
+    assert {f.name for f in found[1:3]} == {
+        f"every arm: log_iiwa_and_panda, {arm}" for arm in ("panda", "iiwa")
+    }
+    assert [len(f.values) for f in maps.approach(1)] == [1, 1]
+
+
+def test_four_hands_are_measured():
+    (figure,) = planners.four_hands(windows=1)
+    assert len(figure.values) == len(figure.cpu) == 1
+
+
 def test_without_coal_the_bench_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr(maps, "GRID", {"heights": 4, "angles": 4, "redundancy": 2})
     monkeypatch.setattr(maps, "SECONDS", dict.fromkeys(maps.SECONDS, 0.01))
@@ -78,12 +95,6 @@ def test_growth_boxes_and_turning(monkeypatch):
     assert [len(figure.values) for figure in maps.boxes(rounds=2)] == [2, 2]
     assert len(next(iter(maps.turning(3))).values) == 3
     assert [len(figure.values) for figure in maps.growth(1)] == [1, 1]
-
-
-def test_the_process_is_weighed():
-    seconds, memory = maps.process(1)
-    assert seconds.values[0] > 0
-    assert 50 < memory.values[0] < 1000
 
 
 @pytest.mark.parametrize("name", PLAIN)
