@@ -58,11 +58,7 @@ A figure that belongs to another one is named ``that one: it``.
 
 
 def table(content: Mapping[str, Any]) -> str:
-    """Return the table as Markdown.
-
-    Raises:
-        KeyError: a row's figure was not measured.
-    """
+    """Return the table as Markdown; what the run did not measure is left out."""
     figures = keyed(map(Figure.from_dict, content["figures"]))
     machine = content["machine"]
     lines = [
@@ -73,7 +69,7 @@ def table(content: Mapping[str, Any]) -> str:
         "|---|---:|---:|---:|---:|",
     ]
     arms = [f for name, f in figures.items() if name.startswith(ARMS)]
-    rows = [(words, figures[name]) for name, words in ROWS.items()]
+    rows = [(words, figures[name]) for name, words in ROWS.items() if name in figures]
     for words, figure in [*rows, *((f"map of {f.name.removeprefix(ARMS)}", f) for f in arms)]:
         low, middle, high = (_short(v) for v in np.quantile(figure.values, [0.0, 0.5, 1.0]))
         cpu = f"{_short(float(np.median(figure.cpu)))} {figure.unit}" if figure.cpu else ""
@@ -82,11 +78,7 @@ def table(content: Mapping[str, Any]) -> str:
 
 
 def write(content: Mapping[str, Any], page: Path) -> None:
-    """Put the table between the markers of a page; without any, in a section of its own.
-
-    Raises:
-        KeyError: a row's figure was not measured.
-    """
+    """Put the table between the markers of a page; without any, in a section of its own."""
     text = page.read_text(encoding="utf-8")
     if BEGIN not in text:
         place = text.index(NEXT)

@@ -35,13 +35,13 @@ __all__ = ["against_others", "approach", "boxes", "every_arm", "growth", "run", 
 GRID = {"heights": 48, "angles": 96, "redundancy": 32}
 """The resolution that the figures are for; with two rolls, 9216 cells."""
 
-ROUNDS = 5
+ROUNDS = 3
 """Number of rounds; each times everything that a ratio compares, one right after the other."""
 
-SECONDS = {"reference": 0.9, "Pinocchio and Coal": 0.5}
+SECONDS = {"reference": 0.5, "Pinocchio and Coal": 0.3}
 """About how long (s) each of the slow methods is timed in a round."""
 
-CALIBRATION = 60
+CALIBRATION = 30
 """Number of cells that are timed to find out how many take that long."""
 
 FINE = 12288

@@ -49,8 +49,8 @@ FIRST_FOUR = 4
 def run() -> Iterator[Figure]:
     """Run the benchmarks of planners and yield their figures as they are measured."""
     yield from long_sequence(tasks=50, runs=10)
-    yield from without_the_manifold(runs=10)
-    yield from several_hands(pairs=500)
+    yield from without_the_manifold(runs=5)
+    yield from several_hands(pairs=100)
     yield from four_hands(windows=51)
 
 
@@ -87,7 +87,7 @@ class _CountingWorld(BulletWorld):
 
 def without_the_manifold(runs: int) -> Iterator[Figure]:
     """Sample grasps and test each in every task, with as many collision checks as the maps took."""
-    scene = Scene.load("pick_pour_place")
+    scene = Scene.load("pick_pour_place").with_settings(heights=12, angles=24, redundancy=8)
     tasks = list(scene.tasks.values())
     with _CountingWorld(scene) as world:
         maker = MapMaker(world)

@@ -53,8 +53,7 @@ def test_a_table_has_median_and_spread():
     assert "2 cores (x86_64)" in lines[0]
     assert len(lines) == 4 + len(ROWS)
     assert all(line.endswith("| 3 ms | 1 | 1,230 | 5 ms |") for line in lines[4:])
-    with pytest.raises(KeyError):
-        table(content(["something else"]))
+    assert len(table(content(["something else"])).splitlines()) == 4
 
 
 def test_every_arm_is_a_row():

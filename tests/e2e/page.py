@@ -25,6 +25,9 @@ WAIT = 30_000
 PACE = 80
 """Time (ms) a key is held, and between two keys."""
 
+MAP_SHARE = 1.5e-4
+"""Share of the 3D view that has the colour of feasible cells at least, when the map is in it."""
+
 expect.set_options(timeout=WAIT)
 
 HARMLESS = (
@@ -117,7 +120,9 @@ class GraspPage:
         def still(view: np.ndarray) -> bool:
             seen.append(view)
             green = np.abs(view.astype(int) - rgb(Reason.FEASIBLE.color)).max(axis=-1) < 25
-            return green.sum() > 100 and len(seen) > 4 and all(np.array_equal(view, v) for v in seen[-4:])
+            return (
+                green.mean() > MAP_SHARE and len(seen) > 4 and all(np.array_equal(view, v) for v in seen[-4:])
+            )
 
         return self.wait_for_view(still)
 
