@@ -97,7 +97,7 @@ def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, balance
     for s in range(len(inputs.retreat)):
         moved_along(T, inputs.retreat[s], moved)
         branches_near(chain, k, moved, at, RETREAT_TURN, q, exists, inside, branches.memory)
-        if not _follow(chain.limits, q, inside, at):
+        if not _follow(chain.limits, inputs.turns, q, inside, at):
             return BLOCKED
         place_frames(moving, at, path.frames[s])
         if falls and not stands(balance, path.frames[s], inputs.T_world_base, moved, row, False):
@@ -117,8 +117,8 @@ def _status(gap):
 
 
 @njit(**STRICT)
-def _follow(limits, q, inside, at):
-    """Replace ``at`` by the nearest branch inside the limits; return whether none turns a joint too far."""
+def _follow(limits, turns, q, inside, at):
+    """Replace ``at`` by the nearest branch inside the limits; return whether it turns no joint too far."""
     nearest, least = -1, math.inf
     for b in range(len(inside)):
         if inside[b]:
@@ -131,8 +131,11 @@ def _follow(limits, q, inside, at):
                 turn = max(turn, abs(q[b, j] - at[j]))
             if turn < least:
                 nearest, least = b, turn
-    if nearest < 0 or least > RETREAT_TURN:
+    if nearest < 0:
         return False
+    for j in range(len(at)):
+        if abs(q[nearest, j] - at[j]) > turns[j]:
+            return False
     copy_row(q[nearest], at)
     return True
 

@@ -65,6 +65,7 @@ class SearchInput(NamedTuple):
         T_base_tool: (m, 4, 4) tool poses of the cells, run by run.
         row: (r,) row of each run.
         retreat: (s,) signed distances (m) along the approach that must be free as well, in order.
+        turns: (n,) largest changes of the joints from one of them to the next.
         margin: distance (m) to keep from static pieces.
         clearance: the clearance (m) of pieces that the arm does not move; that of a candidate is not
             larger.
@@ -77,6 +78,7 @@ class SearchInput(NamedTuple):
     T_base_tool: Array
     row: np.ndarray
     retreat: Array
+    turns: Array
     margin: float
     clearance: float
     always_collides: bool

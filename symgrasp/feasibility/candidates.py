@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.ik import Solver
-from symgrasp.ik.retreat import RETREAT_TURN, retreat_distances, retreated
+from symgrasp.ik.retreat import retreat_distances, retreat_turns, retreated
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
@@ -87,6 +87,7 @@ class CandidateChecker:
         self.world, self.arm, self.ik, self._near = world, arm, ik, near
         self._holders = holders
         self._retreat = retreat_distances(approach).tolist()
+        self._turns = retreat_turns(arm.velocity, approach)
 
     def candidates(self, T_base_tool: Array, opening: float) -> Iterator[Candidate]:
         """Yield the candidates of a tool pose (4, 4), by φ, then by branch, each checked when asked for.
@@ -161,6 +162,6 @@ class CandidateChecker:
         # A joint that turns further than once around goes on from where it is, where its limits allow.
         near = choices + 2 * np.pi * np.round((q - choices) / (2 * np.pi))
         choices = np.where((near >= self.arm.lower) & (near <= self.arm.upper), near, choices)
-        turn = np.abs(choices - q).max(axis=1)
-        nearest = int(turn.argmin())
-        return choices[nearest] if turn[nearest] <= RETREAT_TURN else None
+        turns = np.abs(choices - q)
+        nearest = int(turns.max(axis=1).argmin())
+        return choices[nearest] if np.all(turns[nearest] <= self._turns) else None

@@ -30,7 +30,7 @@ from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.search_recording import FixedBodies, PieceBodies, record_search
 from symgrasp.feasibility.torso_maps import merged
 from symgrasp.ik import GridSolvers, solver_for
-from symgrasp.ik.retreat import retreat_distances
+from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
 from symgrasp.progress import Progress, part_of
@@ -236,6 +236,7 @@ class ExactEngine:
             T_base_tool=np.ascontiguousarray(T_base_tool[np.ix_(rolls, rows)].reshape(-1, 4, 4)),
             row=np.tile(rows, len(rolls)),
             retreat=-retreat_distances(self._settings.approach),
+            turns=retreat_turns(self.arm.velocity, self._settings.approach),
             margin=float(self._settings.margin),
             clearance=fixed.gap,
             always_collides=fixed.collision is not None,

@@ -103,7 +103,7 @@ def _columns(scene: Scene, segment: Segment) -> list[Column]:
             if (arm.robot.name, index) not in seen:
                 seen.add((arm.robot.name, index))
                 robot = arm.robot
-                columns.append((name, j, float(robot.model.velocity[index]), robot.acceleration))
+                columns.append((name, j, float(robot.velocity[index]), robot.acceleration))
     return columns
 
 
@@ -140,7 +140,7 @@ def _hand_time(scene: Scene, segment: Segment) -> float:
     times = [0.0]
     for name, (first, last) in segment.gripper.items():
         arm = scene.arms[name]
-        names, speed = arm.robot.model.joint_names, arm.robot.model.velocity
+        names, speed = arm.robot.model.joint_names, arm.robot.velocity
         values = [
             arm.hand.joint_values(float(x)) for x in np.linspace(last if first is None else first, last, 50)
         ]

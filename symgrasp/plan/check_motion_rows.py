@@ -61,7 +61,7 @@ def check_rows(
         fits = arm.hand.min_opening - TOLERANCE <= last <= arm.hand.max_opening + TOLERANCE
         ok &= expect(fits, f"{where}: the hand of {name} does not open to {last} m")
         for joint, moved in _hand_moves(arm, first, last, start).items():
-            limit = arm.robot.model.velocity[arm.robot.model.joint_names.index(joint)]
+            limit = arm.robot.velocity[arm.robot.model.joint_names.index(joint)]
             text = f"{where}: the hand of {name} moves {joint} too fast"
             ok &= expect(moved / t[-1] <= limit * (1 + LIMIT_TOLERANCE), text)
     return ok
@@ -80,7 +80,7 @@ def _check_path(arm: Arm, t: Array, path: Array, velocities: Array, where: str, 
     limit = 1 + LIMIT_TOLERANCE
     wrong = {
         "outside the limits of": (path < arm.lower[:n]) | (path > arm.upper[:n]),
-        "too fast for": np.abs(v) > arm.robot.model.velocity[arm.indices] * limit,
+        "too fast for": np.abs(v) > arm.robot.velocity[arm.indices] * limit,
         "accelerates too much for": np.abs(a) > arm.robot.acceleration * limit,
         "velocities are not those of the rows, of": np.abs(slopes - velocities) > TOLERANCE,
     }

@@ -43,6 +43,7 @@ class Robot:
         support: corners (k, 2) in the world, counterclockwise, of the convex area that its centre of mass
             must stay above; None where it cannot fall.
         acceleration: largest acceleration (rad/s² or m/s²) of its joints.
+        fastest: largest speed (rad/s or m/s) of joints for which its URDF allows more.
     """
 
     name: str
@@ -52,6 +53,12 @@ class Robot:
     torso: Torso | None = None
     support: Array | None = None
     acceleration: float = DEFAULT_ACCELERATION
+    fastest: float = np.inf
+
+    @property
+    def velocity(self) -> Array:
+        """Largest speeds (n,) (rad/s or m/s) of ``model.joint_names``."""
+        return np.minimum(self.model.velocity, self.fastest)
 
     def at(self, sample: int) -> Robot:
         """Return the robot whose torso rests at a sample."""
@@ -177,6 +184,11 @@ class Arm:
     def value_names(self) -> tuple[str, ...]:
         """What these values are called."""
         return (*self.joint_names, "pitch", "azimuth") if self.pitched else self.joint_names
+
+    @property
+    def velocity(self) -> Array:
+        """Largest speeds (n,) (rad/s or m/s) of its values; those that move no joint have none."""
+        return np.append(self.robot.velocity[self.indices], np.full(self.dof - len(self.indices), np.inf))
 
     @property
     def home(self) -> Array:

@@ -168,7 +168,8 @@ class RobotFile(_Strict):
     for each: the centres of so many equal parts of its range. All arms of the robot move with them.
     ``support`` is what a legged robot stands on: corners [x, y] (m) in the robot's base frame, or the links
     that are its feet. Its centre of mass, with what it holds, must stay above their convex hull.
-    ``acceleration`` (rad/s² or m/s²) is the largest of its joints in motions; 2 unless given.
+    ``acceleration`` (rad/s² or m/s²) is the largest of its joints in motions; 2 unless given. ``velocity``
+    (rad/s or m/s) bounds their speed where the URDF allows more.
     """
 
     name: Name
@@ -192,6 +193,7 @@ class RobotFile(_Strict):
         | None
     ) = None
     acceleration: Positive | None = None
+    velocity: Positive | None = None
 
     @model_validator(mode="after")
     def _tool_or_arms(self) -> RobotFile:

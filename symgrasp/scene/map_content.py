@@ -55,6 +55,7 @@ def _robot(robot: Robot) -> dict[str, Any]:
         "model": robot.model.sha256,
         "base": robot.T_world_base.tolist(),
         "home": robot.home.tolist(),
+        "velocity": robot.velocity.tolist(),
         "support": None if robot.support is None else robot.support.tolist(),
         "torso": robot.torso and {"joints": robot.torso.joint_names, "values": robot.torso.values.tolist()},
     }

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from symgrasp.descriptions.srdf import find_srdf
 from symgrasp.errors import InputError, SceneError, UrdfError, one_of
 from symgrasp.poses import Array
@@ -100,7 +102,8 @@ class RobotBuilder:
         base = entry.base.matrix()
         support = self._support(field, entry, model, home, base)
         acceleration = entry.acceleration or DEFAULT_ACCELERATION
-        robot = Robot(entry.name, model, base, home, torso, support, acceleration)
+        fastest = entry.velocity or np.inf
+        robot = Robot(entry.name, model, base, home, torso, support, acceleration, fastest)
         arms = [
             Arm(a.name, robot, tool, hand, frozenset(chain) - frozenset(names))
             for a, tool, hand, chain, names in zip(files, tools, hands, chains, joints, strict=True)

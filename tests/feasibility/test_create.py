@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -173,10 +174,27 @@ def test_an_approach_follows_one_branch(bottle_map, monkeypatch):
     """No step of the retreat may jump: with no room for the joints to move, everything is blocked."""
     scene = load_small("bottle_on_table", 12, 24, 8).with_settings(approach=0.05)
     assert create_map(scene, method="reference").feasible.any()
-    monkeypatch.setattr("symgrasp.feasibility.candidates.RETREAT_TURN", 1e-6)
+    monkeypatch.setattr("symgrasp.ik.retreat.RETREAT_TURN", 1e-6)
     blocked = create_map(scene, method="reference")
     assert not blocked.feasible.any()
     assert (blocked.reason[bottle_map.feasible] == Reason.APPROACH_BLOCKED).all()
+
+
+@pytest.mark.parametrize("method", ["exact", "reference"])
+def test_a_retreat_turns_no_joint_faster_than_it_can(method):
+    """With the hand at 0.1 m/s: slower joints leave fewer cells, and slow ones none."""
+    content = (
+        Scene.load("bottle_on_table").with_settings(heights=8, angles=12, redundancy=4, approach=0.05).content
+    )
+    found = []
+    for velocity in (None, 0.4, 0.3, 0.2):
+        content["robots"][0]["velocity"] = velocity
+        found.append(create_map(Scene.from_content(content), method=method))
+    for fast, slow in pairwise(found):
+        assert not (slow.feasible & ~fast.feasible).any()
+        assert slow.feasible.sum() < fast.feasible.sum()
+    assert not found[-1].feasible.any()
+    assert (found[-1].reason[found[0].feasible] == Reason.APPROACH_BLOCKED).all()
 
 
 def test_a_margin_can_only_block(bottle_map):
