@@ -14,7 +14,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.motion.planning import MotionPlanner
 from symgrasp.motion.record import from_plan, with_motion
 from symgrasp.motion.timing import timed
-from symgrasp.object.manifold import ROLLS, Manifold
+from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.plan.checked_plan import check_plan
 from symgrasp.plan.plan import Hold, Plan, PlanTask
 from symgrasp.planners.bimanual import ClimbStep
@@ -29,6 +29,7 @@ from symgrasp.planners.planning import (
     sequential_plans,
 )
 from symgrasp.progress import Progress, part_of
+from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
@@ -327,22 +328,20 @@ def plan_result(plan: Plan, scene: Scene) -> PlanResult:
 
 def _print(scene: Scene, hold: Hold) -> np.ndarray:
     """Return the cells (H, A) under the hand, in the object's frame."""
-    grid = scene.manifold
-    row, column, roll = _cell(grid, hold)
-    return scene.arm(hold.arm).handprint(grid, row, roll).on(grid, column)
+    handprint, column = _handprint(scene, hold)
+    return handprint.on(scene.manifold, column)
 
 
 def _gap(scene: Scene, task: PlanTask) -> float | None:
     """Return the smallest gap (m) between the prints of a task's hands."""
     grid = scene.manifold
-    placed = []
-    for hold in task.holds:
-        row, column, roll = _cell(grid, hold)
-        placed.append((scene.arm(hold.arm).handprint(grid, row, roll), column))
-    pairs = combinations(placed, 2)
+    pairs = combinations([_handprint(scene, hold) for hold in task.holds], 2)
     return min((print_gap(a, b, second - first, grid) for (a, first), (b, second) in pairs), default=None)
 
 
-def _cell(grid: Manifold, hold: Hold) -> tuple[int, int, int]:
-    """Return row, column and roll of a hold on a grid."""
-    return *grid.cell(hold.grasp.h, hold.grasp.theta), ROLLS.index(hold.grasp.roll)
+def _handprint(scene: Scene, hold: Hold) -> tuple[Handprint, int]:
+    """Return the print of a hand that holds at column 0, and the column at which it does."""
+    grid, arm, grasp = scene.manifold, scene.arm(hold.arm), hold.grasp
+    row, column = grid.cell(grasp.h, grasp.theta)
+    offset = float(wrap(grasp.theta - grid.theta[column])) if arm.pitched else 0.0
+    return arm.handprint(grid, row, ROLLS.index(grasp.roll), grasp.pitch, offset), column

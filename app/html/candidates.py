@@ -52,9 +52,11 @@ def candidate_html(state: State) -> str:
     if shown_candidate is None or explanation is None or state.candidate is None:
         return ""
     where = f"{state.candidate + 1} of {len(explanation.candidates)}"
+    pitch = "" if shown_candidate.pitch is None else f", pitch {np.rad2deg(shown_candidate.pitch):.1f}°"
     return (
         f'<div class="sg sg-candidate"><b>Candidate {where}</b>: φ = {np.rad2deg(shown_candidate.phi):.1f}°, '
-        f'branch {shown_candidate.branch + 1}<br><i style="background:{shown_candidate.reason.color}"></i>'
+        f"branch {shown_candidate.branch + 1}{pitch}<br>"
+        f'<i style="background:{shown_candidate.reason.color}"></i>'
         f"{escape(candidate_text(shown_candidate))}</div>"
     )
 

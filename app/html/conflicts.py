@@ -29,7 +29,7 @@ def failure_html(refusal: Refusal, grid: Manifold) -> str:
     conflict = refusal.conflict
     if conflict is None:
         return f'<div class="sg sg-note sg-warning" role="alert">{escape(_sentence(refusal.text))}</div>'
-    rows = "".join(f"<div>{escape(_excluded(e))}</div>" for e in conflict.exclusions)
+    rows = "".join(f"<div>{escape(_excluded(e, conflict.kept))}</div>" for e in conflict.exclusions)
     return (
         f'<div class="sg sg-note sg-warning" role="alert"><b>No grasp serves all tasks.</b>{rows}</div>'
         '<div class="sg sg-small">Heights that each task allows, left at roll 0°, right at 180°:</div>'
@@ -60,11 +60,11 @@ def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}."
 
 
-def _excluded(exclusion: Exclusion) -> str:
+def _excluded(exclusion: Exclusion, kept: str) -> str:
     names, apart = exclusion
     if len(names) == 1:
         return f"{names[0]} cannot be done at all."
-    far = "share no roll" if apart is None else f"are {100 * apart:.1f} cm apart along the axis"
+    far = f"share no {kept}" if apart is None else f"are {100 * apart:.1f} cm apart along the axis"
     return f"{' and '.join(names)} exclude each other: they {far}."
 
 

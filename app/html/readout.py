@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.object.manifold import ROLLS
+from symgrasp.plan.plan import Grasp
 
 from ..state.state import State
 from .escaping import escape
@@ -15,6 +16,7 @@ __all__ = [
     "count_text",
     "grasp_html",
     "notes_html",
+    "pitch_text",
     "scene_notes_html",
     "sequence_html",
     "solution_html",
@@ -66,13 +68,13 @@ def grasp_html(state: State) -> str:
         return f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} cannot hold it here: {why}</div>'
     margin = state.map.margin(state.cell)
     holds = state.shown_task.holds if state.shown_task else ()
-    q = next((list(hold.joints.values()) for hold in holds if hold.arm == state.arm), witness.q)
+    hold = next((hold for hold in holds if hold.arm == state.arm), None)
     arm = state.scene.arm(state.arm)
-    degrees = [f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(q))]
-    count = len(arm.joint_names)
-    joints = ", ".join(degrees[:count])
+    q = list(hold.joints.values()) if hold else witness.q[: len(arm.joint_names)].tolist()
+    joints = ", ".join(f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(q)))
     if arm.pitched:
-        joints += f"; hand pitched by {degrees[count]}"
+        pitch = hold.grasp.pitch if hold else arm.pitch_and_azimuth(witness.q, state.cell.roll)[0]
+        joints += f"; hand pitched by {np.round(np.rad2deg(pitch)) + 0.0:.0f}°"
     return (
         f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} holds it: {why}; '
         f"room for {100 * margin.along:.1f} cm along and {np.rad2deg(margin.around):.1f}° around"
@@ -171,9 +173,14 @@ def solution_html(state: State) -> str:
         grasp = first[0].grasp
         text = (
             f"One grasp for {count_text(len(plan.tasks), 'task')}: {_position_text(grasp.h, grasp.theta)}, "
-            f"roll {np.rad2deg(grasp.roll):.0f}°."
+            f"roll {np.rad2deg(grasp.roll):.0f}°{pitch_text(grasp)}."
         )
     return f'<div class="sg">{escape(text)}</div>'
+
+
+def pitch_text(grasp: Grasp) -> str:
+    """Return ", pitch 20°" for a grasp with a pitch, nothing for one without."""
+    return f", pitch {np.rad2deg(grasp.pitch):.0f}°" if grasp.pitch else ""
 
 
 def _position_text(h: float, theta: float) -> str:

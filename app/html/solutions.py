@@ -7,6 +7,7 @@ import numpy as np
 from ..state.plan_results import PlanResult
 from ..state.state import State
 from .escaping import escape
+from .readout import pitch_text
 from .stack import margin_texts
 
 __all__ = ["solutions_html", "worst_margin_texts"]
@@ -41,7 +42,10 @@ def _grasps(plan: PlanResult) -> str:
     grasps = dict.fromkeys((hold.arm, hold.grasp) for task in plan.plan.tasks for hold in task.holds)
     if len({arm for arm, _ in grasps}) > 1:
         return "h = " + ", ".join(f"{100 * grasp.h:.1f}" for _, grasp in grasps) + " cm"
-    return ", ".join(f"h = {100 * grasp.h:.1f} cm, roll {np.rad2deg(grasp.roll):.0f}°" for _, grasp in grasps)
+    return ", ".join(
+        f"h = {100 * grasp.h:.1f} cm, roll {np.rad2deg(grasp.roll):.0f}°{pitch_text(grasp)}"
+        for _, grasp in grasps
+    )
 
 
 def _row(cells: tuple[str, ...], css_class: str) -> str:

@@ -20,6 +20,7 @@ from ..state.requests import MapResult
 from ..state.state import State
 from .escaping import escape
 from .map import THETA_AXIS, circle, h_axis, sample_columns, to_png
+from .readout import pitch_text
 
 __all__ = ["margin_texts", "shared_columns", "stack_html"]
 
@@ -119,7 +120,7 @@ def _row(cells: Sequence[str], css_class: str) -> str:
 
 def _grasp_text(grasp: Grasp) -> str:
     turn, roll = np.rad2deg(grasp.theta) + 0.0, np.rad2deg(grasp.roll)
-    return f"h = {100 * grasp.h:.1f} cm, θ = {turn:.1f}°, roll {roll:.0f}°"
+    return f"h = {100 * grasp.h:.1f} cm, θ = {turn:.1f}°, roll {roll:.0f}°{pitch_text(grasp)}"
 
 
 def _strip(result: MapResult, grasp: Grasp | None, slid: float, delta: float, height: int) -> str:

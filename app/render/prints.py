@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symgrasp.object.manifold import wrap
 from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.scene import Scene
 
@@ -48,11 +49,33 @@ def shown_prints(state: State) -> list[np.ndarray]:
         ]
     if state.plan and state.step is not None and state.shown_task and len(state.shown_task.holds) > 1:
         return list(state.plan.prints[state.step].values())
-    pitched = state.scene.arm(state.arm).pitched  # where its hand is, is known only once the arm is solved
-    if state.map_view.handprint and state.pick and state.cell and not pitched:
+    if state.map_view.handprint and state.pick and state.cell:
         row, column = grid.cell(state.pick.h, state.pick.theta)
-        return [hand_print(state.scene, state.arm, row, state.cell.roll).on(grid, column)]
+        pitch, theta = _pitch_and_angle(state)
+        if theta is not None:
+            offset = float(wrap(theta - grid.theta[column])) if state.scene.arm(state.arm).pitched else 0.0
+            print_ = hand_print(state.scene, state.arm, row, state.cell.roll, pitch, offset)
+            return [print_.on(grid, column)]
     return []
+
+
+def _pitch_and_angle(state: State) -> tuple[float, float | None]:
+    """Return the pitch (rad) of the hand at the picked grasp, and the angle (rad) at which it holds.
+
+    Both follow from the configuration of an arm of five joints. Where it cannot hold, the angle is None.
+    """
+    assert state.pick and state.cell
+    arm = state.scene.arm(state.arm)
+    hold = next((h for h in state.shown_task.holds if h.arm == state.arm), None) if state.shown_task else None
+    if hold is not None:
+        return hold.grasp.pitch, hold.grasp.theta
+    if not arm.pitched:
+        return 0.0, state.pick.theta
+    witness = state.map.witness(state.cell) if state.is_fresh and state.map else None
+    if witness is None or state.map is None:
+        return 0.0, None
+    pitch, azimuth = arm.pitch_and_azimuth(witness.q, state.cell.roll)
+    return pitch, float(state.map.manifold.theta[state.cell.column]) + azimuth
 
 
 def print_names(state: State) -> list[str]:
@@ -65,9 +88,11 @@ def print_names(state: State) -> list[str]:
 
 
 @cached_with_first
-def hand_print(scene: Scene, arm: str, row: int, roll: int) -> Handprint:
+def hand_print(
+    scene: Scene, arm: str, row: int, roll: int, pitch: float = 0.0, azimuth: float = 0.0
+) -> Handprint:
     """Return an arm's handprint at column 0; cached, since a replay repeats the same ones many times."""
-    return scene.arm(arm).handprint(scene.manifold, row, roll)
+    return scene.arm(arm).handprint(scene.manifold, row, roll, pitch, azimuth)
 
 
 def on_surface(state: State, cells: np.ndarray) -> np.ndarray:

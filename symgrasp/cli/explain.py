@@ -48,6 +48,5 @@ def run(args: argparse.Namespace) -> int:
     text = f"{len(found.candidates)} candidates: {', '.join(counts)}" if counts else "no candidates"
     say(f"{text}; {found.unreachable} of {len(found.phi)} redundancy samples have none")
     for result in found.candidates:
-        phi = math.degrees(result.phi)
-        say(f"  φ {phi:7.1f}°  branch {result.branch}  {result.reason.label:18}  {result.why}")
+        say(f"  {result.where}  {result.reason.label:18}  {result.why}")
     return 0

@@ -6,7 +6,7 @@ import argparse
 import math
 from collections.abc import Iterator
 from contextlib import closing
-from itertools import islice, repeat
+from itertools import chain, islice, repeat
 from typing import TYPE_CHECKING, Any
 
 from symgrasp.cli.shared import (
@@ -133,8 +133,9 @@ def _listed(args: argparse.Namespace, scene: Scene, progress: Progress | None) -
     if args.kind == "sequential":
         maps = sequential_maps(scene, args.arm, progress)
         plans = sequential_plans(scene, args.arm, maps)
-        grasps = common_grasps(list(maps.values()))  # in the order of the plans
-        notes = (intervals_in_words(grasp, list(maps.values())) for grasp in grasps)
+        # In the order of the plans; those of an arm of five joints differ in pitch, too.
+        grasps = [] if any(scene.arm(arm).pitched for _, arm in maps) else common_grasps(list(maps.values()))
+        notes = chain((intervals_in_words(grasp, list(maps.values())) for grasp in grasps), notes)
     elif args.kind == "bimanual":
         plans = bimanual_plans(scene, args.task, progress=progress)
     else:

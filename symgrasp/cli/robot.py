@@ -144,7 +144,7 @@ def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     assert isinstance(solver, ArmIK | PitchedIK)  # a scene to start from has no torso that moves
     if isinstance(solver, PitchedIK):
         say(f"    solver: {solver.family}" + ("" if solver.complete else "; it may miss some"))
-        say("    the pitch of its hand is left free: maps without approach, and no plans")
+        say("    the pitch of its hand is left free: maps and plans without approach")
         return True
     locked = "" if solver.locked is None else f"; {arm.joints[solver.locked]} locked"
     say(f"    solver: {solver.family}" + locked + ("" if solver.complete else "; it may miss some"))

@@ -36,6 +36,11 @@ def in_parallel(function: Callable[[int], None], parts: Iterable[int]) -> None:
         function: compiled, so that several threads can run it at once.
         parts: better more of them than cores, as they take different times.
     """
+    parts = list(parts)
+    if len(parts) < 2:
+        for part in parts:
+            function(part)
+        return
     # Threads are started anew each time: that takes 0.1 ms, and leaves none to processes that are forked.
     with ThreadPoolExecutor(core_count()) as threads:
         for _ in threads.map(function, parts):

@@ -46,7 +46,7 @@ def compiled_parts(ik: Solver) -> list[tuple[CompiledIK, np.ndarray]] | None:
 
 
 def batches(solvers: GridSolvers, geometry: ArmGeometry, rows: np.ndarray, part: int) -> Iterator[Batch]:
-    """Yield the cells of some rows: all at once, but of a pitched arm those of each row and roll.
+    """Yield the cells of some rows: all at once, but of a pitched arm those with one solver and opening.
 
     Args:
         solvers: the solvers of the arm.
@@ -55,8 +55,7 @@ def batches(solvers: GridSolvers, geometry: ArmGeometry, rows: np.ndarray, part:
         part: which of the solvers of a pitched arm is used, see `PitchedIK.parts`; 0 for other arms.
     """
     rolls = np.arange(len(ROLLS))
-    groups = [(rows[k : k + 1], rolls[i : i + 1]) for k in range(len(rows)) for i in range(len(rolls))]
-    for some, these in groups if solvers.arm.pitched else [(rows, rolls)]:
+    for some, these in _alike(solvers, geometry, rows) if solvers.arm.pitched else [(rows, rolls)]:
         row = int(some[0])
         ik = solvers.at(row, int(these[0]))
         parts = compiled_parts(ik)
@@ -64,6 +63,18 @@ def batches(solvers: GridSolvers, geometry: ArmGeometry, rows: np.ndarray, part:
         if part < len(parts):
             own, samples = parts[part]
             yield Batch(some, these, ik, own, samples, _spread(len(samples)), geometry.moving_in(row))
+
+
+def _alike(
+    solvers: GridSolvers, geometry: ArmGeometry, rows: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return rows and rolls in groups that have one solver and the same pieces."""
+    groups: dict[tuple[int, int, bytes], list[int]] = {}
+    for roll in range(len(ROLLS)):
+        for row in rows.tolist():
+            key = (roll, id(solvers.at(row, roll)), geometry.local[row].tobytes())
+            groups.setdefault(key, []).append(row)
+    return [(np.array(some), np.array([roll])) for (roll, *_), some in groups.items()]
 
 
 @lru_cache

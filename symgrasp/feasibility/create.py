@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
@@ -15,6 +16,7 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.pitch_maps import at_pitches
 from symgrasp.feasibility.torso_maps import at_torso, merged
 from symgrasp.ik import Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold, wrap
@@ -84,14 +86,39 @@ class MapMaker:
             maps.append(at_torso(self._map(the_arm.at(t), t, the_task, grid, tell), the_arm, t))
         return maps
 
+    def maps_at_pitches(
+        self,
+        arm: str,
+        task: Task | str,
+        pitches: Sequence[float],
+        *,
+        manifold: Manifold | None = None,
+        progress: Progress | None = None,
+    ) -> FeasibilityMap:
+        """Compute the map of a pitched arm with its hand held at some pitches (rad); see `map`."""
+        the_arm, the_task = self._chosen(arm, task)
+        grid = manifold or self.scene.manifold
+        maps = []
+        for k, pitch in enumerate(pitches):
+            tell = part_of(progress, k, len(pitches))
+            maps.append(self._map(the_arm, None, the_task, grid, tell, pitch))
+        return at_pitches(maps, pitches)
+
     def _map(
-        self, arm: Arm, torso: int | None, task: Task, grid: Manifold, progress: Progress | None
+        self,
+        arm: Arm,
+        torso: int | None,
+        task: Task,
+        grid: Manifold,
+        progress: Progress | None,
+        pitch: float | None = None,
     ) -> FeasibilityMap:
         """Compute the map of an arm without a torso, or with its torso at a sample."""
         engine = self._engine(arm, torso, grid)
         if engine:
-            return engine.map(task, grid, progress)
-        return create_map_reference(self.world, arm, task, grid, progress)
+            return engine.map(task, grid, progress, pitch)
+        own = arm if pitch is None else arm.at_pitch(pitch)
+        return create_map_reference(self.world, own, task, grid, progress)
 
     def explain(
         self,

@@ -45,6 +45,9 @@ __all__ = ["ExactEngine"]
 PARTS = 4
 """Parts of a search for each thread, so that none waits long for the last."""
 
+WORTH_A_PART = 256
+"""Candidates, at one branch, that take longer than a thread takes to start."""
+
 TELL = 0.05
 """Time (s) after which progress is told, and may cancel: rows are searched in parts of about that long."""
 
@@ -67,7 +70,7 @@ class ExactEngine:
     def __init__(self, world: BulletWorld, arm: Arm, manifold: Manifold) -> None:
         self.world, self.arm, self.manifold = world, arm, manifold
         self._settings = world.scene.settings
-        self._solvers, self._angles = self._new_solvers(manifold), manifold.angles
+        self._solvers = self._new_solvers(manifold)
         if compiled_parts(self._solvers.at(0, 0)) is None or not supports(arm):
             raise NotImplementedError(f"arm {arm.name}: not of a kind that the exact engine knows")
         radii = manifold.profile.radius(manifold.h)
@@ -97,11 +100,16 @@ class ExactEngine:
         """
         return compiled_parts(solver_for(arm, 1)) is not None and supports(arm)
 
-    def _new_solvers(self, grid: Manifold) -> GridSolvers:
-        return GridSolvers(self.arm, grid, lambda own: solver_for(own, self._settings.redundancy))
+    def _new_solvers(self, grid: Manifold, pitch: float | None = None) -> GridSolvers:
+        arm = self.arm if pitch is None else self.arm.at_pitch(pitch)
+        return GridSolvers(arm, grid, lambda own: solver_for(own, self._settings.redundancy))
 
     def map(
-        self, task: Task, manifold: Manifold | None = None, progress: Progress | None = None
+        self,
+        task: Task,
+        manifold: Manifold | None = None,
+        progress: Progress | None = None,
+        pitch: float | None = None,
     ) -> FeasibilityMap:
         """Compute the map of a task.
 
@@ -109,6 +117,7 @@ class ExactEngine:
             task: the task; it need not be one of the scene's.
             manifold: another grid than the engine's, with the same heights.
             progress: called with the finished share; may raise `Cancelled`.
+            pitch: pitch (rad) at which a pitched arm holds its hand; free if None.
 
         Raises:
             ValueError: the grid has other heights.
@@ -122,19 +131,20 @@ class ExactEngine:
             load_of_hand(self.world.scene, self.arm, task.arms, task.T_world_object, float(h)) for h in grid.h
         ]
         self._balance = loaded(self._geometry.balance, loads)
-        if self._angles != grid.angles:
-            self._solvers, self._angles = self._new_solvers(grid), grid.angles
+        known = self._solvers.manifold.angles == grid.angles and self._solvers.arm.pitch == pitch
+        if not known:
+            self._solvers = self._new_solvers(grid, pitch)
         T_base_tool = inverse(self.arm.robot.T_world_base) @ self.arm.hand.tool_poses(
             grid, task.T_world_object
         )
         drafts = []
-        for part in range(2 if self.arm.pitched else 1):
+        parts = 2 if self.arm.pitched else 1
+        for part in range(parts):
             draft = MapDraft(self.arm, grid, self._opening, self._solvers.at(0, 0))
             for row, misfit in enumerate(self._misfit):
                 if misfit is not None:
                     draft.reason[:, row] = misfit
-            tell = part_of(progress, part, 2) if self.arm.pitched else progress
-            self._search_rows(draft, part, T_base_tool, tell)
+            self._search_rows(draft, part, T_base_tool, part_of(progress, part, parts))
             drafts.append(draft.finish(self.world.scene.name, task))
         self.world.set_arms(())
         return merged(drafts) if len(drafts) > 1 else drafts[0]
@@ -230,6 +240,7 @@ class ExactEngine:
     ) -> Iterator[None]:
         """Search some cells of the map; pause after every one that PyBullet decided."""
         rows, rolls = batch.rows, batch.rolls
+        tries = len(rows) * len(rolls) * draft.manifold.angles * len(batch.order)
         inputs = search.SearchInput(
             sample_order=batch.order,
             T_world_base=self._T_world_base,
@@ -240,7 +251,7 @@ class ExactEngine:
             margin=float(self._settings.margin),
             clearance=fixed.gap,
             always_collides=fixed.collision is not None,
-            parts=PARTS * core_count(),
+            parts=min(PARTS * core_count(), 1 + tries // WORTH_A_PART),
         )
         found = search.search(
             batch.compiled.chain,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -76,6 +76,7 @@ class CandidateResult:
         retreat: how far (m) from the grasp the retreat ended, the whole length if FEASIBLE.
         failure: why the arm could not follow the retreat, None where it could.
         ended: (n,) joint values where it ended: those of the collisions.
+        pitch: pitch (rad) of the hand of an arm of five joints, positive with the palm above; None of others.
         imbalance: how far (m) the centre of mass is outside of the robot's support, at the grasp or where the
             retreat ended, if that is what failed, else 0.
         clearance: distance (m) at the grasp of all pairs that are checked at least, at most
@@ -93,7 +94,14 @@ class CandidateResult:
     failure: RetreatFailure | None
     ended: Array
     clearance: float | None
+    pitch: float | None = None
     imbalance: float = 0.0
+
+    @property
+    def where(self) -> str:
+        """Say which candidate it is: redundancy and branch, and the pitch where there is one."""
+        pitch = "" if self.pitch is None else f"  pitch {math.degrees(self.pitch):6.1f}°"
+        return f"φ {math.degrees(self.phi):7.1f}°  branch {self.branch}{pitch}"
 
     @property
     def why(self) -> str:
@@ -145,9 +153,7 @@ class Explanation:
         """The reason, how many candidates have which, and a line for each."""
         counts = ", ".join(f"{count} {reason.label}" for reason, count in self.counts().items())
         lines = [f"{self.reason.legend}: {len(self.candidates)} candidates{counts and ': ' + counts}"]
-        for c in self.candidates:
-            phi = math.degrees(c.phi)
-            lines.append(f"  φ {phi:7.1f}°  branch {c.branch}  {c.reason.label:18}  {c.why}")
+        lines += [f"  {c.where}  {c.reason.label:18}  {c.why}" for c in self.candidates]
         return "\n".join(lines)
 
     @property
@@ -198,7 +204,10 @@ def explain_cell(
             world.set_arms(())
             world.set_object(task.T_world_object)
             checker = CandidateChecker(world, arm, ik, world.scene.settings.approach, holders=task.arms)
-            candidates = sorted(_results(checker, T_base_tool, opening, progress), key=CandidateResult._rank)
+            found = _results(checker, T_base_tool, opening, progress)
+            if arm.pitched:
+                found = (replace(c, pitch=arm.pitch_and_azimuth(c.q, cell.roll)[0]) for c in found)
+            candidates = sorted(found, key=CandidateResult._rank)
         reason = candidates[0].reason if candidates else without_candidates(ik)
     if progress and not candidates:
         progress(1.0)

@@ -69,6 +69,9 @@ class FeasibilityMap:
         shown_in: the scene, for `show`; it is not saved, so a map from a file has None.
         ease: (R, H, A) how easily the arm stands at each witness, see `symgrasp.robot.posture.ease`, where
             planners have asked for it; it is not saved.
+        pitches: pitches (rad) that the hand is held at: then the first axis has all rolls at the first pitch,
+            all rolls at the second, and so on, and a cell's roll is an index into them. Empty where the pitch
+            is free, or there is none. It is not saved: only planners have such maps.
     """
 
     scene: str
@@ -88,6 +91,7 @@ class FeasibilityMap:
     depth: Array
     shown_in: Scene | None = None
     ease: Array | None = None
+    pitches: tuple[float, ...] = ()
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
@@ -103,6 +107,11 @@ class FeasibilityMap:
     def feasible(self) -> np.ndarray:
         """(R, H, A) bool."""
         return self.reason == Reason.FEASIBLE
+
+    def roll_and_pitch(self, roll: int) -> tuple[int, float]:
+        """Return the index into `ROLLS` and the pitch (rad) that a cell's roll stands for."""
+        pitch, own = divmod(roll, len(ROLLS))
+        return own, self.pitches[pitch] if self.pitches else 0.0
 
     def witness(self, cell: Cell | tuple[int, int, int]) -> Witness | None:
         """Return the configuration that proves a cell feasible, or None where it is not."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -237,6 +238,25 @@ def chain_geometries(
     Returns:
         Up to what its axes meet or are parallel, and K geometries of one family.
     """
+    # For a pitched arm it is asked row by row, though the limits are all that differs.
+    return _geometries((arm.H.tobytes(), arm.P.tobytes(), arm.R0.tobytes()), locked, phi.tobytes())
+
+
+class _Screws(NamedTuple):
+    """The part of an arm's kinematics that decides; see `Arm`."""
+
+    H: Array
+    P: Array
+    R0: Array
+
+
+@lru_cache(maxsize=256)
+def _geometries(
+    screws: tuple[bytes, bytes, bytes], locked: int | None, values: bytes
+) -> tuple[Precision, Sequence[ChainGeometry]] | None:
+    """Do what `chain_geometries` does, for the bytes of H, P, R0 and phi."""
+    phi = np.frombuffer(values)
+    arm = _Screws(*(np.frombuffer(part).reshape(-1, 3) for part in screws))
     for precision, find in _FAMILIES:
         for backwards in (False, True):
             rows = [find(_joints(arm, locked, float(value), backwards), precision) for value in phi]
@@ -258,7 +278,7 @@ def has_exact_pair(arm: Arm, locked: int | None, phi: float) -> bool:
     return any(_meeting_pair(_joints(arm, locked, phi, end), EXACT) is not None for end in (False, True))
 
 
-def _joints(arm: Arm, locked: int | None, phi: float, backwards: bool) -> _Joints:
+def _joints(arm: Arm | _Screws, locked: int | None, phi: float, backwards: bool) -> _Joints:
     """Return the free joints of an arm with a joint locked at φ."""
     h, o = arm.H.copy(), np.cumsum(arm.P, axis=0)
     R0, p0, o = arm.R0, o[-1], o[:-1].copy()

@@ -10,6 +10,7 @@ a lying one it comes from all azimuths with hardly any pitch.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -27,11 +28,13 @@ __all__ = ["GridSolvers", "PitchedIK"]
 class PitchedIK:
     """The configurations of a pitched arm: in the middle of a cell, and at samples of one value.
 
-    Sample 0 is the middle of the cell; sample 1 + k is that of index k.
+    Sample 0 is the middle of the cell; sample 1 + k is that of index k. Of an arm whose hand is held at a
+    pitch, sample 1 is that pitch, anywhere within the cell, and in the middle it is met up to `SAME_PITCH`:
+    an arm that holds an upright object from above has one pitch at all azimuths, up to its URDF's rounding.
 
     Args:
         arm: the arm, for the grasps of a row; see `Arm.grasping`.
-        samples: number of samples.
+        samples: number of samples; where the pitch is held there is one.
         solver: makes the solver of the arm with a value locked, None where there is none.
 
     Raises:
@@ -46,11 +49,14 @@ class PitchedIK:
 
     def __init__(self, arm: Arm, samples: int, solver: Callable[[Arm, Lock], ArmIK | None]) -> None:
         self.arm = arm
-        locked = joint_to_lock(arm)
-        assert locked is not None
-        # Rows differ in the limits of the pitch, but samples mean the same in all of them.
-        limits = (-STEEPEST, STEEPEST) if locked == PITCH else (arm.lower[locked], arm.upper[locked])
-        phi = centres(*limits, samples)
+        if arm.pitch_value is None:
+            locked = joint_to_lock(arm)
+            assert locked is not None
+            # Rows differ in the limits of the pitch, but samples mean the same in all of them.
+            limits = (-STEEPEST, STEEPEST) if locked == PITCH else (arm.lower[locked], arm.upper[locked])
+            phi = centres(*limits, samples)
+        else:
+            locked, phi = PITCH, np.array([arm.pitch_value])
         inside = np.flatnonzero((phi >= arm.lower[locked]) & (phi <= arm.upper[locked]))
         self.phi = np.append(0.0, phi)
         middle = solver(arm, Lock(AZIMUTH, np.zeros(1)))
@@ -100,16 +106,19 @@ class GridSolvers:
 
     Attributes:
         arm: that arm.
+        manifold: that grid.
+        at: returns the solver for the grasps of a row and roll.
     """
 
     def __init__(self, arm: Arm, manifold: Manifold, solver: Callable[[Arm], Solver]) -> None:
-        self.arm, self._manifold, self._solver = arm, manifold, solver
+        self.arm, self.manifold, self._solver = arm, manifold, solver
         self._known: dict[tuple[float, ...], Solver] = {}
+        self.at = cache(self._at)
 
-    def at(self, row: int, roll: int) -> Solver:
+    def _at(self, row: int, roll: int) -> Solver:
         """Return the solver for the grasps of a row and roll."""
-        arm = self.arm.grasping(self._manifold, row, roll)
-        key = (*arm.P.ravel().tolist(), *arm.lower.tolist(), *arm.upper.tolist())
+        arm = self.arm.grasping(self.manifold, row, roll)
+        key = (*arm.P.ravel().tolist(), *arm.lower.tolist(), *arm.upper.tolist(), arm.pitch_value or 0.0)
         if key not in self._known:
             self._known[key] = self._solver(arm)
         return self._known[key]

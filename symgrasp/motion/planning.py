@@ -6,6 +6,7 @@ import numpy as np
 
 from symgrasp.ik import Solver, solver_for
 from symgrasp.motion.draft import MotionDraft
+from symgrasp.motion.search import NoMotionError
 from symgrasp.motion.segments import Motion
 from symgrasp.motion.situation import MotionScene
 from symgrasp.motion.ways import Grip
@@ -51,12 +52,19 @@ class MotionPlanner:
         scene: the scene.
         world: a world of it.
 
+    Raises:
+        NoMotionError: an arm of five joints has a task: its hand cannot be led along given poses.
+
     Attributes:
         scene: the scene.
         bodies: the pieces of the scene.
     """
 
     def __init__(self, scene: Scene, world: BulletWorld) -> None:
+        names = dict.fromkeys(name for task in scene.tasks.values() for name in task.arms)
+        pitched = [name for name in names if scene.arm(name).pitched]
+        if pitched:
+            raise NoMotionError(f"no motion of {', '.join(pitched)}: expected arms of 6 or 7 joints")
         self.scene, self.bodies = scene, MotionScene(scene, world)
         self._world = world
         self._solvers: dict[str, tuple[Solver, Solver]] = {}

@@ -10,7 +10,8 @@ import numpy as np
 from symgrasp.plan.check_poses import TOLERANCE, check_pose, same_pose
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Hold, PlanTask
 from symgrasp.plan.report import Report
-from symgrasp.poses import Array
+from symgrasp.poses import Array, rotation_about
+from symgrasp.robot.pitch import SAME_PITCH, pitch_range
 from symgrasp.robot.posture import conditioning, limit_slack
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import support_margins
@@ -82,7 +83,8 @@ def _check_torsos(configurations: Sequence[tuple[Arm, Array, float]], where: str
 
 def _check_arm(hold: Hold, arm: Arm, q: Array, who: str, report: Report) -> None:
     """Check limits, and the tool pose by the forward kinematics of the whole URDF."""
-    for name, value, lower, upper in zip(arm.joint_names, q, arm.lower, arm.upper, strict=True):
+    n = len(arm.joint_names)  # the values of an arm of five joints are more
+    for name, value, lower, upper in zip(arm.joint_names, q, arm.lower[:n], arm.upper[:n], strict=True):
         text = f"{who}: {name} is {value:.6f}, outside [{lower:g}, {upper:g}]"
         report.expect(lower <= value <= upper, text)
     slack, condition = float(limit_slack(arm, q)), float(conditioning(arm, q))
@@ -98,7 +100,8 @@ def _check_arm(hold: Hold, arm: Arm, q: Array, who: str, report: Report) -> None
     )
     report.expect(same, f"{who}: hand joints {hold.hand_joints}, but the opening takes {expected}")
     if check_pose(hold.tool_pose, f"{who}: tool_pose", report):
-        reached = arm.robot.T_world_base @ arm.tool_pose(q)
+        links = arm.robot.model.forward(arm.robot_values(q))
+        reached = arm.robot.T_world_base @ links[arm.robot.model.link_index(arm.tool)]
         same_pose(reached, hold.tool_pose.array(), f"{who}: forward kinematics and tool_pose", report)
 
 
@@ -118,16 +121,37 @@ def _check_grasp(hold: Hold, arm: Arm, T: Array, who: str, scene: Scene, report:
     wanted = hand.opening(radius)
     text = f"{who}: opening is {1e3 * hold.opening:.3f} mm, but this height takes {1e3 * wanted:.3f} mm"
     report.expect(abs(hold.opening - wanted) <= TOLERANCE, text)
-    expected = tool_of(arm, T, g.h, g.theta, flipped, radius)
-    same_pose(expected, hold.tool_pose.array(), f"{who}: grasp and tool_pose", report)
+    _check_pitch(hold, arm, scene, who, report)
+    expected = tool_of(arm, T, g.h, g.theta, flipped, radius, g.pitch)
+    leeway = SAME_PITCH if arm.pitched else 0.0
+    same_pose(expected, hold.tool_pose.array(), f"{who}: grasp and tool_pose", report, leeway)
 
 
-def tool_of(arm: Arm, T: Array, h: float, theta: float, flipped: bool, radius: float) -> Array:
-    """Return the tool pose of a grasp, written out: z radially inwards, y along the tangent."""
+def _check_pitch(hold: Hold, arm: Arm, scene: Scene, who: str, report: Report) -> None:
+    """Check that the hand may have the pitch of its grasp."""
+    pitch = hold.grasp.pitch
+    if not arm.pitched:
+        report.expect(pitch == 0.0, f"{who}: pitch is {pitch:g}, but only arms of five joints have one")
+        return
+    low, high = pitch_range(arm.hand, scene.profile, hold.grasp.h)
+    text = f"{who}: pitch is {pitch:.5f}, outside [{low:.5f}, {high:.5f}]"
+    report.expect(low - SAME_PITCH <= pitch <= high + SAME_PITCH, text)
+
+
+def tool_of(
+    arm: Arm, T: Array, h: float, theta: float, flipped: bool, radius: float, pitch: float = 0.0
+) -> Array:
+    """Return the tool pose of a grasp, written out: z radially inwards, y along the tangent.
+
+    The pitch turns it about the tangent, through the point of the object's axis at the grasp's height.
+    """
     out = np.array([np.cos(theta), np.sin(theta), 0.0])
     tangent = np.array([-np.sin(theta), np.cos(theta), 0.0]) * (-1.0 if flipped else 1.0)
     tool = np.eye(4)
     tool[:3, :3] = np.column_stack([np.cross(tangent, -out), tangent, -out])
     tool[:3, 3] = max(0.0, radius - arm.hand.finger_depth) * out + [0.0, 0.0, h]
     tool[:3, 3] -= float(arm.hand.shift_at(radius)) * tangent
-    return T @ tool
+    turn = np.eye(4)
+    turn[:3, :3] = rotation_about([np.sin(theta), -np.cos(theta), 0.0], pitch)
+    turn[:3, 3] = [0.0, 0.0, h] - turn[:3, :3] @ [0.0, 0.0, h]
+    return T @ turn @ tool

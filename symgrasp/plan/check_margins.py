@@ -40,11 +40,22 @@ def check_margins(
         if not report.expect(torso, f"{who}: the torso is at none of the values that maps try"):
             return
     holders = [other.arm for other in task.holds]
-    ik = solver_for(arm, scene.settings.redundancy, torso)
-    checker = CandidateChecker(world, arm, ik, scene.settings.approach, holders=holders)
+
+    def checker_at(h: float) -> CandidateChecker:
+        own = arm
+        if arm.pitched:
+            own = arm.at_pitch(g.pitch).grasping_at(scene.profile, h, int(g.roll > 1.0), 0.5 * grid.dtheta)
+        ik = solver_for(own, scene.settings.redundancy, torso)
+        return CandidateChecker(world, own, ik, scene.settings.approach, holders=holders)
+
+    checker = checker_at(g.h)
     for name in scene.robots:
         world.park(name)
     _check_retreat(hold, checker, T, who, report)
+    theta = g.theta
+    if arm.pitched:  # it holds somewhere within its cell, and margins are counted from the middle
+        _, column = grid.cell(g.h, g.theta + task.delta)
+        theta = float(grid.theta[column]) - task.delta
     margins = (
         ("margin_along", hold.margin_along, grid.dh, grid.heights, (grid.dh, 0.0)),
         ("margin_around", hold.margin_around, grid.dtheta, grid.angles // 2, (0.0, grid.dtheta)),
@@ -58,11 +69,11 @@ def check_margins(
         report.expect(whole, f"{who}: {text} is {margin / size:.4f} cells, not a whole number above zero")
         report.at_most(margin, count * size, 1e-6 * size, f"{who}: {text} is more than {count} cells")
         signed = [sign * k for k in range(1, count) for sign in (-1, 1)]
-        cells += [(text, k, g.h + k * step[0], g.theta + k * step[1]) for k in signed]
+        cells += [(text, k, g.h + k * step[0], theta + k * step[1]) for k in signed]
     for done, (text, away, h, theta) in enumerate(cells):
         if progress:
             progress(done / len(cells))
-        free = _feasible(checker, world, T, h, theta, g.roll)
+        free = _feasible(checker_at(h) if arm.pitched else checker, world, T, h, theta, g.roll)
         report.expect(free, f"{who}: {text} is overstated: {away:+d} cells away is infeasible")
 
 

@@ -43,8 +43,11 @@ def check_pose(pose: Pose, where: str, report: Report) -> bool:
     return same_pose(spelled, matrix, f"{where}: quaternion", report)
 
 
-def same_pose(a: Array, b: Array, where: str, report: Report) -> bool:
-    """Check that two poses (4, 4) are the same; ``where`` says what they are."""
+def same_pose(a: Array, b: Array, where: str, report: Report, leeway: float = 0.0) -> bool:
+    """Check that two poses (4, 4) are the same; ``where`` says what they are.
+
+    They may differ by a leeway (rad, and m at a decimetre) beyond the tolerance.
+    """
     distance, angle = (float(e) for e in pose_error(a, b))
     text = f"{where}: off by {1e3 * distance:.4f} mm and {np.rad2deg(angle):.5f}°"
-    return report.expect(distance <= TOLERANCE and angle <= TOLERANCE, text)
+    return report.expect(distance <= TOLERANCE + 0.1 * leeway and angle <= TOLERANCE + leeway, text)

@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 
 from symgrasp.plan.plan import Hold, Plan
+from symgrasp.robot.pitch import holds_at
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 
@@ -68,11 +69,11 @@ def to_tsr(plan: Plan) -> str:
     with the same opening.
     """
     scene = Scene.from_content(plan.scene.content, "plan: scene.content")
-    tightest: dict[tuple[str, float, float], Hold] = {}
+    tightest: dict[tuple[str, float, float, float], Hold] = {}
     for hold in (hold for task in plan.tasks for hold in task.holds):
-        known = tightest.setdefault((hold.arm, hold.grasp.h, hold.grasp.roll), hold)
-        if hold.margin_along < known.margin_along:
-            tightest[hold.arm, hold.grasp.h, hold.grasp.roll] = hold
+        key = hold.arm, hold.grasp.h, hold.grasp.roll, hold.grasp.pitch
+        if hold.margin_along < tightest.setdefault(key, hold).margin_along:
+            tightest[key] = hold
     regions = [_region(plan, scene, hold) for hold in tightest.values()]
     return yaml.safe_dump_all(regions, sort_keys=False, allow_unicode=True)
 
@@ -81,15 +82,16 @@ def _region(plan: Plan, scene: Scene, hold: Hold) -> dict[str, Any]:
     arm = scene.arm(hold.arm)
     radius = float(scene.profile.radius(hold.grasp.h))
     low, high = _height_range(scene, arm, hold)
-    free = [0.0, 0.0]
+    free, pitch = [0.0, 0.0], hold.grasp.pitch
+    pitched = f", pitched by {np.rad2deg(pitch):.1f}°" if pitch else ""
     return {
         "name": f"{plan.scene.name}: {hold.arm}",
-        "description": f"Grasps of {scene.file.object.name} with the {arm.hand.name} hand",
+        "description": f"Grasps of {scene.file.object.name} with the {arm.hand.name} hand{pitched}",
         "task": "grasp",
         "subject": arm.hand.name,
         "reference": scene.file.object.name,
         "T_ref_tsr": np.eye(4).tolist(),
-        "Tw_e": arm.hand.tool_pose(np.eye(4), 0.0, 0.0, hold.grasp.roll, radius).tolist(),
+        "Tw_e": arm.hand.tool_pose(np.eye(4), 0.0, 0.0, hold.grasp.roll, radius, pitch).tolist(),
         "Bw": [free, free, [low, high], free, free, [-np.pi, np.pi]],
         "preshape": [hold.opening],
     }
@@ -102,6 +104,8 @@ def _height_range(scene: Scene, arm: Arm, hold: Hold) -> tuple[float, float]:
 
     def same(height: float) -> bool:
         if not profile.h_min <= height <= profile.h_max or not hand.pads_rest(profile, height):
+            return False
+        if hold.grasp.pitch and not holds_at(hand, profile, height, hold.grasp.pitch):
             return False
         return abs(float(profile.radius(height)) - radius) <= hand.radius_tolerance
 

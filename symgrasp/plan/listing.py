@@ -25,4 +25,5 @@ def plan_in_words(plan: Plan) -> str:
 def place_in_words(grasp: Grasp) -> str:
     """Say where on the object a grasp is."""
     turn = f"θ = {math.degrees(grasp.theta):.1f}°, roll {math.degrees(grasp.roll):.0f}°"
-    return f"h = {100 * grasp.h:.1f} cm, {turn}"
+    pitch = f", pitch {math.degrees(grasp.pitch):.1f}°" if grasp.pitch else ""
+    return f"h = {100 * grasp.h:.1f} cm, {turn}{pitch}"

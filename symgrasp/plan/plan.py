@@ -111,6 +111,11 @@ class Grasp(_Part):
     h: Finite = Field(description="height along the axis (m)")
     theta: Finite = Field(description="angle about the axis (rad), in the object's frame")
     roll: Finite = Field(description="turn about the approach (rad): 0 or π")
+    pitch: Finite = Field(
+        default=0.0,
+        description="turn about the closing direction (rad), through the point of the object's axis at h, "
+        "positive with the palm above: of arms of five joints, the same in all tasks up to 0.0001",
+    )
 
 
 class Hold(_Part):

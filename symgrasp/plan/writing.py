@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.object.manifold import ROLLS
+from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.plan.plan import (
     CLEARANCE_LIMIT,
     FRAMES,
@@ -50,12 +50,14 @@ class Held(NamedTuple):
         map: its map of the task.
         cell: where on that map it holds.
         grasp: the same on the turned object, so the grasp itself.
+        offset: by how much (rad) the angle of the grasp is larger than that of the middle of this cell.
     """
 
     configuration: ArmConfiguration
     map: FeasibilityMap
     cell: Cell
     grasp: Cell
+    offset: float = 0.0
 
 
 def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held]) -> PlanTask:
@@ -73,18 +75,20 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
     arms = [h.configuration.arm for h in held]
     margins = support_margins(world.scene, turned, [h.configuration for h in held])
     entries = []
-    for (arm, q, opening), m, cell, grasp in held:
+    for (arm, q, opening), m, cell, grasp, offset in held:
         margin = m.margin(cell)
         h, theta = float(m.manifold.h[grasp.row]), float(m.manifold.theta[grasp.column])
-        roll = ROLLS[grasp.roll]
-        radius = float(m.manifold.profile.radius(h))
+        theta = float(wrap(theta + offset)) if offset else theta
+        own, pitch = m.roll_and_pitch(grasp.roll)
+        roll, radius = ROLLS[own], float(m.manifold.profile.radius(h))
+        pitched, _ = arm.pitch_and_azimuth(q, own)  # the same up to `SAME_PITCH`
         entries.append(
             Hold(
                 arm=arm.name,
                 robot=arm.robot.name,
-                grasp=Grasp(h=h, theta=theta, roll=roll),
-                tool_pose=Pose.of(arm.hand.tool_pose(turned, h, theta, roll, radius)),
-                joints=dict(zip(arm.joint_names, q.tolist(), strict=True)),
+                grasp=Grasp(h=h, theta=theta, roll=roll, pitch=pitch),
+                tool_pose=Pose.of(arm.hand.tool_pose(turned, h, theta, roll, radius, pitched)),
+                joints=dict(zip(arm.joint_names, q[: len(arm.joint_names)].tolist(), strict=True)),
                 hand_joints=arm.hand.joint_values(opening),
                 opening=opening,
                 margin_along=margin.along,

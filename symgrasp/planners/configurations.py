@@ -90,7 +90,7 @@ class ConfigurationFinder:
     ) -> None:
         self.world, self.arms, self.maps = world, arms, maps
         self._by_torso = by_torso
-        self._checker = cache(self._make_checker)
+        self._known_checker = cache(self._make_checker)
         self._choices = cache(self._make_choices)
         self._pairs: dict[tuple[_At, _At], list[int]] = {}
 
@@ -220,7 +220,7 @@ class ConfigurationFinder:
     def _make_choices(self, at: _At) -> _Choices:
         arm = self.arms[at.arm]
         opening = float(self.maps[at.arm].opening[at.cell.row])
-        found = self._checker(at.arm, at.torso).ik.solve(self._tool(at))
+        found = self._checker(at).ik.solve(self._tool(at))
         inside = found.inside
         configurations = [ArmConfiguration(arm, q, opening) for q in found.q[inside]]
         values = [arm.robot_values(q, opening) for q in found.q[inside]]
@@ -243,7 +243,7 @@ class ConfigurationFinder:
                 self.world.park(robot)
             self.world.set_object(self.maps[at.arm].T_world_object)
             configuration, sample = own.configurations[choice], own.samples[choice]
-            checker = self._checker(at.arm, at.torso)
+            checker = self._checker(at)
             result = checker.check(self._tool(at), configuration.q, sample, configuration.opening)
             if result.reason != Reason.FEASIBLE:
                 own.left &= ~(1 << choice)
@@ -256,12 +256,25 @@ class ConfigurationFinder:
         arm, m, cell = self.arms[at.arm], self.maps[at.arm], at.cell
         h, theta = m.manifold.h[cell.row], m.manifold.theta[cell.column]
         radius = float(m.manifold.profile.radius(h))
-        tool = arm.hand.tool_pose(m.T_world_object, h, theta, ROLLS[cell.roll], radius)
+        roll, _ = m.roll_and_pitch(cell.roll)
+        tool = arm.hand.tool_pose(m.T_world_object, h, theta, ROLLS[roll], radius)
         return inverse(arm.robot.T_world_base) @ tool
 
-    def _make_checker(self, k: int, torso: int | None) -> CandidateChecker:
+    def _checker(self, at: _At) -> CandidateChecker:
+        """Return the checker of an arm, of a pitched one for the row, roll and pitch of its cell."""
+        m, cell = self.maps[at.arm], at.cell
+        pitched = self.arms[at.arm].pitched
+        grasp = (cell.row, *m.roll_and_pitch(cell.roll)) if pitched else None
+        return self._known_checker(at.arm, at.torso, grasp)
+
+    def _make_checker(
+        self, k: int, torso: int | None, grasp: tuple[int, int, float] | None
+    ) -> CandidateChecker:
         settings = self.world.scene.settings
         arm = self.arms[k]
+        if grasp:
+            row, roll, pitch = grasp
+            arm = arm.at_pitch(pitch).grasping(self.maps[k].manifold, row, roll)
         ik = solver_for(arm, settings.redundancy, None if torso is None else [torso])
         holders = [own.name for own in self.arms]
         return CandidateChecker(self.world, arm, ik, settings.approach, holders=holders)

@@ -76,11 +76,11 @@ def smallest_conflicts(maps: Sequence[FeasibilityMap]) -> list[tuple[int, ...]]:
 def height_gap(maps: Sequence[FeasibilityMap]) -> float | None:
     """Return how far apart (m) tasks are: the smallest spread of heights that serves each of them.
 
-    Zero means that they share a height, None that they share no roll.
+    Zero means that they share a height, None that they share no roll, or no roll and pitch.
     """
     h = maps[0].manifold.h
     gaps = []
-    for roll in range(len(ROLLS)):
+    for roll in range(len(maps[0].feasible)):
         rows = [h[allowed(m)[roll]] for m in maps]
         if not all(len(r) for r in rows):
             continue
@@ -133,7 +133,8 @@ class TaskHeights(NamedTuple):
 
     Attributes:
         task: name of the task.
-        spans: for each roll the runs of heights (lowest, highest) (m) that are feasible at some angle.
+        spans: for each roll the runs of heights (lowest, highest) (m) that are feasible at some angle, and of
+            an arm of five joints at some pitch.
     """
 
     task: str
@@ -145,8 +146,8 @@ class Exclusion(NamedTuple):
 
     Attributes:
         tasks: their names.
-        apart: the smallest spread (m) of heights, at one roll, that serves each; None if they share no
-            roll or one of them cannot be done at all.
+        apart: the smallest spread (m) of heights, at one roll (and pitch), that serves each; None if they
+            share none or one of them cannot be done at all.
     """
 
     tasks: tuple[str, ...]
@@ -173,17 +174,19 @@ class Conflict:
         exclusions: the smallest sets of tasks that exclude each other, all of one size.
         heights: of every task, in their order.
         regrasps: the fewest grasps that solve it; empty if no number does, None if that was not asked.
+        kept: what all tasks have in common beside the height, in words.
     """
 
     exclusions: tuple[Exclusion, ...]
     heights: tuple[TaskHeights, ...]
     regrasps: tuple[Shared, ...] | None
+    kept: str = "roll"
 
     def __str__(self) -> str:
         names, apart = self.exclusions[0]
         if len(names) == 1:
             return f"no grasp is feasible in task {names[0]}"
-        gap = "they share no roll" if apart is None else f"they are {100 * apart:.1f} cm apart"
+        gap = f"they share no {self.kept}" if apart is None else f"they are {100 * apart:.1f} cm apart"
         more = f" (one of {len(self.exclusions)} such sets)" if len(self.exclusions) > 1 else ""
         spans = {task.task: task.spans for task in self.heights}
         parts = [f"{name} allows {_in_words(spans[name])}" for name in names]
@@ -225,11 +228,12 @@ def find_conflict(maps: Sequence[FeasibilityMap], resting: Sequence[int] | None 
         for segment in segments
     ]
     heights = [TaskHeights(m.task, tuple(_spans(m, roll) for roll in range(len(ROLLS)))) for m in maps]
-    return Conflict(tuple(exclusions), tuple(heights), None if resting is None else tuple(shared))
+    kept = "roll and pitch" if maps[0].pitches else "roll"
+    return Conflict(tuple(exclusions), tuple(heights), None if resting is None else tuple(shared), kept)
 
 
 def _spans(m: FeasibilityMap, roll: int) -> tuple[tuple[float, float], ...]:
-    rows = np.flatnonzero(allowed(m)[roll])
+    rows = np.flatnonzero(allowed(m)[roll :: len(ROLLS)].any(axis=0))
     runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
     return tuple((float(m.manifold.h[run[0]]), float(m.manifold.h[run[-1]])) for run in runs)
 

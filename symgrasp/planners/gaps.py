@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -27,10 +28,11 @@ PASSING = -0.25
 class GapTable(NamedTuple):
     """The gaps between all prints of two arms.
 
-    A line is a roll and a row: roll · heights + row. L lines, A angles.
+    A line is a roll and a row: roll · heights + row, with rolls as `FeasibilityMap.pitches` counts them.
+    L and M lines, A angles.
 
     Attributes:
-        row: (L, L) where in ``gaps`` a pair of lines is: those of the first arm by those of the second.
+        row: (L, M) where in ``gaps`` a pair of lines is: those of the first arm by those of the second.
         gaps: (K, A) gaps (m) by the second column less the first.
     """
 
@@ -50,10 +52,15 @@ class PrintGaps:
     Args:
         arms: the arms, in the order of the maps.
         grid: the grid of the maps.
+        pitches: of every arm the pitches (rad) that its maps have; see `FeasibilityMap.pitches`. Prints are
+            those of a hand in the middle of its cell.
     """
 
-    def __init__(self, arms: Sequence[Arm], grid: Manifold) -> None:
+    def __init__(
+        self, arms: Sequence[Arm], grid: Manifold, pitches: Sequence[Sequence[float]] | None = None
+    ) -> None:
         self.arms, self.grid = arms, grid
+        self._pitches = [own or (0.0,) for own in pitches or ((),) * len(arms)]
         self._kind = cache(self._kind_of)
         self._lines = cache(self._lines_of)
         self._between = cache(self._compute)
@@ -73,28 +80,33 @@ class PrintGaps:
         return table.gaps[table.row[roll * heights + row]].reshape(len(ROLLS), heights, -1)
 
     def _kind_of(self, a: int) -> int:
-        """Return the first arm whose hand is the same as that of arm a."""
-        return next(k for k in range(a + 1) if k == a or _same_hand(self.arms[k], self.arms[a], self.grid))
+        """Return the first arm whose hand and pitches are the same as those of arm a."""
+        for k in range(a):
+            if self._pitches[k] == self._pitches[a] and _same_hand(self.arms[k], self.arms[a], self.grid):
+                return k
+        return a
 
     def _lines_of(self, a: int) -> tuple[np.ndarray, list[_Line]]:
         """Return which kind each line is (L,), and the kinds: lines that differ by their height alone."""
-        known: dict[tuple[int, float], int] = {}
+        known: dict[tuple[int, float, float], int] = {}
         kinds, ids = [], []
-        for roll, row in np.ndindex(len(ROLLS), self.grid.heights):
+        for pitch, roll, row in product(self._pitches[a], range(len(ROLLS)), range(self.grid.heights)):
             radius = float(self.grid.profile.radius(self.grid.h[row]))
-            if (roll, radius) not in known:
-                known[roll, radius] = len(kinds)
-                p = self.arms[a].handprint(self.grid, row, roll)
-                kinds.append(_Line(roll, radius, p.first_row - row, p.cells))
-            ids.append(known[roll, radius])
+            key = (roll, pitch, radius)
+            if key not in known:
+                known[key] = len(kinds)
+                p = self.arms[a].handprint(self.grid, row, roll, pitch)
+                kinds.append(_Line(roll, pitch, radius, p.first_row - row, p.cells))
+            ids.append(known[key])
         return np.array(ids), kinds
 
     def _pairs_of(self, a: int, b: int) -> tuple[np.ndarray, np.ndarray]:
         """Return pairs (K, 3) of kinds of lines and rows apart, and which one two lines are (L, L)."""
-        row = np.tile(np.arange(self.grid.heights), len(ROLLS))
-        kinds = np.broadcast_arrays(self._lines(a)[0][:, None], self._lines(b)[0], row - row[:, None])
+        of_a, of_b = self._lines(a)[0], self._lines(b)[0]
+        rows = [np.arange(len(lines)) % self.grid.heights for lines in (of_a, of_b)]
+        kinds = np.broadcast_arrays(of_a[:, None], of_b, rows[1] - rows[0][:, None])
         unique, inverse = np.unique(np.stack(kinds, axis=-1).reshape(-1, 3), axis=0, return_inverse=True)
-        return unique, np.ascontiguousarray(inverse.reshape(len(row), len(row)))
+        return unique, np.ascontiguousarray(inverse.reshape(len(of_a), len(of_b)))
 
     def _compute(self, a: int, b: int) -> GapTable:
         pairs, row = self._pairs_of(a, b)
@@ -134,13 +146,15 @@ class PrintGaps:
 
     def _tool(self, a: int, line: _Line, h: float) -> Array:
         """Return the tool pose (4, 4) on the object at column 0 and a height (m)."""
-        return self.arms[a].hand.tool_pose(np.eye(4), h, 0.0, ROLLS[line.roll], line.radius)
+        hand = self.arms[a].hand
+        return hand.tool_pose(np.eye(4), h, 0.0, ROLLS[line.roll], line.radius, line.pitch)
 
 
 class _Line(NamedTuple):
-    """A hand at a line: roll, radius (m), first row of its print less the line's own, and the print."""
+    """A hand at a line: roll, pitch (rad), radius (m), first row of its print less its own, and print."""
 
     roll: int
+    pitch: float
     radius: float
     first: int
     cells: np.ndarray

@@ -35,6 +35,10 @@ LOWEST = -0.5
 """Below the score of every placement, above that of none: `PASSING` counts, `OVERLAP` does not."""
 
 
+INFEASIBLE = -1.0
+"""A margin below that of everything feasible."""
+
+
 class HoldRun(NamedTuple):
     """An arm that keeps one grasp over consecutive tasks.
 
@@ -194,13 +198,12 @@ class HoldingSearch:
 
     @cached_property
     def _alone(self) -> Array:
-        """(n, L) what each line of each hold reaches at most."""
-        return np.array(
-            [
-                np.min([s.margins[h].max(axis=(0, 2)) for s in self._stations if h in s.margins], axis=0)
-                for h in range(len(self.holds))
-            ]
-        )
+        """(n, L) what each line of each hold reaches at most; those of arms with fewer are filled up."""
+        reached = [
+            np.min([s.margins[h].max(axis=(0, 2)) for s in self._stations if h in s.margins], axis=0)
+            for h in range(len(self.holds))
+        ]
+        return _filled(reached, INFEASIBLE)
 
     def _lines(self) -> Iterator[Holding]:
         """Yield every line of a single hold; a larger clearance breaks ties."""
@@ -241,19 +244,19 @@ class HoldingSearch:
         lines = self._alone.shape[1]
         several = [own for _, own in self._turned_together]
         stations = [s for own in several for s in own]
+        groups = np.array([k for k, own in enumerate(several) for _ in own], dtype=np.int64)
         feasible = np.ones((len(several), n, lines, angles), dtype=bool)
         part = np.full((n, len(stations)), -1)
         margins = []
-        values = max((len(m) for s in stations for m in s.margins.values()), default=1)
         for column, station in enumerate(stations):
             for h, margin in station.margins.items():
                 part[h, column] = len(margins)
-                missing = np.full((values - len(margin), lines, angles), -1.0)
-                margins.append(np.concatenate([margin, missing]))
-        for g, own in enumerate(several):
-            for station in own:
-                for h, margin in station.margins.items():
-                    feasible[g, h] = (margin >= 0).any(axis=0)
+                margins.append(margin)
+        values = max(map(len, margins), default=1)
+        filled = _filled([*margins, np.empty((values, lines, angles))], INFEASIBLE)[:-1]
+        for column, station in enumerate(stations):
+            for h in station.margins:
+                feasible[groups[column], h] = (filled[part[h, column]] >= 0).any(axis=0)
         table, rows, gaps, first = np.full((n, n), -1), [], [], 0
         for pair in self._meetings:
             found = gaps_of(*pair)
@@ -265,10 +268,19 @@ class HoldingSearch:
             order=np.argsort(-self._alone, axis=1, kind="stable"),
             alone=self._alone,
             feasible=doubled(feasible),
-            group=np.array([k for k, own in enumerate(several) for _ in own], dtype=np.int64),
+            group=groups,
             part=part,
-            margins=np.array(margins).reshape(-1, values, lines, angles),
+            margins=filled,
             table=table,
-            row=np.array(rows, dtype=np.int64).reshape(-1, lines, lines),
+            row=_filled([*rows, np.empty((lines, lines), dtype=np.int64)], 0)[:-1],
             gaps=np.concatenate([np.empty((0, angles)), *gaps]),
         )
+
+
+def _filled(arrays: Sequence[np.ndarray], value: float) -> np.ndarray:
+    """Return arrays of different shapes as one, filled up with a value to the largest."""
+    shape = np.max([array.shape for array in arrays], axis=0)
+    filled = np.full((len(arrays), *shape), value, dtype=arrays[0].dtype)
+    for own, array in zip(filled, arrays, strict=True):
+        own[tuple(map(slice, array.shape))] = array
+    return filled

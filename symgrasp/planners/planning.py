@@ -16,10 +16,13 @@ import numpy as np
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.pitch_maps import common_pitches
 from symgrasp.feasibility.torso_maps import merged
 from symgrasp.plan.plan import Plan, Planner
 from symgrasp.plan.writing import write_plan
+from symgrasp.planners.azimuths import bound_holds
 from symgrasp.planners.bimanual import Climb, ClimbStep
+from symgrasp.planners.holding import hold_runs, turn_groups
 from symgrasp.planners.solving import TaskVisit, climb, first_grasp, holdings, with_regrasps
 from symgrasp.progress import Progress, part_of
 from symgrasp.robot.posture import ease
@@ -44,6 +47,11 @@ SequentialMethod = Literal["best", "first", "regrasp"]
 
 Plans = Generator[Plan]
 """Plans, made when asked for, best first; `close` it when no more are wanted."""
+
+PITCHES_ALONE, PITCHES_TOGETHER = ((8, 6), (50, 12)), ((4, 4),)
+"""How many pitches of an arm of five joints are tried all over the range, and how many each task suggests:
+the first numbers and, where no pitch serves all tasks, the next. Where one arm holds the object at a time,
+and where several do, whose prints are compared pitch by pitch."""
 
 MapsByKey = Mapping[tuple[str, str], FeasibilityMap]
 """(name of the task, name of the arm) → map: the one key of maps."""
@@ -91,7 +99,8 @@ def sequential_plans(
     """List the plans with one grasp for all tasks that an arm does alone, best first.
 
     One for every height and roll that serves all tasks, each with its best turns: in the order of
-    `common_grasps`. Arguments and errors are those of `plan_sequential`.
+    `common_grasps`. Of an arm of five joints, one for every pitch that was tried as well. Arguments and
+    errors are those of `plan_sequential`.
     """
     _, tasks = _tasks_alone(scene, arm)
     with open_world(scene) as world:
@@ -110,8 +119,12 @@ def sequential_maps(
     """
     _, tasks = _tasks_alone(scene, arm)
     with open_world(scene) as world:
-        visits = _visits(world, tasks, None, progress)
-    return {(visit.task.name, arm): m for visit in visits for arm, m in visit.maps.items()}
+        maker = MapMaker(world)
+        return {
+            (task.name, name): maker.map(name, task, progress=part_of(progress, k, len(tasks)))
+            for k, task in enumerate(tasks)
+            for name in task.arms
+        }
 
 
 def plan_bimanual(
@@ -145,6 +158,10 @@ def plan_bimanual(
     if method == "exact":
         return _best(bimanual_plans(scene, task, maps, progress))
     the_task = _task_together(scene, task)
+    pitched = [name for name in the_task.arms if scene.arm(name).pitched]
+    if pitched:
+        expected = "arms of 6 or 7 joints for hill climbing, which knows no pitch"
+        raise SceneError(scene.source, f"task {the_task.name}: arms", pitched, expected)
     with open_world(scene) as world:
         (visit,) = _visits(world, [the_task], maps, progress)
         entry, planner = climb(world, visit, seed, limits or Climb(), progress, trace)
@@ -269,12 +286,10 @@ def _visits(
     world: BulletWorld, tasks: Sequence[Task], known: MapsByKey | None, progress: Progress | None
 ) -> list[TaskVisit]:
     """Visit every task once, with the maps of all its arms; those that are not known are computed."""
-    for task in tasks:
-        pitched = [name for name in task.arms if world.scene.arm(name).pitched]
-        if pitched:
-            expected = "arms of 6 or 7 joints: the pitch of an arm of five differs from task to task"
-            raise SceneError(world.scene.source, f"task {task.name}: arms", pitched, expected)
+    _check_azimuths(world.scene, tasks)
     total = sum(len(task.arms) for task in tasks)
+    pitched = {name for task in tasks for name in task.arms if world.scene.arm(name).pitched}
+    total += sum(name in pitched for task in tasks for name in task.arms)
     maker = MapMaker(world)
     visits: list[TaskVisit] = []
     done = 0
@@ -294,12 +309,55 @@ def _visits(
                 maps[arm] = _rated(world, given or maker.map(arm, task, progress=step))
             done += 1
         visits.append(TaskVisit(task, maps, tuple(torsos.values())))
+    several = any(len(task.arms) > 1 for task in tasks)
+    for arm in sorted(pitched):
+        own = [k for k, visit in enumerate(visits) if arm in visit.maps]
+        maps_of_arm = [visits[k].maps[arm] for k in own]
+        for count in PITCHES_TOGETHER if several else PITCHES_ALONE:
+            pitches = common_pitches(world.scene.arm(arm), maps_of_arm, *count)
+            for k, free in zip(own, maps_of_arm, strict=True):
+                step = part_of(progress, done + own.index(k), total)
+                found = _rated(world, _at_pitches(maker, arm, visits[k].task, free, pitches, step))
+                visits[k] = visits[k]._replace(maps={**visits[k].maps, arm: found})
+            if np.logical_and.reduce([visits[k].maps[arm].feasible.any(axis=2) for k in own]).any():
+                break
+        done += len(own)
     return visits
 
 
 def _rated(world: BulletWorld, m: FeasibilityMap) -> FeasibilityMap:
     """Return a map that knows how easily the arm stands at its witnesses."""
     return replace(m, ease=ease(world.scene.arm(m.arm), m.q))
+
+
+def _check_azimuths(scene: Scene, tasks: Sequence[Task]) -> None:
+    """Refuse tasks in which an arm of five joints would have to follow other hands.
+
+    It holds the object at an azimuth that follows from its pitch, so a turn of the object is left that brings
+    its grasp there: one for each task. Where other hands bind that turn to the turns of other tasks, there is
+    none left.
+    """
+    sets = [task.arms for task in tasks]
+    bound = bound_holds(hold_runs(sets), turn_groups(sets))
+    for run in bound:
+        if scene.arm(run.arm).pitched:
+            task = tasks[run.tasks[-1]]
+            expected = f"6 or 7 joints for {run.arm}, which holds the object together with others in several"
+            raise SceneError(scene.source, f"task {task.name}: arms", list(task.arms), expected)
+
+
+def _at_pitches(
+    maker: MapMaker,
+    arm: str,
+    task: Task,
+    free: FeasibilityMap,
+    pitches: Sequence[float],
+    progress: Progress | None,
+) -> FeasibilityMap:
+    """Return the map of an arm with its hand at some pitches (rad), feasible only where it is if free."""
+    posed = replace(task, T_world_object=free.T_world_object)
+    found = maker.maps_at_pitches(arm, posed, pitches, manifold=free.manifold, progress=progress)
+    return found.masked(np.tile(free.feasible, (len(pitches), 1, 1)))
 
 
 def _by_torso(

@@ -16,7 +16,7 @@ import numpy as np
 from symgrasp.errors import InputError
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.object.manifold import ROLLS, wrap
+from symgrasp.object.manifold import wrap
 from symgrasp.planners.conflicts import ConflictError, find_conflict
 from symgrasp.poses import Array
 
@@ -71,7 +71,7 @@ def first_common_grasp(
     """
     check_same_grid(maps)
     for row in range(maps[0].manifold.heights):
-        for roll in range(len(ROLLS)):
+        for roll in range(len(maps[0].feasible)):
             columns = [_first(m.feasible[roll, row]) for m in maps]
             if None not in columns:
                 return _grasp(maps, roll, row, [c for c in columns if c is not None])

@@ -14,12 +14,13 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import wrap
 from symgrasp.plan.plan import Planner, PlanTask
 from symgrasp.plan.writing import Held, write_task
+from symgrasp.planners.azimuths import offsets
 from symgrasp.planners.bimanual import Climb, ClimbStep, hill_climb
 from symgrasp.planners.configurations import ConfigurationFinder, witnesses
 from symgrasp.planners.conflicts import ConflictError, fewest_regrasps, find_conflict
 from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import PrintGaps
-from symgrasp.planners.holding import HoldingSearch, hold_runs
+from symgrasp.planners.holding import HoldingSearch, hold_runs, turn_groups
 from symgrasp.planners.sequential import first_common_grasp
 from symgrasp.planners.stations import SharedTorso
 from symgrasp.progress import Progress
@@ -59,11 +60,23 @@ def first_grasp(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> li
     """
     maps = [visit.maps[arm] for visit in visits]
     found = first_common_grasp(maps, _resting(world, visits))
-    entries = []
-    for visit, m, cell, delta in zip(visits, maps, found.cells, found.deltas, strict=True):
-        (configuration,) = witnesses([world.scene.arm(arm)], [m], [cell])
-        entries.append(write_task(world, visit.task, delta, [Held(configuration, m, cell, found.grasp)]))
-    return entries
+    held = [
+        Held(witnesses([world.scene.arm(arm)], [m], [cell])[0], m, cell, found.grasp)
+        for m, cell in zip(maps, found.cells, strict=True)
+    ]
+    sets = [[arm] for _ in visits]
+    azimuths = {(k, arm): _azimuth(own) for k, own in enumerate(held)}
+    more, (offset,) = offsets(hold_runs(sets), turn_groups(sets), azimuths, 0.0)
+    return [
+        write_task(world, visit.task, float(wrap(delta + extra)), [own._replace(offset=offset)])
+        for visit, delta, extra, own in zip(visits, found.deltas, more, held, strict=True)
+    ]
+
+
+def _azimuth(held: Held) -> float:
+    """Return the angle (rad) by which an arm holds beside the middle of its cell."""
+    roll, _ = held.map.roll_and_pitch(held.cell.roll)
+    return held.configuration.arm.pitch_and_azimuth(held.configuration.q, roll)[1]
 
 
 def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> list[PlanTask]:
@@ -118,7 +131,7 @@ def holdings(
         world: a world of the scene.
         visits: the tasks in order, with the maps of all their arms.
         progress: called with the finished share; may raise `Cancelled`.
-        turned: turn (rad, whole cells) of the object in the first task.
+        turned: turn (rad) of the object in the first task.
 
     Yields:
         The tasks as a plan states them, and what found them.
@@ -128,7 +141,9 @@ def holdings(
     """
     scene, maps = world.scene, [visit.maps for visit in visits]
     grid = next(iter(maps[0].values())).manifold
-    gaps = PrintGaps([scene.arm(run.arm) for run in hold_runs(maps)], grid)
+    runs = hold_runs(maps)
+    pitches = [maps[run.tasks[0]][run.arm].pitches for run in runs]
+    gaps = PrintGaps([scene.arm(run.arm) for run in runs], grid, pitches)
     torsos = [SharedTorso(k, shared) for k, visit in enumerate(visits) for shared in visit.torsos]
     search = HoldingSearch(maps, gaps, torsos)
     finders = [_finder(world, visit) for visit in visits]
@@ -136,14 +151,25 @@ def holdings(
     found = False
     for placement in placements:
         found = True
-        common = round(turned / grid.dtheta) - placement.steps[0].turn
-        entries = []
-        for visit, step in zip(visits, placement.steps, strict=True):
-            held = [
-                Held(configuration, m, cell, cell.turned(-step.turn - common, grid.angles))
-                for configuration, m, cell in zip(step.configurations, step.maps, step.cells, strict=True)
+        columns = round(turned / grid.dtheta)
+        common = columns - placement.steps[0].turn
+        holds = [
+            [
+                Held(q, m, cell, cell.turned(-step.turn - common, grid.angles))
+                for q, m, cell in zip(step.configurations, step.maps, step.cells, strict=True)
             ]
-            delta = float(wrap((step.turn + common) * grid.dtheta))
+            for step in placement.steps
+        ]
+        azimuths = {
+            (k, own.configuration.arm.name): _azimuth(own) for k, held in enumerate(holds) for own in held
+        }
+        more, grasps = offsets(search.holds, search.groups, azimuths, turned - columns * grid.dtheta)
+        entries = []
+        for k, (visit, step, held) in enumerate(zip(visits, placement.steps, holds, strict=True)):
+            runs = zip(search.holds, grasps, strict=True)
+            offset = {run.arm: own for run, own in runs if k in run.tasks}
+            held = [own._replace(offset=offset[own.configuration.arm.name]) for own in held]
+            delta = float(wrap((step.turn + common) * grid.dtheta + more[k]))
             entries.append(write_task(world, visit.task, delta, held))
         yield (
             entries,

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from symgrasp.errors import InputError
 from symgrasp.object.manifold import Manifold, grasp_to_tool
 from symgrasp.object.profile import Profile
-from symgrasp.poses import Array
+from symgrasp.poses import Array, from_rotation, rotation_about
 from symgrasp.robot.assembly import Frame
 
 __all__ = ["HANDS", "SIDED_HANDS", "Hand", "JointTable"]
@@ -110,7 +110,13 @@ class Hand:
         return max(0.0, radius - self.finger_depth)
 
     def tool_pose(
-        self, T_world_object: ArrayLike, h: ArrayLike, theta: ArrayLike, roll: ArrayLike, radius: ArrayLike
+        self,
+        T_world_object: ArrayLike,
+        h: ArrayLike,
+        theta: ArrayLike,
+        roll: ArrayLike,
+        radius: ArrayLike,
+        pitch: float = 0.0,
     ) -> Array:
         """Return the tool poses (..., 4, 4) of grasps; see `grasp_to_tool`.
 
@@ -120,9 +126,16 @@ class Hand:
             theta: angles (...) (rad).
             roll: 0 or π (...).
             radius: radii (...) of the object at these heights (m).
+            pitch: turn (rad) of the hand about its closing direction, through the point of the object's axis
+                that it holds; positive with the palm above, towards larger heights.
         """
         standoff = np.maximum(0.0, np.asarray(radius) - self.finger_depth)
-        return grasp_to_tool(T_world_object, h, theta, roll, standoff, self.shift_at(radius))
+        poses = grasp_to_tool(T_world_object, h, theta, roll, standoff, self.shift_at(radius))
+        if pitch == 0.0:
+            return poses
+        axis = np.stack(np.broadcast_arrays(0.0, self.shift_at(radius), standoff), axis=-1)
+        turn = rotation_about(np.array([0.0, 1.0, 0.0]), -pitch * np.cos(np.asarray(roll, dtype=float)))
+        return poses @ from_rotation(turn, axis - (turn @ axis[..., None])[..., 0])
 
     def tool_poses(self, manifold: Manifold, T_world_object: ArrayLike) -> Array:
         """Return ``T_world_tool`` (rolls, heights, angles, 4, 4) at every cell centre of a manifold."""

@@ -33,10 +33,14 @@ from symgrasp.object.profile import Profile
 from symgrasp.poses import Array
 from symgrasp.robot.hand import Hand
 
-__all__ = ["STEEPEST", "pitch_range"]
+__all__ = ["SAME_PITCH", "STEEPEST", "holds_at", "pitch_range"]
 
 STEEPEST = np.deg2rad(100.0)
 """Largest pitch (rad) to either side: a little more than for an approach along the object's axis."""
+
+SAME_PITCH = 1e-4
+"""Pitches (rad) that differ by no more are the same: 0.01 mm at a finger's length, and a little more than
+what the rounded angles of URDFs make of one that all configurations would have in common."""
 
 STEPS = 200
 """Pitches that are tried on either side of none: every half degree."""
@@ -63,6 +67,11 @@ def pitch_range(hand: Hand, profile: Profile, h: float) -> tuple[float, float]:
             last = float(pitch)
         ends.append(last)
     return ends[0], ends[1]
+
+
+def holds_at(hand: Hand, profile: Profile, h: float, pitch: float) -> bool:
+    """Whether a hand at a pitch (rad) holds an object at a height (m), whatever it does at other pitches."""
+    return _holds(hand, profile, _section(profile), h, pitch)
 
 
 def _section(profile: Profile) -> Array:

@@ -27,9 +27,9 @@ def limit_slack(arm: Arm, q: ArrayLike) -> Array:
         arm: the arm, whose torso does not count.
         q: joint values (..., n).
     """
-    first = arm.dof - len(arm.H)
-    q = np.asarray(q, dtype=float)[..., first:]
-    slack = np.minimum(q - arm.lower[first:], arm.upper[first:] - q)
+    own = _own_joints(arm)
+    q = np.asarray(q, dtype=float)[..., own]
+    slack = np.minimum(q - arm.lower[own], arm.upper[own] - q)
     return np.minimum(slack.min(axis=-1), np.pi)
 
 
@@ -42,12 +42,12 @@ def conditioning(arm: Arm, q: ArrayLike) -> Array:
         arm: the arm, whose torso does not count.
         q: joint values (..., n).
     """
-    first = arm.dof - len(arm.H)
-    q = np.asarray(q, dtype=float)[..., first:]
+    own = _own_joints(arm)
+    q = np.asarray(q, dtype=float)[..., own]
     rotation = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
     position = np.zeros((*q.shape[:-1], 3))
     axes, points = [], []
-    for k, axis in enumerate(arm.H):
+    for k, axis in enumerate(arm.H[: q.shape[-1]]):
         axes.append(rotation @ axis)
         points.append(position)
         rotation = rotation @ rotation_about(axis, q[..., k])
@@ -59,6 +59,11 @@ def conditioning(arm: Arm, q: ArrayLike) -> Array:
     ]
     values = np.linalg.svd(np.stack(columns, axis=-1), compute_uv=False)
     return values[..., -1] / values[..., 0]
+
+
+def _own_joints(arm: Arm) -> slice:
+    """Return where the arm's joints are among its values: after a torso, before pitch and azimuth."""
+    return slice(arm.dof - len(arm.H), len(arm.joint_names))
 
 
 def ease(arm: Arm, q: ArrayLike) -> Array:

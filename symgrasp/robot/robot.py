@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 
 from symgrasp.errors import InputError, UrdfError, one_of
 from symgrasp.object.manifold import ROLLS, Manifold
+from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, from_rotation, inverse, rotation_about
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.handprint import Handprint, handprint
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.model import RobotModel
-from symgrasp.robot.pitch import STEEPEST, pitch_range
+from symgrasp.robot.pitch import SAME_PITCH, STEEPEST, pitch_range
 from symgrasp.robot.torso import Torso
 
 __all__ = ["AZIMUTH", "DEFAULT_ACCELERATION", "PITCH", "Arm", "Robot"]
@@ -98,6 +99,7 @@ class Arm:
         joint_names: its joints, from base to tool, those of the torso included.
         indices: (.,) their indices into the robot's joint values.
         pitched: whether it has five joints, and its n values are theirs, pitch and azimuth.
+        pitch: pitch (rad) that the hand is held at, positive with the palm above; None where it is free.
         lower: limits (n,) of its values, -inf for a continuous joint.
         upper: limits (n,), inf for a continuous joint.
         H: unit axes (., 3) in the base frame at zero, of the joints after the torso, which is at home.
@@ -132,7 +134,7 @@ class Arm:
         names = [j.name for j in joints]
         if len(joints) not in (5, 6, 7):
             raise UrdfError(model.path, f"arm {name}", names, _joints_expected(len(joints)))
-        self.pitched = len(joints) == 5
+        self.pitched, self.pitch, self._way = len(joints) == 5, None, 1.0
         if self.pitched and (torso or robot.support is not None):
             expected = f"6 or 7 revolute joints on a robot with a {'torso' if torso else 'support'}"
             raise UrdfError(model.path, f"arm {name}", names, expected)
@@ -203,16 +205,54 @@ class Arm:
             row: height index.
             roll: index into `ROLLS`.
         """
+        return self.grasping_at(manifold.profile, float(manifold.h[row]), roll, 0.5 * manifold.dtheta)
+
+    def grasping_at(self, profile: Profile, h: float, roll: int, azimuth: float) -> Arm:
+        """Return the arm for the grasps at a height and roll: itself unless it is pitched.
+
+        Args:
+            profile: the object.
+            h: the height (m).
+            roll: index into `ROLLS`.
+            azimuth: how far (rad) to either side of the grasp it may hold.
+        """
         if not self.pitched:
             return self
-        h = float(manifold.h[row])
-        radius = float(manifold.profile.radius(h))
-        low, high = pitch_range(self.hand, manifold.profile, h)
-        return self.pitching(
-            (float(self.hand.shift_at(radius)), self.hand.standoff(radius)),
-            (low, high) if roll == 0 else (-high, -low),
-            0.5 * manifold.dtheta,
-        )
+        radius = float(profile.radius(h))
+        low, high = pitch_range(self.hand, profile, h)
+        axis = (float(self.hand.shift_at(radius)), self.hand.standoff(radius))
+        if self.pitch is not None:
+            low, high = max(low, self.pitch - SAME_PITCH), min(high, self.pitch + SAME_PITCH)
+        other = self.pitching(axis, (low, high) if roll == 0 else (-high, -low), azimuth)
+        other._way = _way(roll)
+        return other
+
+    def at_pitch(self, pitch: float) -> Arm:
+        """Return a pitched arm whose hand is held at a pitch (rad), positive with the palm above."""
+        assert self.pitched
+        other = copy(self)
+        other.pitch = pitch
+        return other
+
+    @property
+    def pitch_value(self) -> float | None:
+        """What stands for `pitch` among the values of a configuration (rad), for the roll of `grasping`."""
+        return None if self.pitch is None else self._way * self.pitch
+
+    def pitch_and_azimuth(self, q: Array, roll: int) -> tuple[float, float]:
+        """Return how a pitched arm holds at values (n,): zeros for other arms.
+
+        Args:
+            q: its values.
+            roll: index into `ROLLS`.
+
+        Returns:
+            The pitch (rad), positive with the palm above, and by how much (rad) the angle about the object's
+            axis is larger than that of the grasp frame.
+        """
+        if not self.pitched:
+            return 0.0, 0.0
+        return _way(roll) * float(q[PITCH]), -_way(roll) * float(q[AZIMUTH])
 
     def pitching(self, axis: tuple[float, float], pitch: tuple[float, float], azimuth: float) -> Arm:
         """Return a pitched arm with other axes and limits of pitch and azimuth.
@@ -317,18 +357,27 @@ class Arm:
             raise InputError(model.path, f"hand {self.hand.name}", list(self.hand.links), "links with bodies")
         return hulls
 
-    def handprint(self, manifold: Manifold, row: int, roll: int) -> Handprint:
+    def handprint(
+        self, manifold: Manifold, row: int, roll: int, pitch: float = 0.0, theta: float = 0.0
+    ) -> Handprint:
         """Return the handprint of a grasp at column 0, with the opening for the radius at that row.
 
         Args:
             manifold: the grid.
             row: height index of the grasp.
             roll: index into `ROLLS`.
+            pitch: pitch (rad) of the hand; see `Hand.tool_pose`.
+            theta: by how much (rad) the angle about the axis is larger than that of the middle of the column.
         """
         radius = float(manifold.profile.radius(manifold.h[row]))
         hulls = self.hand_hulls(self.hand.opening(radius))
-        T_object_tool = self.hand.tool_pose(np.eye(4), manifold.h[row], 0.0, ROLLS[roll], radius)
+        T_object_tool = self.hand.tool_pose(np.eye(4), manifold.h[row], theta, ROLLS[roll], radius, pitch)
         return handprint(hulls, manifold, T_object_tool)
+
+
+def _way(roll: int) -> float:
+    """Return 1 where a turn about the tool's y raises the palm, -1 where it lowers it, by index of roll."""
+    return 1.0 if roll == 0 else -1.0
 
 
 def _joints_expected(count: int) -> str:

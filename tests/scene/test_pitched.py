@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from symgrasp.errors import SceneError, UrdfError
-from symgrasp.planners.planning import plan_handover, plan_sequential
 from symgrasp.scene.scene import Scene
 from tests.engine.random_scenes import random_pitched_scene
 
@@ -40,14 +39,6 @@ def test_no_support(content):
     standing = {**robot, "home": home, "support": [[1, 1], [-1, 1], [-1, -1], [1, -1]]}
     with pytest.raises(UrdfError, match="6 or 7 revolute joints on a robot with a support"):
         Scene.from_content({**content, "robots": [standing]})
-
-
-def test_no_plans(content):
-    """The pitch of the hand would have to be the same in all tasks."""
-    scene = Scene.from_content(content)
-    for planner in (plan_sequential, plan_handover):
-        with pytest.raises(SceneError, match="the pitch of an arm of five differs"):
-            planner(scene)
 
 
 def test_a_scara_is_told_what_it_lacks(content):
