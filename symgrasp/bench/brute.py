@@ -53,6 +53,11 @@ class BruteForce:
             request.security_margin = 0.0
         self._joints = [j for j in robot.model.joints if j.source >= 0]
 
+    def keep(self, distance: float) -> None:
+        """Count what is closer than a distance (m) as touching."""
+        for request in self._geometry_data.collisionRequests:
+            request.security_margin = distance
+
     @property
     def pairs(self) -> int:
         """Number of pairs of shapes that each configuration is checked for."""

@@ -146,7 +146,7 @@ def _slow_methods(world: BulletWorld, scene: Scene) -> Iterator[tuple[str, Decid
     """Yield (name, function) of the slow methods to decide a cell of the first task."""
     task = scene.task()
     arm = scene.arm(task.arms[0])
-    ik = solver_for(arm, scene.settings.redundancy)
+    ik = solver_for(arm, scene.settings.samples)
     checker = CandidateChecker(world, arm, ik, scene.settings.approach)
     yield "reference", lambda T, opening: furthest(checker.candidates(T, opening))
     if has_coal() and scene.settings.approach == scene.settings.margin == 0:

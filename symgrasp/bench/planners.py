@@ -120,9 +120,7 @@ def _sample_grasps(
     The tasks are taken as posed, without turning the object about its axis.
     """
     arm = scene.arm()
-    checker = CandidateChecker(
-        world, arm, solver_for(arm, scene.settings.redundancy), scene.settings.approach
-    )
+    checker = CandidateChecker(world, arm, solver_for(arm, scene.settings.samples), scene.settings.approach)
     rng = np.random.default_rng(seed)
     world.checks = 0
     T_base_world = inverse(arm.robot.T_world_base)

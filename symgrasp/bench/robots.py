@@ -172,7 +172,7 @@ def _measured(name: str, content: dict[str, Any], poses: int) -> RobotRow:
     """Return what is measured of a scene with one arm."""
     scene = Scene.from_content(content)
     arm = scene.arm()
-    ik = solver_for(arm, scene.settings.redundancy)
+    ik = solver_for(arm, scene.settings.samples)
     assert isinstance(ik, ArmIK | PitchedIK)  # a scene to start from has no torso that moves
     with open_world(scene) as world:
         maker = MapMaker(world)
@@ -222,7 +222,7 @@ def check(scene: Scene, maps: Sequence[FeasibilityMap], reasons: Sequence[Reason
         reasons: of the cells.
     """
     arm, rng = scene.arm(), np.random.default_rng(0)
-    samples = scene.settings.redundancy
+    samples = scene.settings.samples
     solvers = GridSolvers(arm, scene.manifold, lambda own: solver_for(own, samples))
     cells = rng.permutation(_cells(maps, reasons))[:CHECKED]
     found = []

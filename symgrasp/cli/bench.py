@@ -16,17 +16,25 @@ POSES = 20_000
 """Random configurations of an arm that ``bench ik`` and ``bench robots`` look for, unless told otherwise."""
 
 
+RANDOM_MAPS = 100
+"""Maps of ``bench guarantee`` with objects at random places, unless told otherwise."""
+
+
 def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
     text = "Measure maps and planners against what one would do otherwise, or the robots that packages ship."
     command = add_command(commands, "bench", run, text)
     text = (
         "measure the robots that packages ship instead: their inverse kinematics, or also a map of each, "
-        "which an independent search then tries to refute"
+        "which an independent search then tries to refute; or what maps miss"
     )
-    command.add_argument("what", metavar="ik|robots", nargs="?", choices=("ik", "robots"), help=text)
+    command.add_argument(
+        "what", metavar="ik|robots|guarantee", nargs="?", choices=("ik", "robots", "guarantee"), help=text
+    )
     text = "random configurations that `bench ik` and `bench robots` look for (default: %(default)s)"
     command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
+    text = "maps of `bench guarantee` with objects at random places (default: %(default)s)"
+    command.add_argument("--random", metavar="N", type=whole(0), default=RANDOM_MAPS, help=text)
     add_out(command, "write the figures as JSON")
     text = "a run that `symgrasp bench --out` kept: say what became slower since, with exit status 1"
     command.add_argument("--compare", metavar="FILE", type=Path, help=text)
@@ -37,9 +45,9 @@ def run(args: argparse.Namespace) -> int:
     check_out(args.out)
     if args.what:
         if args.compare:
-            expected = "no ik or robots: only times of maps and planners are compared"
+            expected = "only times of maps and planners: no ik, robots or guarantee"
             raise InputError("command line", "--compare", args.what, expected)
-        _write(args.out, _robots(args))
+        _write(args.out, _guarantee(args) if args.what == "guarantee" else _robots(args))
         return 0
     from symgrasp import bench
 
@@ -58,6 +66,24 @@ def run(args: argparse.Namespace) -> int:
 def _write(out: Path | None, content: dict[str, Any]) -> None:
     if out:
         write_out(out, (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode())
+
+
+def _guarantee(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure what maps miss."""
+    from symgrasp.bench import guarantee
+    from symgrasp.bench.figures import with_machine
+
+    rows = []
+    for row in guarantee.run(args.random):
+        say(row.line())
+        rows.append(row)
+    ratios = sorted(row.ratio for row in rows)
+    say(
+        f"{sum(row.missed for row in rows)} of {sum(row.feasible for row in rows)} feasible cells missed, "
+        f"{sum(row.refuted for row in rows)} of {sum(row.tried for row in rows)} infeasible ones refuted; "
+        f"median time × {ratios[len(ratios) // 2]:.2f}"
+    )
+    return with_machine("maps", rows)
 
 
 def _robots(args: argparse.Namespace) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from symgrasp.cli.shared import (
     chosen,
     progress_of,
     say,
+    whole,
     write_out,
 )
 from symgrasp.errors import InputError, one_of
@@ -34,6 +35,8 @@ def add_parser(commands: Commands) -> None:
     command = add_command(commands, "map", run, text)
     add_scene(command)
     add_task_and_arm(command)
+    text = "samples of what the arm leaves free, or auto: all of it is searched (default: the scene's)"
+    command.add_argument("--redundancy", metavar="N|auto", type=_redundancy, help=text)
     add_out(command, "write the map: .npz, .png, .svg or .json")
 
 
@@ -44,6 +47,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("command line", "--out", str(args.out), "an ending: " + one_of(ENDINGS))
 
     scene, task, arm = chosen(args)
+    if args.redundancy is not None:
+        scene = scene.with_settings(redundancy=args.redundancy)
 
     from symgrasp.feasibility.create import create_map
     from symgrasp.reason import Reason
@@ -54,11 +59,22 @@ def run(args: argparse.Namespace) -> int:
     say(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
     for reason, count in the_map.counts().items():
         say(f"  {reason.label:20} {count:6}  {100 * count / cells:5.1f} %")
+    if the_map.resolution:
+        proven = the_map.proven.sum() / max(1, (~the_map.feasible).sum())
+        say(
+            f"  {100 * proven:.1f} % of the infeasible cells are proven to be, the others to "
+            f"{the_map.resolution:.0e} rad of the redundancy"
+        )
     if Reason.NOT_FOUND in the_map.counts():
         say("  (not found: by a search for configurations, which is no proof that there is none)")
     if args.out:
         write_out(args.out, _content(the_map, args.out.suffix))
     return 0
+
+
+def _redundancy(text: str) -> int | str:
+    """Return a number of samples, or auto."""
+    return text if text == "auto" else whole(1)(text)
 
 
 def _content(the_map: FeasibilityMap, ending: str) -> bytes:

@@ -91,6 +91,12 @@ def search(
         joints: number n of joints.
     """
     m = len(inputs.T_base_tool)
+    runs, steps = len(inputs.row), 1 + len(inputs.retreat)
+    rows = RowChecks(
+        gap=np.empty((runs, steps)),
+        hit=np.full((runs, steps, 2), -1, dtype=np.int64),
+        depth=np.full((runs, steps), np.nan),
+    )
     result = SearchResult(
         status=np.zeros(m, dtype=np.uint8),
         pair=np.full((m, 2), -1, dtype=np.int32),
@@ -101,12 +107,7 @@ def search(
         undecided_count=np.zeros(m, dtype=np.int32),
         undecided_q=np.empty((m, UNDECIDED_KEPT, joints)),
         undecided_solution=np.empty((m, UNDECIDED_KEPT, 2), dtype=np.int16),
-    )
-    runs, steps = len(inputs.row), 1 + len(inputs.retreat)
-    rows = RowChecks(
-        gap=np.empty((runs, steps)),
-        hit=np.full((runs, steps, 2), -1, dtype=np.int64),
-        depth=np.full((runs, steps), np.nan),
+        rows=rows,
     )
     idle: SimpleQueue[tuple[Scratch, BranchScratch]] = SimpleQueue()
     for scratch in scratches:

@@ -99,6 +99,7 @@ class SearchResult(NamedTuple):
         undecided_count: (m,) number of undecided candidates.
         undecided_q: (m, UNDECIDED_KEPT, n) joint values of the first of them.
         undecided_solution: (m, UNDECIDED_KEPT, 2) their redundancy samples and branches.
+        rows: the row checks.
     """
 
     status: np.ndarray
@@ -110,6 +111,7 @@ class SearchResult(NamedTuple):
     undecided_count: np.ndarray
     undecided_q: Array
     undecided_solution: np.ndarray
+    rows: RowChecks
 
 
 class RowChecks(NamedTuple):

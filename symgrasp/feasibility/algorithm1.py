@@ -43,7 +43,7 @@ def create_map_reference(
         UrdfError: the arm has no closed-form inverse kinematics.
     """
     settings = world.scene.settings
-    solvers = GridSolvers(arm, manifold, lambda own: solver_for(own, settings.redundancy))
+    solvers = GridSolvers(arm, manifold, lambda own: solver_for(own, settings.samples))
     radii = manifold.profile.radius(manifold.h)
     draft = MapDraft(arm, manifold, np.array([arm.hand.opening(float(r)) for r in radii]), solvers.at(0, 0))
     T_base_tool = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(manifold, task.T_world_object)
@@ -53,7 +53,7 @@ def create_map_reference(
     for row, h in enumerate(manifold.h):
         misfit = fit(arm.hand, manifold.profile, float(h))
         if misfit is not None:
-            draft.reason[:, row] = misfit
+            draft.reason[:, row], draft.proven[:, row] = misfit, True
         else:
             for roll in range(len(ROLLS)):
                 ik = solvers.at(row, roll)

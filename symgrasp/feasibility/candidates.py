@@ -85,7 +85,7 @@ class CandidateChecker:
         holders: Sequence[str] = (),
     ) -> None:
         self.world, self.arm, self.ik, self._near = world, arm, ik, near
-        self._holders = holders
+        self.holders = tuple(holders)
         self._retreat = retreat_distances(approach).tolist()
         self._turns = retreat_turns(arm.velocity, approach)
 
@@ -140,7 +140,7 @@ class CandidateChecker:
         """Return what the arm's robot bears of the object that a hand at a tool pose (4, 4) holds."""
         T = self.world.object_pose
         height = float((inverse(T) @ self.arm.robot.T_world_base @ T_base_tool)[2, 3])
-        return load_of_hand(self.world.scene, self.arm, self._holders, T, height)
+        return load_of_hand(self.world.scene, self.arm, self.holders, T, height)
 
     def _imbalance(self, q: Array, opening: float, loads: Sequence[Load] = ()) -> float:
         """Return how far (m) the robot's centre of mass is outside of its support; 0 where it stands."""

@@ -83,7 +83,8 @@ class MapMaker:
         maps = []
         for t in range(len(the_arm.robot.torso)):
             tell = part_of(progress, t, len(the_arm.robot.torso))
-            maps.append(at_torso(self._map(the_arm.at(t), t, the_task, grid, tell), the_arm, t))
+            own = self._map(the_arm.at(t), t, the_task, grid, tell)
+            maps.append(at_torso(own, the_arm, t, self._samples(the_arm)))
         return maps
 
     def maps_at_pitches(
@@ -143,8 +144,19 @@ class MapMaker:
         ik = self._solvers.get(the_arm.name)
         if ik is None or the_arm.pitched:
             own = the_arm.grasping(grid, where.row, where.roll)
-            self._solvers[the_arm.name] = ik = solver_for(own, self.scene.settings.redundancy)
+            self._solvers[the_arm.name] = ik = solver_for(own, self.scene.settings.samples)
+        if self.scene.settings.redundancy == "auto":
+            witness = self.map(the_arm.name, the_task, manifold=grid).witness(where)
+            if witness is not None and not the_arm.pitched:
+                ik = solver_for(the_arm, self.scene.settings.samples, more=[witness.phi])
         return explain_cell(self.world, ik, the_task, grid, where, progress)
+
+    def _samples(self, arm: Arm) -> int:
+        """Return the number of redundancy samples of an arm alone."""
+        alone = arm.at(0)
+        return {5: 1 + self.scene.settings.samples, 6: 1}.get(
+            len(alone.joint_names), self.scene.settings.samples
+        )
 
     def _chosen(self, arm: str | None, task: Task | str | None) -> tuple[Arm, Task]:
         """Return an arm and a task: the scene's first task, and the task's first arm, where none is named."""

@@ -17,7 +17,10 @@ from symgrasp.engine.boxes import boxes_of
 from symgrasp.engine.broad_phase import mark_near
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
+from symgrasp.engine.cover import FINEST, cover
+from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
+from symgrasp.engine.inner_pieces import inner_pieces
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
 from symgrasp.engine.pieces import pose_rows
 from symgrasp.engine.threads import core_count
@@ -29,7 +32,8 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.search_recording import FixedBodies, PieceBodies, record_search
 from symgrasp.feasibility.torso_maps import merged
-from symgrasp.ik import GridSolvers, solver_for
+from symgrasp.ik import CompiledIK, GridSolvers, Solver, solver_for
+from symgrasp.ik.at_phi import Locked, locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
@@ -47,6 +51,9 @@ PARTS = 4
 
 WORTH_A_PART = 256
 """Candidates, at one branch, that take longer than a thread takes to start."""
+
+COVER_PARTS = 16
+"""Equal parts of the range of the redundancy with which covering it begins."""
 
 TELL = 0.05
 """Time (s) after which progress is told, and may cancel: rows are searched in parts of about that long."""
@@ -88,6 +95,7 @@ class ExactEngine:
         self._most = CLEARANCE_LIMIT
         if not arm.pitched:  # whose hand has other poses in every row
             self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, self._most)
+        self._inner, self._known_locks = inner_pieces(geometry.pieces), {}
         self._balance, self._holders = self._geometry.balance, (arm.name,)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
@@ -102,7 +110,7 @@ class ExactEngine:
 
     def _new_solvers(self, grid: Manifold, pitch: float | None = None) -> GridSolvers:
         arm = self.arm if pitch is None else self.arm.at_pitch(pitch)
-        return GridSolvers(arm, grid, lambda own: solver_for(own, self._settings.redundancy))
+        return GridSolvers(arm, grid, lambda own: solver_for(own, self._settings.samples))
 
     def map(
         self,
@@ -143,7 +151,7 @@ class ExactEngine:
             draft = MapDraft(self.arm, grid, self._opening, self._solvers.at(0, 0))
             for row, misfit in enumerate(self._misfit):
                 if misfit is not None:
-                    draft.reason[:, row] = misfit
+                    draft.reason[:, row], draft.proven[:, row] = misfit, True
             self._search_rows(draft, part, T_base_tool, part_of(progress, part, parts))
             drafts.append(draft.finish(self.world.scene.name, task))
         self.world.set_arms(())
@@ -267,10 +275,87 @@ class ExactEngine:
         cells = (rolls[roll], rows[row], column)
         found.solution[:, 0] = batch.samples[found.solution[:, 0]]  # of cells without one it is not used
         record_search(draft, bodies, found, cells, fixed)
+        covered = self._cover(draft, found, inputs, batch, cells)
         for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.undecided_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             T = inputs.T_base_tool[i]
-            self._decide(draft, cell, T, batch, self._undecided(found, int(i), T, batch))
+            self._decide(draft, cell, T, batch.ik, self._undecided(found, int(i), T, batch))
+            yield
+        if covered:
+            yield from self._decide_covered(draft, *covered, inputs, batch, cells)
+
+    def _cover(
+        self,
+        draft: MapDraft,
+        found: search.SearchResult,
+        inputs: search.SearchInput,
+        batch: Batch,
+        cells: tuple[np.ndarray, ...],
+    ) -> tuple[np.ndarray, CoverResult] | None:
+        """Search all of the redundancy for the cells at whose samples nothing is free, where that is asked
+        for.
+
+        Returns:
+            What was found for which of the cells, or None where samples are all there is.
+        """
+        locked = self._locked(batch.compiled) if self._settings.redundancy == "auto" else None
+        if locked is None or inputs.always_collides:
+            return None
+        which = np.flatnonzero(found.status != search.FEASIBLE)
+        covered = cover(
+            batch.compiled.chain,
+            batch.moving,
+            self._geometry.pieces,
+            self._geometry.tree,
+            self._scratch,
+            inputs,
+            self._balance,
+            found.rows,
+            CoverInput(which, locked, self._inner, COVER_PARTS),
+            self.arm.dof,
+        )
+        free = which[covered.found]
+        found.status[free] = search.FEASIBLE
+        draft.record_feasible(
+            tuple(part[free] for part in cells),
+            covered.q[covered.found],
+            draft.add_phi(covered.phi[covered.found]),
+            covered.branch[covered.found],
+            covered.clearance[covered.found],
+        )
+        proven = which[covered.proven]
+        draft.proven[tuple(part[proven] for part in cells)] = True
+        draft.resolution = max(draft.resolution, FINEST, float(covered.left.max(initial=0.0)))
+        return which, covered
+
+    def _locked(self, ik: CompiledIK) -> Locked | None:
+        """Return what computes an arm's geometry at any redundancy, kept for each solver."""
+        key = id(ik)
+        if key not in self._known_locks:
+            self._known_locks[key] = locked_joint(ik)
+        return self._known_locks[key]
+
+    def _decide_covered(
+        self,
+        draft: MapDraft,
+        which: np.ndarray,
+        covered: CoverResult,
+        inputs: search.SearchInput,
+        batch: Batch,
+        cells: tuple[np.ndarray, ...],
+    ) -> Iterator[None]:
+        """Let PyBullet check what the search of all of the redundancy left open; pause after every cell."""
+        for k in np.flatnonzero(~covered.found & (covered.undecided_count > 0)):
+            cell = tuple(int(part[which[k]]) for part in cells)
+            if draft.reason[cell] == Reason.FEASIBLE:
+                continue
+            count, T = min(int(covered.undecided_count[k]), OPEN_KEPT), inputs.T_base_tool[which[k]]
+            phi, branch = covered.undecided_phi[k, :count], covered.undecided_branch[k, :count]
+            ik = batch.compiled.at(phi)
+            s = ik.solve(T)
+            these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
+            listed = [(s.q[j], int(s.sample[j]), int(s.branch[j])) for j in these]
+            self._decide(draft, cell, T, ik, listed, phi)
             yield
 
     def _undecided(
@@ -290,18 +375,28 @@ class ExactEngine:
         draft: MapDraft,
         cell: tuple[int, ...],
         T_base_tool: Array,
-        batch: Batch,
+        ik: Solver,
         listed: list[tuple[Array, int, int]],
+        phi: Array | None = None,
     ) -> None:
-        """Let PyBullet check the candidates of an open cell, against the bodies near enough to collide."""
+        """Let PyBullet check the candidates of an open cell, against the bodies near enough to collide.
+
+        Args:
+            draft: the map.
+            cell: the cell.
+            T_base_tool: its tool pose (4, 4).
+            ik: the solver of the candidates.
+            listed: joint values, sample of that solver, and branch of each.
+            phi: the samples of that solver (rad), where it is not the map's.
+        """
         near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
-        checker = CandidateChecker(
-            self.world, batch.ik.arm, batch.ik, self._settings.approach, near, self._holders
-        )
+        checker = CandidateChecker(self.world, ik.arm, ik, self._settings.approach, near, self._holders)
         before: Collision | None = None
         for q, sample, branch in listed:
             reason, collision, *_ = checker.check(T_base_tool, q, sample, float(self._opening[cell[1]]))
             if reason == Reason.FEASIBLE:
+                if phi is not None:
+                    sample = int(draft.add_phi(phi[sample : sample + 1])[0])
                 draft.record_feasible(cell, q, sample, branch)
                 return
             if reason > draft.reason[cell]:

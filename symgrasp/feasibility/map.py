@@ -66,6 +66,11 @@ class FeasibilityMap:
         pair: (R, H, A, 2) int16 into ``bodies``: what hits what, for a cell whose reason is a
             collision, of the candidate that came closest to being free; -1 elsewhere.
         depth: (R, H, A) how much closer (m) than allowed that pair is, NaN elsewhere.
+        proven: (R, H, A) bool, whether it is proven that no redundancy value makes the cell feasible: the
+            hand does not fit or collides, or the pose is further away than the arm reaches. What else is
+            infeasible is so at all values that were tried, see `rests_on`.
+        resolution: width (rad) of the parts of the redundancy's range below which nothing is told apart,
+            where all of it was searched; 0 where samples were.
         shown_in: the scene, for `show`; it is not saved, so a map from a file has None.
         ease: (R, H, A) how easily the arm stands at each witness, see `symgrasp.robot.posture.ease`, where
             planners have asked for it; it is not saved.
@@ -89,6 +94,8 @@ class FeasibilityMap:
     bodies: tuple[str, ...]
     pair: np.ndarray
     depth: Array
+    proven: np.ndarray
+    resolution: float = 0.0
     shown_in: Scene | None = None
     ease: Array | None = None
     pitches: tuple[float, ...] = ()
@@ -138,6 +145,17 @@ class FeasibilityMap:
         depth = 1e3 * self.depth[cell]
         return f"{text}: {self.bodies[first]} and {self.bodies[second]}, {depth:.1f} mm too close"
 
+    def rests_on(self, cell: Cell | tuple[int, int, int]) -> str:
+        """Say in words what it rests on that a cell is feasible or infeasible."""
+        cell = Cell(*cell)
+        if self.feasible[cell]:
+            return "its witness"
+        if self.proven[cell]:
+            return "a proof"
+        if self.resolution:
+            return f"a search of the redundancy to {self.resolution:.0e} rad"
+        return f"{len(self.phi)} redundancy samples"
+
     def counts(self) -> dict[Reason, int]:
         """Return how many cells each reason has, most frequent first."""
         values, counts = np.unique(self.reason, return_counts=True)
@@ -170,7 +188,7 @@ class FeasibilityMap:
         manifold, k = self.manifold.shift(delta)
         rolled = {
             name: np.roll(getattr(self, name), -k, axis=2)
-            for name in ("reason", "q", "sample", "branch", "clearance", "pair", "depth")
+            for name in ("reason", "q", "sample", "branch", "clearance", "pair", "depth", "proven")
         }
         if self.ease is not None:
             rolled["ease"] = np.roll(self.ease, -k, axis=2)
@@ -187,6 +205,7 @@ class FeasibilityMap:
             sample=np.where(drop, -1, self.sample),
             branch=np.where(drop, -1, self.branch),
             clearance=np.where(drop, np.nan, self.clearance),
+            proven=self.proven & ~drop,
         )
 
     def values(self, color_by: ColorBy) -> Array:
@@ -252,6 +271,7 @@ class FeasibilityMap:
             "theta_start": self.manifold.theta_start,
             "bodies": list(self.bodies),
             "reasons": [r.name for r in Reason],
+            "resolution": self.resolution,
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -272,6 +292,7 @@ class FeasibilityMap:
             "clearance": _listed(self.clearance),
             "margin_along": self.margins[..., 0].tolist(),
             "margin_around": self.margins[..., 1].tolist(),
+            "proven": self.proven.tolist(),
         }
 
     def to_npz(self) -> bytes:
@@ -296,7 +317,8 @@ class FeasibilityMap:
         """
         try:
             with np.load(path, allow_pickle=False) as file:
-                data = {name: file[name] for name in (*_ARRAYS, "profile", "meta")}
+                names = (*_ARRAYS, "profile", "meta")
+                data = {name: file[name] for name in names if name != "proven" or name in file.files}
             meta = json.loads(str(data.pop("meta")))
         except FileNotFoundError:
             raise MapError(path, "file", str(path), "an existing map file") from None
@@ -314,7 +336,10 @@ class FeasibilityMap:
                     raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
             reasons = VERSION_2_REASONS if meta["version"] == 2 else meta["reasons"]
             data["reason"] = _renumbered(data["reason"], reasons)
-            names = {key: meta[key] for key in ("scene", "arm", "task")}
+            data.setdefault("proven", np.zeros(shape, dtype=bool))  # files of earlier versions do not say
+            names = {key: meta[key] for key in ("scene", "arm", "task")} | {
+                "resolution": meta.get("resolution", 0.0)
+            }
             return FeasibilityMap(**names, manifold=manifold, bodies=tuple(meta["bodies"]), **data)
         except (KeyError, IndexError, TypeError, ProfileError) as error:
             raise MapError(path, "meta", str(error), "a map written by symgrasp") from error
@@ -343,4 +368,5 @@ def _listed(values: Array) -> list[Any]:
 
 _ARRAYS = (
     "T_world_object", "reason", "q", "sample", "branch", "clearance", "phi", "opening", "pair", "depth",
+    "proven",
 )  # fmt: skip

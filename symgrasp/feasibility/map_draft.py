@@ -38,6 +38,8 @@ class MapDraft:
         opening: (H,) opening of the hand (m) at each height.
         no_candidate: the reason of a cell without a candidate, see `without_candidates`.
         reason: (R, H, A) uint8 of `Reason`.
+        proven: (R, H, A) bool, see `FeasibilityMap`.
+        resolution: see `FeasibilityMap`.
     """
 
     def __init__(self, arm: Arm, manifold: Manifold, opening: Array, ik: Solver) -> None:
@@ -46,6 +48,7 @@ class MapDraft:
         self._arm, self._phi = arm, ik.phi
         self.no_candidate = without_candidates(ik)
         self.reason = np.full(shape, self.no_candidate, dtype=np.uint8)
+        self.proven, self.resolution = np.zeros(shape, dtype=bool), 0.0
         self._q = np.full((*shape, arm.dof), np.nan)
         self._sample = np.full(shape, -1, dtype=np.int32)
         self._branch = np.full(shape, -1, dtype=np.int16)
@@ -57,6 +60,12 @@ class MapDraft:
     def body_index(self, name: str) -> int:
         """Return the index of a body in the map's list of names; a new name is added."""
         return self._bodies.setdefault(name, len(self._bodies))
+
+    def add_phi(self, phi: Array) -> np.ndarray:
+        """Add values (k,) of the redundancy (rad) to the samples; return what their indices (k,) are."""
+        first = len(self._phi)
+        self._phi = np.append(self._phi, phi)
+        return np.arange(first, len(self._phi))
 
     def record_feasible(
         self,
@@ -116,4 +125,6 @@ class MapDraft:
             bodies=tuple(self._bodies),
             pair=self._pair,
             depth=self._depth,
+            proven=self.proven & (self.reason != Reason.FEASIBLE),
+            resolution=self.resolution,
         )

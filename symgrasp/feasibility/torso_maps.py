@@ -13,18 +13,22 @@ from symgrasp.robot.robot import Arm
 __all__ = ["at_torso", "merged"]
 
 
-def at_torso(m: FeasibilityMap, arm: Arm, sample: int) -> FeasibilityMap:
+def at_torso(m: FeasibilityMap, arm: Arm, sample: int, count: int) -> FeasibilityMap:
     """Return the map of the arm alone at a sample of the torso as one of the whole arm.
 
     Args:
         m: the map of ``arm.at(sample)``.
         arm: the arm.
         sample: of its robot's torso.
+        count: number K of redundancy samples of the arm alone. Values that its map has besides come after
+            those of all torso samples.
     """
     assert arm.robot.torso is not None
-    samples = np.where(m.feasible, m.sample + sample * len(m.phi), -1)
+    torso = len(arm.robot.torso)
+    own = m.sample + np.where(m.sample < count, sample, torso - 1) * count
+    samples = np.where(m.feasible, own, -1)
     q = np.where(m.feasible[..., None], arm.with_torso(sample, m.q), np.nan)
-    return replace(m, q=q, sample=samples, phi=np.tile(m.phi, len(arm.robot.torso)))
+    return replace(m, q=q, sample=samples, phi=np.append(np.tile(m.phi[:count], torso), m.phi[count:]))
 
 
 def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:
@@ -36,6 +40,7 @@ def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:
     Args:
         maps: maps of one arm and task on one grid.
     """
+    maps = _with_one_phi(maps)
     bodies = tuple(dict.fromkeys(name for m in maps for name in m.bodies))
     pairs = [_renamed(m, bodies) for m in maps]
     depth = np.array([np.nan_to_num(m.depth, nan=np.inf) for m in maps])
@@ -51,7 +56,21 @@ def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:
 
     names = ("reason", "q", "sample", "branch", "clearance", "depth")
     arrays = {name: pick([getattr(m, name) for m in maps]) for name in names}
-    return replace(maps[0], **arrays, pair=pick(pairs), bodies=bodies)
+    proven = np.logical_and.reduce([m.proven for m in maps])
+    return replace(maps[0], **arrays, pair=pick(pairs), bodies=bodies, proven=proven)
+
+
+def _with_one_phi(maps: Sequence[FeasibilityMap]) -> list[FeasibilityMap]:
+    """Return the maps with the redundancy values of all: first those that they share, then each one's own."""
+    shared = min(len(m.phi) for m in maps)
+    differ = np.flatnonzero([len({float(m.phi[k]) for m in maps}) > 1 for k in range(shared)])
+    shared = int(differ[0]) if len(differ) else shared
+    phi = np.concatenate([maps[0].phi[:shared], *(m.phi[shared:] for m in maps)])
+    found, before = [], 0
+    for m in maps:
+        found.append(replace(m, sample=np.where(m.sample >= shared, m.sample + before, m.sample), phi=phi))
+        before += len(m.phi) - shared
+    return found
 
 
 def _renamed(m: FeasibilityMap, bodies: Sequence[str]) -> np.ndarray:

@@ -16,7 +16,7 @@ from symgrasp.ik.locking import joint_to_lock
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm
 
-__all__ = ["ArmIK", "Lock", "Solutions", "Tolerance", "centres"]
+__all__ = ["ArmIK", "Lock", "Solutions", "Tolerance", "centres", "one_turn"]
 
 
 @dataclass(frozen=True)
@@ -126,9 +126,15 @@ class ArmIK(ABC):
 
 def centres(lower: float, upper: float, samples: int) -> Array:
     """Return the centres (samples,) of equal parts of a joint's range (rad); of a turn without limits."""
-    if not np.isfinite(upper - lower):
-        lower, upper = -np.pi, np.pi
-    elif upper - lower > 2 * np.pi:  # what is a full turn apart is the same to the other joints
-        middle = 0.5 * (lower + upper)
-        lower, upper = middle - np.pi, middle + np.pi
+    lower, upper = one_turn(lower, upper)
     return lower + (np.arange(samples) + 0.5) * (upper - lower) / samples
+
+
+def one_turn(lower: float, upper: float) -> tuple[float, float]:
+    """Return a joint's range (rad), or a turn of it where it is larger or has no limits."""
+    if not np.isfinite(upper - lower):
+        return -np.pi, np.pi
+    if upper - lower > 2 * np.pi:  # what is a full turn apart is the same to the other joints
+        middle = 0.5 * (lower + upper)
+        return middle - np.pi, middle + np.pi
+    return lower, upper

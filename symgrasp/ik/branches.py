@@ -45,6 +45,9 @@ class Memory(NamedTuple):
         counts: (2,) how many.
         row: (n,) joint values.
         near: (6, n) limits around a configuration, see `Chain`.
+        missing: (B,) why a branch does not exist, where the last closed form was solved outside the limits
+            too: the radicand (at least -9) of its root that is negative, less 10 times the root's number;
+            else 0.
     """
 
     J: Array
@@ -58,6 +61,7 @@ class Memory(NamedTuple):
     counts: np.ndarray
     row: Array
     near: Array
+    missing: Array
 
 
 def new_memory(joints: int) -> Memory:
@@ -74,6 +78,7 @@ def new_memory(joints: int) -> Memory:
         np.empty(2, dtype=np.int64),
         np.empty(joints),
         np.empty((6, joints)),
+        np.zeros(PAIR_BRANCHES),
     )
 
 
@@ -113,6 +118,7 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
     for b in range(exists.shape[0]):
         exists[b] = False
         inside[b] = False
+        memory.missing[b] = 0.0
     if joint[8] == MEETING_PAIR:
         solvable = pair_branches(chain, k, T, inside_only, q, exists, inside, memory)
         some = inside_only
@@ -123,7 +129,7 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
     if joint[8] == THREE_PARALLEL:
         solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, memory.numbers)
     else:
-        solvable = spherical_branches(g, joint, limits, T, inside_only, q, exists, inside)
+        solvable = spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, memory.missing)
     for b in range(exists.shape[0]):
         if exists[b] and joint[9]:
             exists[b] = polish_in(chain.forward, chain.fixed, q[b], T, memory.J, memory.A)

@@ -10,6 +10,7 @@ from symgrasp.ik.vectors import STRICT, column, dot, minus, plus, rotate, row, t
 
 __all__ = [
     "ROOT_TOLERANCE",
+    "miss",
     "misses",
     "nearest_turn",
     "outside",
@@ -104,6 +105,22 @@ def sine(cosine, slack):
     """
     rest = 1.0 - cosine * cosine
     return math.sqrt(max(rest, slack)) if rest >= -(ROOT_TOLERANCE + slack) else -1.0
+
+
+@njit(**STRICT)
+def miss(missing, first, count, root, radicand):
+    """Write down that some branches do not exist, because the radicand of a root of the closed form is
+    negative.
+
+    Args:
+        missing: (B,) see `symgrasp.ik.branches.Memory`.
+        first: the first of them.
+        count: how many.
+        root: number of the root, from 1.
+        radicand: its radicand (dimensionless), negative.
+    """
+    for b in range(first, first + count):
+        missing[b] = max(radicand, -9.0) - 10.0 * root
 
 
 @njit(**STRICT)

@@ -20,7 +20,16 @@ import math
 
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, PHI, SLACK, TRIPLE, WRIST, WRIST_SEEN
-from symgrasp.ik.joints import ROOT_TOLERANCE, nearest_turn, outside, sine, tool_motion, within, write_branch
+from symgrasp.ik.joints import (
+    ROOT_TOLERANCE,
+    miss,
+    nearest_turn,
+    outside,
+    sine,
+    tool_motion,
+    within,
+    write_branch,
+)
 from symgrasp.ik.vectors import (
     STRICT,
     cross,
@@ -35,22 +44,23 @@ from symgrasp.ik.vectors import (
     vec,
 )
 
-__all__ = ["spherical_branches"]
+__all__ = ["reach_cosine", "spherical_branches"]
 
 
 @njit(**STRICT)
-def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside):
-    """Solve one pose (4, 4); see `symgrasp.ik.branches.branches_at` for arguments and result."""
-    R, p = tool_motion(g, joint[7], T)
+def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, missing):
+    """Solve one pose (4, 4); see `symgrasp.ik.branches.branches_at` for arguments and result.
+
+    Missing (B,) is `Memory.missing`.
+    """
+    R, t, c = _reach(g, joint, T)
     a = vec(g, CENTRE_SEEN)
-    t = minus(transposed_times(R, minus(vec(g, CENTRE), p)), vec(g, WRIST))  # G⁻¹ S − W
-    # Subproblem 3: |R4⁻¹ a − b| = |t|. Where possible sines and cosines are computed without their angles:
-    # most branches are dropped at a joint limit before an angle is needed.
-    middle, length, part = vec(g, MIDDLE)
-    sm, cm = g[MIDDLE + 3], g[MIDDLE + 4]
-    c = (-0.5 * dot(t, t) - part) / length
+    # Where possible sines and cosines are computed without their angles: most branches are dropped at a joint
+    # limit before an angle is needed.
+    middle, sm, cm = g[MIDDLE], g[MIDDLE + 3], g[MIDDLE + 4]
     s = sine(c, g[SLACK])
     if s < 0.0:
+        miss(missing, 0, 8, 1, 1.0 - c * c)
         return False
     offset = math.atan2(s, c)
     for i in range(2):
@@ -64,12 +74,26 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside):
         if inside_only and not within(limits, joint[3], q4):
             continue
         u = minus(rotate(vec(g, AXES + 9), -s4, c4, a), vec(g, WRIST_SEEN))  # e4⁻¹ S − W
-        _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside)
+        _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside, missing)
     return True
 
 
 @njit(**STRICT)
-def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside):
+def _reach(g, joint, T):
+    """Subproblem 3, |R4⁻¹ a − b| = |t|: return R_G, t = G⁻¹ S − W, and the cosine that joint 4 needs."""
+    R, p = tool_motion(g, joint[7], T)
+    t = minus(transposed_times(R, minus(vec(g, CENTRE), p)), vec(g, WRIST))
+    return R, t, (-0.5 * dot(t, t) - g[MIDDLE + 2]) / g[MIDDLE + 1]
+
+
+@njit(**STRICT)
+def reach_cosine(g, joint, T):
+    """Return the cosine that joint 4 needs for a pose (4, 4); beyond ±1 it is out of reach."""
+    return _reach(g, joint, T)[2]
+
+
+@njit(**STRICT)
+def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside, missing):
     """Subproblem 2: R5⁻¹ u = R6 t gives q5 and q6 for a value of the middle joint."""
     h4, h5, h6 = vec(g, AXES + 9), vec(g, AXES + 12), vec(g, AXES + 15)
     c = dot(h5, h6)
@@ -80,6 +104,7 @@ def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, insi
     rest = (dot(u, u) - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / across
     slack = g[SLACK] * dot(u, u)
     if rest < -(ROOT_TOLERANCE + slack):
+        miss(missing, 4 * i, 4, 2, rest / dot(u, u))
         return
     gamma = math.sqrt(max(rest, slack))
     normal = cross(h5, h6)
@@ -110,11 +135,14 @@ def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, insi
         # M = R_G R6⁻¹ R5⁻¹ R4⁻¹, applied to h3 and to a vector perpendicular to it
         M3 = times(R, rotate(h6, -s6, c6, rotate(h5, -s5, c5, v3)))
         Mside = times(R, rotate(h6, -s6, c6, rotate(h5, -s5, c5, vside)))
-        _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, 4 * i + 2 * j, inside_only, q, exists, inside)
+        branch = 4 * i + 2 * j
+        _triple(
+            g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside, missing
+        )
 
 
 @njit(**STRICT)
-def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside):
+def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside, missing):
     """Subproblem 4: R1 R2 R3 = M, so h1ᵀ R2 h3 = h1ᵀ M h3, gives q1, q2 and q3; write the branch."""
     h1, h2, h3 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 6)
     middle, length, part = vec(g, TRIPLE)
@@ -122,6 +150,7 @@ def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, 
     c = (dot(h1, M3) - part) / length
     s = sine(c, g[SLACK])
     if s < 0.0:
+        miss(missing, branch, 2, 3, 1.0 - c * c)
         return
     for i in range(2):
         way = s if i == 0 else -s

@@ -79,7 +79,7 @@ class MotionPlanner:
         """Return the grasp of a hold."""
         arm = self.scene.arm(hold.arm)
         if arm.name not in self._solvers:
-            samples = self.scene.settings.redundancy
+            samples = self.scene.settings.samples
             fine = samples * (2 * int(np.ceil((LEAST_SAMPLES / samples - 1) / 2)) + 1)
             self._solvers[arm.name] = solver_for(arm, samples), solver_for(arm, max(samples, fine))
         return Grip.of(hold, arm, *self._solvers[arm.name], self.scene.profile)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.feasibility.candidates import CandidateChecker
-from symgrasp.ik import solver_for
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.ik import redundancy_of, solver_for
+from symgrasp.object.manifold import Manifold
 from symgrasp.plan.check_holds import tool_of
 from symgrasp.plan.plan import Hold, PlanTask
 from symgrasp.plan.report import Report
 from symgrasp.poses import Array, inverse
 from symgrasp.progress import Progress
 from symgrasp.reason import Reason
+from symgrasp.scene.parts import Task
 from symgrasp.world import BulletWorld
 
 __all__ = ["check_margins"]
@@ -45,7 +48,7 @@ def check_margins(
         own = arm
         if arm.pitched:
             own = arm.at_pitch(g.pitch).grasping_at(scene.profile, h, int(g.roll > 1.0), 0.5 * grid.dtheta)
-        ik = solver_for(own, scene.settings.redundancy, torso)
+        ik = solver_for(own, scene.settings.samples, torso)
         return CandidateChecker(world, own, ik, scene.settings.approach, holders=holders)
 
     checker = checker_at(g.h)
@@ -85,6 +88,9 @@ def _check_retreat(hold: Hold, checker: CandidateChecker, T: Array, who: str, re
     world.set_object(T)
     q = np.array([hold.joints[name] for name in arm.joint_names])
     T_base_tool = arm.tool_pose(q)
+    phi = redundancy_of(arm, q)
+    if world.scene.settings.redundancy == "auto" and phi is not None:
+        checker = _checker_at(checker, phi)
     found = checker.ik.solve(T_base_tool)
     if not report.expect(len(found.q), f"{who}: no configuration of the grasp is found"):
         return
@@ -108,4 +114,40 @@ def _feasible(
     tool = inverse(arm.robot.T_world_base) @ tool_of(arm, T, h, theta, roll > 1.0, radius)
     world.set_object(T)
     candidates = checker.candidates(tool, arm.hand.opening(radius))
-    return any(c.reason == Reason.FEASIBLE for c in candidates)
+    if any(c.reason == Reason.FEASIBLE for c in candidates):
+        return True
+    settings = world.scene.settings
+    return settings.redundancy == "auto" and _feasible_between(checker, T, h, theta, roll, tool)
+
+
+def _feasible_between(
+    checker: CandidateChecker, T: Array, h: float, theta: float, roll: float, T_base_tool: Array
+) -> bool:
+    """Whether a grasp is feasible at a value of the redundancy that is no sample.
+
+    A map tells at which, and the checker whether: it checks that configuration as any other.
+    """
+    world, arm = checker.world, checker.arm
+    scene = world.scene
+    row, _ = scene.manifold.cell(h, theta)
+    if abs(float(scene.manifold.h[row]) - h) > 1e-9:
+        return False  # no margin counts such grasps
+    column = Manifold(scene.profile, scene.manifold.heights, 1, theta - np.pi)
+    task = Task("between", checker.holders or (arm.name,), T)
+    witness = MapMaker(world).map(arm.name, task, manifold=column).witness((int(roll > 1.0), row, 0))
+    if witness is None:
+        return False
+    for name in scene.robots:
+        world.park(name)
+    world.set_object(T)
+    exact = _checker_at(checker, witness.phi)
+    sample = int(np.abs(exact.ik.phi - witness.phi).argmin())
+    result = exact.check(T_base_tool, witness.q, sample, witness.opening)
+    return result.reason == Reason.FEASIBLE
+
+
+def _checker_at(checker: CandidateChecker, phi: float) -> CandidateChecker:
+    """Return a checker that also has a value φ (rad) of the redundancy."""
+    settings = checker.world.scene.settings
+    ik = solver_for(checker.arm, settings.samples, more=[phi])
+    return CandidateChecker(checker.world, checker.arm, ik, settings.approach, holders=checker.holders)

@@ -220,7 +220,7 @@ class ConfigurationFinder:
     def _make_choices(self, at: _At) -> _Choices:
         arm = self.arms[at.arm]
         opening = float(self.maps[at.arm].opening[at.cell.row])
-        found = self._checker(at).ik.solve(self._tool(at))
+        found = self._checker(at, self._own_phi(at)).ik.solve(self._tool(at))
         inside = found.inside
         configurations = [ArmConfiguration(arm, q, opening) for q in found.q[inside]]
         values = [arm.robot_values(q, opening) for q in found.q[inside]]
@@ -243,7 +243,7 @@ class ConfigurationFinder:
                 self.world.park(robot)
             self.world.set_object(self.maps[at.arm].T_world_object)
             configuration, sample = own.configurations[choice], own.samples[choice]
-            checker = self._checker(at)
+            checker = self._checker(at, self._own_phi(at))
             result = checker.check(self._tool(at), configuration.q, sample, configuration.opening)
             if result.reason != Reason.FEASIBLE:
                 own.left &= ~(1 << choice)
@@ -260,22 +260,41 @@ class ConfigurationFinder:
         tool = arm.hand.tool_pose(m.T_world_object, h, theta, ROLLS[roll], radius)
         return inverse(arm.robot.T_world_base) @ tool
 
-    def _checker(self, at: _At) -> CandidateChecker:
-        """Return the checker of an arm, of a pitched one for the row, roll and pitch of its cell."""
+    def _checker(self, at: _At, more: tuple[float, ...] = ()) -> CandidateChecker:
+        """Return the checker of an arm, of a pitched one for the row, roll and pitch of its cell.
+
+        Args:
+            at: the arm and its cell.
+            more: values (rad) of the redundancy besides the samples.
+        """
         m, cell = self.maps[at.arm], at.cell
         pitched = self.arms[at.arm].pitched
         grasp = (cell.row, *m.roll_and_pitch(cell.roll)) if pitched else None
-        return self._known_checker(at.arm, at.torso, grasp)
+        return self._known_checker(at.arm, at.torso, grasp, more)
+
+    def _own_phi(self, at: _At) -> tuple[float, ...]:
+        """Return the redundancy (rad) of the witness of a cell, where it is none of the samples."""
+        if self.world.scene.settings.redundancy != "auto":
+            return ()
+        m = self.maps[at.arm] if at.torso is None else self._by_torso[self.arms[at.arm].name][at.torso]
+        witness = m.witness(at.cell)
+        if witness is None or witness.phi in self._checker(at).ik.phi:
+            return ()
+        return (witness.phi,)
 
     def _make_checker(
-        self, k: int, torso: int | None, grasp: tuple[int, int, float] | None
+        self,
+        k: int,
+        torso: int | None,
+        grasp: tuple[int, int, float] | None,
+        more: tuple[float, ...],
     ) -> CandidateChecker:
         settings = self.world.scene.settings
         arm = self.arms[k]
         if grasp:
             row, roll, pitch = grasp
             arm = arm.at_pitch(pitch).grasping(self.maps[k].manifold, row, roll)
-        ik = solver_for(arm, settings.redundancy, None if torso is None else [torso])
+        ik = solver_for(arm, settings.samples, None if torso is None else [torso], more)
         holders = [own.name for own in self.arms]
         return CandidateChecker(self.world, arm, ik, settings.approach, holders=holders)
 

@@ -55,7 +55,13 @@ Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
-Samples = Annotated[int, Field(ge=1, le=1024)]
+AUTO_SAMPLES = 32
+"""Redundancy samples with which the search of all of it begins."""
+
+MOST_SAMPLES = 2048
+"""Most redundancy samples of a map."""
+
+Samples = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
 Vector = tuple[Number, Number, Number]
 
 
@@ -317,15 +323,21 @@ class MapSettings(_Strict):
 
     heights: Annotated[int, Field(ge=1, le=1024)] = 48
     angles: Annotated[int, Field(ge=1, le=1024)] = 96
-    redundancy: Samples = 32
+    redundancy: Samples | Literal["auto"] = 32
+    """number of samples of the redundancy, or auto: all of it is searched, none is stepped over"""
     approach: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
     """length (m) of the straight radial retreat that must be free as well"""
     margin: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
     """distance (m) to keep from obstacles and other robots"""
 
+    @property
+    def samples(self) -> int:
+        """Number of redundancy samples: with auto, those with which the search begins."""
+        return AUTO_SAMPLES if self.redundancy == "auto" else self.redundancy
+
     @model_validator(mode="after")
     def _not_too_many(self) -> MapSettings:
-        candidates = self.heights * self.angles * len(ROLLS) * self.redundancy
+        candidates = self.heights * self.angles * len(ROLLS) * self.samples
         if candidates > MOST_CANDIDATES:
             raise ValueError(
                 f"heights × angles × {len(ROLLS)} rolls × redundancy of at most {MOST_CANDIDATES:,}, "
@@ -364,7 +376,7 @@ class SceneFile(_Strict):
     @model_validator(mode="after")
     def _not_too_many(self) -> SceneFile:
         m, torso = self.map, max(math.prod((r.torso or {}).values()) for r in self.robots)
-        candidates = m.heights * m.angles * len(ROLLS) * m.redundancy * torso
+        candidates = m.heights * m.angles * len(ROLLS) * m.samples * torso
         if candidates > MOST_CANDIDATES:
             raise ValueError(
                 f"heights × angles × {len(ROLLS)} rolls × redundancy × torso samples of at most "

@@ -284,7 +284,7 @@ class Scene:
                     entry["hand"] = hand
         return Scene.from_content(content, self.source)
 
-    def with_settings(self, **changes: float) -> Scene:
+    def with_settings(self, **changes: float | str) -> Scene:
         """Return the scene with other map settings; robots and object are shared.
 
         Raises:

@@ -58,6 +58,7 @@ def map_of(feasible: np.ndarray, name: str = "task", grid: Manifold = GRID) -> F
         phi=np.zeros(1),
         opening=np.zeros(grid.heights),
         bodies=(),
+        proven=np.zeros(shape, dtype=bool),
         pair=np.full((*shape, 2), -1),
         depth=np.full(shape, np.nan),
     )

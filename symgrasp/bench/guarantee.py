@@ -1,0 +1,184 @@
+"""How many feasible cells maps miss: with redundancy samples, and where all of the redundancy is searched.
+
+The truth is a map at 2,048 uniform samples. Pinocchio and Coal tell of some of the cells that are called
+infeasible whether one of those samples is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from time import process_time
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from symgrasp.engine.checks import HIT_BAND
+from symgrasp.errors import SceneError
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.ik import solver_for
+from symgrasp.poses import inverse
+from symgrasp.reason import Reason
+from symgrasp.scene.format import AUTO_SAMPLES, MOST_SAMPLES
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+from symgrasp.scene.shipped import missing_extra, shipped_scenes
+from symgrasp.world import open_world
+
+__all__ = ["Guarantee", "run"]
+
+RANDOM_GRID = {"heights": 8, "angles": 16}
+"""Grid of the scenes whose objects are at random places."""
+
+SHIFT, TURN = 0.1, 0.4
+"""Standard deviation of those places (m), and of the turn of the object about each axis (rad), every other
+time."""
+
+REFUTED = 3
+"""Cells of each map that Pinocchio and Coal try to refute."""
+
+
+@dataclass(frozen=True)
+class Guarantee:
+    """What maps of one arm and task miss.
+
+    Attributes:
+        scene: name of the scene.
+        task: name of the task.
+        arm: name of the arm.
+        feasible: number of cells that some of 2,048 samples shows feasible.
+        missed_sampled: number of those that a map at 32 samples calls infeasible.
+        missed: number of those that the map calls infeasible for which all of the redundancy was searched.
+        found: number of cells that it shows feasible, and 2,048 samples do not.
+        infeasible: number of cells that it calls infeasible.
+        proven: number of those that are proven to be.
+        resolution: see `FeasibilityMap`.
+        refuted: number of cells that it calls infeasible, and Pinocchio and Coal find free at a sample.
+        tried: number of cells for which those were asked; 0 where they are not installed.
+        ratio: processor time of the map, divided by that of one at 32 samples.
+    """
+
+    scene: str
+    task: str
+    arm: str
+    feasible: int
+    missed_sampled: int
+    missed: int
+    found: int
+    infeasible: int
+    proven: int
+    resolution: float
+    refuted: int
+    tried: int
+    ratio: float
+
+    def line(self) -> str:
+        """Return the figures as one line of text."""
+        share = 100 * self.proven / max(1, self.infeasible)
+        return (
+            f"{self.scene}, {self.task} with {self.arm}: of {self.feasible} feasible cells "
+            f"{self.missed_sampled} missed by {AUTO_SAMPLES} samples, {self.missed} by auto, which finds "
+            f"{self.found} more; {share:.0f} % of {self.infeasible} proven, others to "
+            f"{self.resolution:.0e} rad; {self.refuted} of {self.tried} refuted; time × {self.ratio:.2f}"
+        )
+
+
+def run(random: int) -> Iterator[Guarantee]:
+    """Measure the shipped scenes at their own grids, then as many with objects at random places.
+
+    Args:
+        random: number of maps with objects at random places.
+    """
+    scenes = [Scene.load(name) for name, path in shipped_scenes().items() if missing_extra(path) is None]
+    arms = [(scene, task, name) for scene in scenes for task, name in _arms(scene)]
+    for scene, task, name in arms:
+        yield _measured(scene, task, name)
+    rng = np.random.default_rng(0)
+    for k in range(random):
+        scene, task, name = arms[k % len(arms)]
+        T = task.T_world_object.copy()
+        T[:3, 3] += rng.normal(0.0, SHIFT, 3)
+        if k % 2:
+            T[:3, :3] = T[:3, :3] @ _turn(rng.normal(0.0, TURN, 3))
+        small = scene.with_settings(**RANDOM_GRID)
+        yield _measured(small, Task(f"random {k}", task.arms, T), name)
+
+
+def _arms(scene: Scene) -> Iterator[tuple[Task, str]]:
+    """Yield every arm of seven joints with the first task that it has."""
+    known: set[str] = set()
+    for task in scene.tasks.values():
+        for name in task.arms:
+            arm = scene.arm(name)
+            alone = arm if arm.robot.torso is None else arm.at(0)
+            if name not in known and not arm.pitched and len(alone.joint_names) == 7:
+                known.add(name)
+                yield task, name
+
+
+def _measured(scene: Scene, task: Task, name: str) -> Guarantee:
+    """Measure the maps of a task with an arm."""
+    sampled, before = _timed(scene.with_settings(redundancy=AUTO_SAMPLES), task, name)
+    searched, after = _timed(scene.with_settings(redundancy="auto"), task, name)
+    truth = _truth(scene, task, name)
+    missed = truth & ~searched.feasible
+    refuted, tried = _refuted(scene, task, name, searched)
+    return Guarantee(
+        scene.name, task.name, name, int(truth.sum()), int((truth & ~sampled.feasible).sum()),
+        int(missed.sum()), int((searched.feasible & ~truth).sum()), int((~searched.feasible).sum()),
+        int(searched.proven.sum()), searched.resolution, refuted, tried, after / before,
+    )  # fmt: skip
+
+
+def _timed(scene: Scene, task: Task, name: str) -> tuple[FeasibilityMap, float]:
+    """Return a map, and the processor time (s) of the second time that it is computed in its world."""
+    with open_world(scene) as world:
+        maker = MapMaker(world)
+        maker.map(name, task)
+        start = process_time()
+        return maker.map(name, task), process_time() - start
+
+
+def _truth(scene: Scene, task: Task, name: str) -> np.ndarray:
+    """Return which cells 2,048 samples show feasible, by as many maps as that many candidates need."""
+    samples = MOST_SAMPLES
+    while True:
+        try:
+            dense = scene.with_settings(redundancy=samples)
+        except SceneError:  # so many candidates are more than a map may have
+            samples //= 2
+            continue
+        with open_world(dense) as world:
+            return MapMaker(world).map(name, task).feasible
+
+
+def _refuted(scene: Scene, task: Task, name: str, m: FeasibilityMap) -> tuple[int, int]:
+    """Return how many infeasible cells Pinocchio and Coal find free at a sample, and how many they tried."""
+    try:
+        from symgrasp.bench.brute import BruteForce
+    except ImportError:
+        return 0, 0
+    arm = scene.arm(name)
+    if arm.robot.torso is not None or arm.robot.support is not None or scene.settings.margin:
+        return 0, 0
+    open_cells = np.argwhere((m.reason > Reason.UNREACHABLE) & ~m.feasible & ~m.proven)
+    rng = np.random.default_rng(0)
+    cells = rng.permutation(open_cells)[:REFUTED]
+    if not len(cells) or scene.settings.approach:
+        return 0, 0
+    tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, task.T_world_object)
+    refuted = 0
+    with open_world(scene) as world:
+        brute = BruteForce(world, arm, solver_for(arm, MOST_SAMPLES), task.T_world_object)
+        brute.keep(HIT_BAND)  # PyBullet, which decides what all but touches, is off by that
+        for index in cells:
+            cell = Cell(*index.tolist())
+            refuted += brute.feasible(tools[cell], float(m.opening[cell.row]))
+    return refuted, len(cells)
+
+
+def _turn(vector: np.ndarray) -> np.ndarray:
+    """Return the rotation (3, 3) about a vector (3,) by its length (rad)."""
+    return Rotation.from_rotvec(vector).as_matrix()

@@ -1,0 +1,116 @@
+"""Input and result of the search that covers the redundancy, and the arrays that it works on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.engine.pieces import PackedPieces
+from symgrasp.ik.at_phi import Locked
+from symgrasp.ik.chain import Chain
+from symgrasp.poses import Array
+
+__all__ = ["OPEN_KEPT", "SLOTS", "CoverInput", "CoverResult", "Nodes", "new_nodes"]
+
+OPEN_KEPT = 512
+"""Largest number of undecided candidates of a cell that are listed."""
+
+SLOTS = 32
+"""Values of the redundancy that are kept at a time: both ends of a part that is halved again and again."""
+
+
+class CoverInput(NamedTuple):
+    """What to cover.
+
+    Attributes:
+        cells: (c,) the cells, as indices into those of the search.
+        locked: the locked joint.
+        inner: bodies inside the pieces, see `inner_pieces`.
+        first: number of equal parts of the range of φ to begin with.
+    """
+
+    cells: np.ndarray
+    locked: Locked
+    inner: tuple[PackedPieces, ...]
+    first: int
+
+
+class CoverResult(NamedTuple):
+    """What was found for each of c cells.
+
+    Attributes:
+        found: (c,) whether a free configuration was found.
+        q: (c, n) its joint values.
+        phi: (c,) its redundancy (rad).
+        branch: (c,) its branch.
+        clearance: (c,) lower bound of its clearance (m).
+        proven: (c,) whether it is proven that there is none.
+        left: (c,) width (rad) of the widest part of the range that was neither excluded nor halved.
+        visited: (c,) number of values of the redundancy at which candidates were checked.
+        undecided_count: (c,) number of undecided candidates.
+        undecided_phi: (c, OPEN_KEPT) redundancy (rad) of the first of them.
+        undecided_branch: (c, OPEN_KEPT) their branches.
+    """
+
+    found: np.ndarray
+    q: Array
+    phi: Array
+    branch: np.ndarray
+    clearance: Array
+    proven: np.ndarray
+    left: Array
+    visited: np.ndarray
+    undecided_count: np.ndarray
+    undecided_phi: Array
+    undecided_branch: np.ndarray
+
+
+class Nodes(NamedTuple):
+    """Candidates at some values of the redundancy, B branches each.
+
+    Attributes:
+        chain: the arm, with a geometry (1, m) that is overwritten.
+        phi: (SLOTS,) the values (rad).
+        q: (SLOTS, B, n) joint values.
+        state: (SLOTS, B) what is the matter with a branch, see `symgrasp.engine.cover`.
+        missing: (SLOTS, B) see `symgrasp.ik.branches.Memory`.
+        pair: (SLOTS, B, 2) the pieces of which the first hits the second.
+        pose: (SLOTS, B, 2, 12) their poses.
+        depth: (SLOTS, B) how deep (m) they collide at least, as far as it is known.
+        level: (SLOTS, B) number of the bodies inside the pieces from which it is known.
+        excluded: (SLOTS, B) which branches are excluded on the part that ends at a slot.
+        stack: (SLOTS,) slots of the ends of parts.
+        used: (SLOTS,) which slots are taken.
+    """
+
+    chain: Chain
+    phi: Array
+    q: Array
+    state: np.ndarray
+    missing: Array
+    pair: np.ndarray
+    pose: Array
+    depth: Array
+    level: np.ndarray
+    excluded: np.ndarray
+    stack: np.ndarray
+    used: np.ndarray
+
+
+def new_nodes(chain: Chain, branches: int, joints: int) -> Nodes:
+    """Return arrays for an arm with that many branches and joints."""
+    return Nodes(
+        chain=chain._replace(geometry=chain.geometry[:1].copy()),
+        phi=np.empty(SLOTS),
+        q=np.empty((SLOTS, branches, joints)),
+        state=np.empty((SLOTS, branches), dtype=np.int8),
+        missing=np.empty((SLOTS, branches)),
+        pair=np.empty((SLOTS, branches, 2), dtype=np.int64),
+        pose=np.empty((SLOTS, branches, 2, 12)),
+        depth=np.empty((SLOTS, branches)),
+        level=np.empty((SLOTS, branches), dtype=np.int64),
+        excluded=np.zeros((SLOTS, branches), dtype=bool),
+        stack=np.empty(SLOTS, dtype=np.int64),
+        used=np.zeros(SLOTS, dtype=bool),
+    )
