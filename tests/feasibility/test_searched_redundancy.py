@@ -1,0 +1,122 @@
+"""Maps for which all of the redundancy is searched, against maps at many samples."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from symgrasp.errors import SceneError
+from symgrasp.feasibility.candidates import CandidateChecker
+from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.ik import solver_for
+from symgrasp.poses import inverse
+from symgrasp.reason import Reason
+from symgrasp.scene.scene import Scene
+from symgrasp.world import open_world
+from tests.conftest import load_small
+from tests.engine.random_scenes import random_scene, random_torso_scene
+
+DENSE = 256
+
+
+def covered(scene: Scene) -> tuple[FeasibilityMap, FeasibilityMap]:
+    """The map of the first task for which all of the redundancy is searched, and that at many samples."""
+    with open_world(scene.with_settings(redundancy="auto")) as world:
+        auto = MapMaker(world).map()
+    with open_world(scene.with_settings(redundancy=DENSE)) as world:
+        return auto, MapMaker(world).map()
+
+
+def assert_witnesses(scene: Scene, m: FeasibilityMap) -> None:
+    """Witnesses that are at no sample pass the checks of Algorithm 1, at their own redundancy."""
+    arm, task = scene.arm(m.arm), scene.task(m.task)
+    tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, m.T_world_object)
+    own = solver_for(arm, scene.settings.samples)
+    with open_world(scene) as world:
+        world.set_object(m.T_world_object)
+        for index in np.argwhere(m.feasible & (m.sample >= len(own.phi)))[:20]:
+            cell = Cell(*index.tolist())
+            witness = m.witness(cell)
+            assert witness is not None
+            assert np.allclose(arm.tool_pose(witness.q), tools[cell], atol=1e-6)
+            ik = solver_for(arm, 1, more=[witness.phi])
+            checker = CandidateChecker(world, arm, ik, scene.settings.approach, holders=task.arms)
+            sample = int(np.abs(ik.phi - witness.phi).argmin())
+            found = checker.check(tools[cell], witness.q, sample, witness.opening)
+            assert found.reason == Reason.FEASIBLE
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 10_000))
+def test_no_cell_is_missed_that_a_sample_shows_feasible(seed):
+    scene = Scene.from_content(random_scene(seed))
+    auto, dense = covered(scene)
+    assert not (dense.feasible & ~auto.feasible).any()
+    assert not (auto.proven & dense.feasible).any()
+    assert_witnesses(scene.with_settings(redundancy="auto"), auto)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_arms_of_six_joints_on_a_torso_have_the_same_map(seed):
+    scene = Scene.from_content(random_torso_scene(seed))
+    auto, dense = covered(scene)
+    assert np.array_equal(auto.feasible, dense.feasible)
+
+
+def test_an_arm_of_seven_joints_on_a_torso_keeps_its_witnesses():
+    scene = Scene.load("tiago_dual_tray").with_settings(heights=6, angles=12, redundancy="auto")
+    with open_world(scene) as world:
+        m = MapMaker(world).map("left")
+    arm = scene.arm("left")
+    base = solver_for(arm, scene.settings.samples).phi
+    assert np.array_equal(m.phi[: len(base)], base)
+    tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, m.T_world_object)
+    assert m.feasible.any()
+    for index in np.argwhere(m.feasible):
+        witness = m.witness(Cell(*index.tolist()))
+        assert witness is not None
+        assert np.allclose(arm.tool_pose(witness.q), tools[tuple(index)], atol=1e-6)
+
+
+@cache
+def small_map() -> FeasibilityMap:
+    return create_map(load_small("log_iiwa_and_panda").with_settings(redundancy="auto"), arm="panda")
+
+
+def test_more_is_found_than_at_samples_and_it_says_what_it_rests_on():
+    sampled = create_map(load_small("log_iiwa_and_panda", redundancy=32), arm="panda")
+    m = small_map()
+    assert (sampled.feasible <= m.feasible).all()
+    assert m.feasible.sum() > sampled.feasible.sum()
+    said = {m.rests_on(Cell(*index)) for index in np.ndindex(m.reason.shape)}
+    assert {"its witness", "a proof"} <= said
+    assert m.resolution >= 1e-4
+    assert sampled.resolution == 0.0
+    assert not (m.proven & m.feasible).any()
+
+
+def test_what_it_rests_on_is_saved(tmp_path):
+    m = small_map()
+    m.save(tmp_path / "map.npz")
+    loaded = FeasibilityMap.load(tmp_path / "map.npz")
+    assert np.array_equal(loaded.proven, m.proven)
+    assert loaded.resolution == m.resolution
+    assert np.array_equal(m.shift(m.manifold.dtheta).proven, np.roll(m.proven, -1, axis=2))
+
+
+def test_an_explanation_has_the_witness_of_the_map():
+    scene = load_small("log_iiwa_and_panda").with_settings(redundancy="auto")
+    m = small_map()
+    index = np.argwhere(m.feasible & (m.sample >= scene.settings.samples))[0]
+    with open_world(scene) as world:
+        explanation = MapMaker(world).explain("panda", None, Cell(*index.tolist()))
+    assert explanation.reason == Reason.FEASIBLE
+
+
+def test_other_words_are_refused():
+    with pytest.raises(SceneError, match="redundancy"):
+        load_small("soda_can").with_settings(redundancy="all")
