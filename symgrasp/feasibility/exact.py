@@ -32,8 +32,8 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.search_recording import FixedBodies, PieceBodies, record_search
 from symgrasp.feasibility.torso_maps import merged
-from symgrasp.ik import CompiledIK, GridSolvers, Solver, solver_for
-from symgrasp.ik.at_phi import Locked, locked_joint
+from symgrasp.ik import GridSolvers, Solver, solver_for
+from symgrasp.ik.at_phi import locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
@@ -95,7 +95,7 @@ class ExactEngine:
         self._most = CLEARANCE_LIMIT
         if not arm.pitched:  # whose hand has other poses in every row
             self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, self._most)
-        self._inner, self._known_locks = inner_pieces(geometry.pieces), {}
+        self._inner = inner_pieces(geometry.pieces) if self._settings.redundancy == "auto" else ()
         self._balance, self._holders = self._geometry.balance, (arm.name,)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
@@ -298,7 +298,7 @@ class ExactEngine:
         Returns:
             What was found for which of the cells, or None where samples are all there is.
         """
-        locked = self._locked(batch.compiled) if self._settings.redundancy == "auto" else None
+        locked = locked_joint(batch.compiled) if self._settings.redundancy == "auto" else None
         if locked is None or inputs.always_collides:
             return None
         which = np.flatnonzero(found.status != search.FEASIBLE)
@@ -327,13 +327,6 @@ class ExactEngine:
         draft.proven[tuple(part[proven] for part in cells)] = True
         draft.resolution = max(draft.resolution, FINEST, float(covered.left.max(initial=0.0)))
         return which, covered
-
-    def _locked(self, ik: CompiledIK) -> Locked | None:
-        """Return what computes an arm's geometry at any redundancy, kept for each solver."""
-        key = id(ik)
-        if key not in self._known_locks:
-            self._known_locks[key] = locked_joint(ik)
-        return self._known_locks[key]
 
     def _decide_covered(
         self,
