@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from symgrasp.ik import Solver, solver_for
+from symgrasp.ik import Solver, redundancy_of, solver_for
 from symgrasp.motion.draft import MotionDraft
 from symgrasp.motion.search import NoMotionError
 from symgrasp.motion.segments import Motion
@@ -67,7 +67,7 @@ class MotionPlanner:
             raise NoMotionError(f"no motion of {', '.join(pitched)}: expected arms of 6 or 7 joints")
         self.scene, self.bodies = scene, MotionScene(scene, world)
         self._world = world
-        self._solvers: dict[str, tuple[Solver, Solver]] = {}
+        self._solvers: dict[tuple[str, tuple[float, ...]], tuple[Solver, Solver]] = {}
 
     def plan(self, plan: Plan, seed: int = 0, progress: Progress | None = None) -> tuple[Plan, Motion]:
         """Plan the motion of a plan; see `plan_motion`."""
@@ -78,8 +78,13 @@ class MotionPlanner:
     def _grip(self, hold: Hold) -> Grip:
         """Return the grasp of a hold."""
         arm = self.scene.arm(hold.arm)
-        if arm.name not in self._solvers:
+        more: tuple[float, ...] = ()
+        if self.scene.settings.redundancy == "auto":  # whose grasps need not be at a sample
+            phi = redundancy_of(arm, np.array([hold.joints[name] for name in arm.joint_names]))
+            more = () if phi is None else (phi,)
+        if (arm.name, more) not in self._solvers:
             samples = self.scene.settings.samples
             fine = samples * (2 * int(np.ceil((LEAST_SAMPLES / samples - 1) / 2)) + 1)
-            self._solvers[arm.name] = solver_for(arm, samples), solver_for(arm, max(samples, fine))
-        return Grip.of(hold, arm, *self._solvers[arm.name], self.scene.profile)
+            solvers = solver_for(arm, samples, more=more), solver_for(arm, max(samples, fine), more=more)
+            self._solvers[arm.name, more] = solvers
+        return Grip.of(hold, arm, *self._solvers[arm.name, more], self.scene.profile)
