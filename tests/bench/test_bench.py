@@ -105,7 +105,7 @@ def test_brute_force_agrees_with_the_map(name):
     arm = scene.arm(task.arms[0])
     with BulletWorld(scene) as world:
         m = MapMaker(world).map()
-        brute = BruteForce(world, arm, solver_for(arm, scene.settings.redundancy), task.T_world_object)
+        brute = BruteForce(world, arm, solver_for(arm, scene.settings.samples), task.T_world_object)
         tools = m.manifold.tool_poses(task.T_world_object, arm.hand.finger_depth)
         T = inverse(arm.robot.T_world_base) @ tools
         live = np.argwhere(m.reason >= Reason.UNREACHABLE)

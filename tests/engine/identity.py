@@ -42,7 +42,7 @@ def assert_true(
         m: the map.
         cells: the cells to check; all of them if None.
     """
-    samples = scene.settings.redundancy
+    samples = scene.settings.samples
     solvers = GridSolvers(arm, m.manifold, lambda own: independent_solver(own, samples))
     (holders,) = [task.arms for task in scene.tasks.values() if task.name == m.task]
     tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, m.T_world_object)

@@ -86,7 +86,7 @@ def test_no_configuration_has_more_and_some_nearly_that(name):
 def test_no_candidate_is_much_clearer_than_the_witness(name):
     arm = scene().arm(name)
     m = create_map(scene(), arm=name)
-    ik = independent_solver(arm, scene().settings.redundancy)
+    ik = independent_solver(arm, scene().settings.samples)
     tools = inverse(arm.robot.T_world_base) @ m.manifold.tool_poses(m.T_world_object, arm.hand.finger_depth)
     cells = [Cell(*index) for index in np.argwhere(m.feasible)]
     with BulletWorld(scene()) as world:

@@ -52,7 +52,7 @@ class Slow(ConfigurationFinder):
             for robot in self.world.scene.robots:
                 self.world.park(robot)
             self.world.set_object(m.T_world_object)
-            ik = solver_for(arm, settings.redundancy)
+            ik = solver_for(arm, settings.samples)
             checker = CandidateChecker(
                 self.world, arm, ik, settings.approach, holders=[a.name for a in self.arms]
             )
