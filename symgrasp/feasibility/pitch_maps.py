@@ -20,7 +20,7 @@ def at_pitches(maps: Sequence[FeasibilityMap], pitches: Sequence[float]) -> Feas
     """Return the maps of an arm and task at some pitches (rad) as one; see `FeasibilityMap.pitches`."""
     bodies = tuple(dict.fromkeys(name for m in maps for name in m.bodies))
     index = [np.array([*map(bodies.index, m.bodies), -1], dtype=np.int16) for m in maps]
-    names = ("reason", "q", "sample", "branch", "clearance", "depth")
+    names = ("reason", "q", "sample", "branch", "clearance", "depth", "proven")
     arrays = {name: np.concatenate([getattr(m, name) for m in maps]) for name in names}
     pair = np.concatenate([own[m.pair] for own, m in zip(index, maps, strict=True)])
     # A sample is the pitch by its index; its sign, which depends on the roll, is in q.

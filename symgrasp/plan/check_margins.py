@@ -116,8 +116,9 @@ def _feasible(
     candidates = checker.candidates(tool, arm.hand.opening(radius))
     if any(c.reason == Reason.FEASIBLE for c in candidates):
         return True
-    settings = world.scene.settings
-    return settings.redundancy == "auto" and _feasible_between(checker, T, h, theta, roll, tool)
+    if world.scene.settings.redundancy != "auto" or arm.pitched:
+        return False
+    return _feasible_between(checker, T, h, theta, roll, tool)
 
 
 def _feasible_between(

@@ -148,6 +148,8 @@ def test_maps_at_a_pitch_are_those_of_a_numerical_search():
         maker = MapMaker(world)
         for task in scene.tasks.values():
             m = maker.maps_at_pitches("so101", task, pitches)
+            assert m.proven.shape == m.feasible.shape
+            assert not (m.proven & m.feasible).any()
             tools = scene.arm().hand.tool_poses(scene.manifold, task.T_world_object)
             out = np.isin(m.reason, (Reason.UNREACHABLE, Reason.NOT_FOUND, Reason.JOINT_LIMITS))
             for some in (np.argwhere(out), np.argwhere(m.feasible)):
