@@ -8,6 +8,7 @@ from pathlib import Path
 import symgrasp
 from symgrasp.compiling import SOURCES
 from symgrasp.feasibility.create import create_map
+from symgrasp.motion.planning import plan_motion
 from symgrasp.planners.planning import plan_bimanual, plan_sequential
 from tests.conftest import PLAIN, load_small
 
@@ -24,5 +25,7 @@ def fingerprint() -> str:
 if __name__ == "__main__":
     for name in PLAIN:
         create_map(load_small(name, 4, 8, 2))
-    plan_sequential(load_small("pick_pour_place", 12, 24, 8))
+    create_map(load_small(PLAIN[0], 4, 8, 2).with_settings(redundancy="auto"))
+    sequence = load_small("pick_pour_place", 12, 24, 8)
+    plan_motion(sequence, plan_sequential(sequence))
     plan_bimanual(load_small("log_two_robots", 20, 24, 6))

@@ -173,3 +173,25 @@ def test_a_plan_goes_out_in_every_format_and_comes_back_verified(open_page, tmp_
     assert Plan.load(download(other, "JSON", tmp_path)) == plan
     assert other.page.evaluate("window.hacked") is None
     assert page.complaints == other.complaints == []
+
+
+def test_a_motion_is_found_scrubbed_played_and_downloaded(open_page, tmp_path):
+    page = open_page(scene="pick_pour_place")
+    page.tab("Sequence")
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 3 tasks: h = ")).to_be_visible()
+    page.button("With motion").click()
+    expect(page.text("way of the tool: ")).to_be_visible(timeout=120_000)
+    expect(page.button("With motion")).to_be_hidden()
+    page.slide("Time (s)", 5)
+    expect(page.text("carry, pick → pour, panda")).to_be_visible()
+    shoot(page, "motion")
+    page.choose("Speed", "4 ×")
+    before = page.settled_view()
+    page.button("Play").click()
+    page.wait_for_change(before)
+    expect(page.button("Play")).to_be_visible(timeout=60_000)  # again, at the end
+    path = download(page, "JSON", tmp_path)
+    plan = Plan.load(path)
+    assert plan.motion
+    assert verify(plan).holds
