@@ -44,3 +44,4 @@ robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write th
 
 grids: $(VENV)/dev.stamp  ## measure coarse and fine grids of every shipped scene, and write docs/grids.md (minutes)
 	$(BIN)/python -m docs.grids
+	$(BIN)/python -m docs.figures grids

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from docs.figures.style import IMAGES, board, new, save
 from docs.pages import put_between
 from symgrasp.bench.figures import with_machine
 from symgrasp.bench.grids import Counts, GridResult, measure_grids
@@ -19,7 +18,7 @@ from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
 from symgrasp.world import prepared
 
-__all__ = ["BEGIN", "END", "MEASURED", "PAGE", "PICTURE", "measure", "picture", "read", "table", "write"]
+__all__ = ["BEGIN", "END", "MEASURED", "PAGE", "measure", "read", "table", "write"]
 
 ROOT = Path(__file__).parent.parent
 
@@ -27,8 +26,6 @@ MEASURED = ROOT / "docs" / "grids.json"
 """What was measured when the page was made."""
 
 PAGE = ROOT / "docs" / "grids.md"
-
-PICTURE = "grids.png"
 
 BEGIN, END = "<!-- measured: make grids -->", "<!-- end -->"
 
@@ -84,26 +81,6 @@ def table(results: Results) -> str:
     )
 
 
-def picture(results: Results) -> None:
-    """Draw the errors of all scenes, and their median."""
-    figure = new(7.0, 3.8)
-    axes = board(figure, (0.65, 0.4, 6.1, 3.25))
-    errors = np.array([[100 * r.error for r in grids] for grids in results.values()])
-    first = next(iter(results.values()))
-    cells = [r.heights * r.angles for r in first]
-    for row in errors:
-        axes.plot(cells, row, "-", color="#9aa5b1", linewidth=1)
-    axes.plot(cells, np.median(errors, axis=0), "-o", color="#0072b2", linewidth=2.2, label="median")
-    axes.plot([], [], "-", color="#9aa5b1", linewidth=1, label="a shipped scene")
-    axes.set(xscale="log", yscale="log", ylabel="wrong, % of the feasible area")
-    axes.set_xticks(cells, [f"{r.heights} × {r.angles}" for r in first])
-    axes.set_yticks(ticks := [1, 2, 5, 10, 20, 50, 100], [str(t) for t in ticks])
-    axes.minorticks_off()
-    axes.grid(color="#e4e7eb", linewidth=0.6)
-    axes.legend(frameon=False)
-    save(figure, PICTURE)
-
-
 def write(content: Mapping[str, Any], page: Path) -> None:
     """Put the tables between the markers of a page."""
     put_between(page, BEGIN, END, table(read(content)))
@@ -119,8 +96,6 @@ def _plan(result: GridResult) -> str:
 
 if __name__ == "__main__":
     content = measure(list(shipped_scenes()))
-    IMAGES.mkdir(exist_ok=True)
     with write_atomically(MEASURED) as file:
         file.write((json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
-    picture(read(content))
     write(content, PAGE)

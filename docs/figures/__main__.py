@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 
 from docs.figures import climbing, holding, page, unwrapping
 from docs.figures.architecture import architecture
+from docs.figures.grids import grids
 from docs.figures.style import IMAGES
 
 __all__ = ["FIGURES", "main"]
@@ -26,6 +27,7 @@ FIGURES: dict[str, Callable[[], None]] = {
         climbing.handprints,
         holding.pick_pour_place,
         holding.tutorial,
+        grids,
         page.page,
         page.page_two_robots,
     )

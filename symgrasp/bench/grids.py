@@ -6,7 +6,7 @@ on coarse grids are compared, area by area, with one on a grid that is finer tha
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -17,7 +17,13 @@ from symgrasp.errors import NoPlanError, SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.pictures import draw_errors
-from symgrasp.planners.planning import handover_plans
+from symgrasp.planners.planning import (
+    MapsByKey,
+    Plans,
+    bimanual_plans,
+    handover_plans,
+    sequential_plans,
+)
 from symgrasp.progress import Progress, part_of
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
@@ -206,12 +212,18 @@ def _maps(
             yield (task, arm), maker.map(arm, task, progress=part)
 
 
-def _with_plan(
-    scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap], result: GridResult
-) -> GridResult:
+def _plans(scene: Scene, maps: MapsByKey) -> Plans:
+    """List the plans for all tasks of a scene in order."""
+    tasks = list(scene.tasks.values())
+    if all(task.arms == tasks[0].arms for task in tasks) and len(tasks[0].arms) == 1:
+        return sequential_plans(scene, tasks[0].arms[0], maps)
+    return bimanual_plans(scene, tasks[0].name, maps) if len(tasks) == 1 else handover_plans(scene, maps)
+
+
+def _with_plan(scene: Scene, maps: MapsByKey, result: GridResult) -> GridResult:
     """Return a result with what the best plan on its maps is worth."""
     try:
-        with closing(handover_plans(scene, maps)) as plans:
+        with closing(_plans(scene, maps)) as plans:
             holds = [hold for task in next(plans).tasks for hold in task.holds]
     except (NoPlanError, SceneError) as error:
         return replace(result, no_plan=str(error))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from symgrasp.plan.plan import PlanTask, Pose
@@ -32,11 +34,12 @@ def check_pose(pose: Pose, where: str, report: Report) -> bool:
     """Check that a pose is rigid, and that its two spellings agree."""
     matrix = pose.array()
     rotation = matrix[:3, :3]
-    rigid = np.abs(rotation.T @ rotation - np.eye(3)).max() < TOLERANCE and np.linalg.det(rotation) > 0
+    with np.errstate(over="ignore", invalid="ignore"):  # of numbers that no rotation has
+        rigid = np.abs(rotation.T @ rotation - np.eye(3)).max() < TOLERANCE and np.linalg.det(rotation) > 0
     rigid &= np.array_equal(matrix[3], [0, 0, 0, 1])
     if not report.expect(rigid, f"{where}: the matrix is no rigid pose"):
         return False
-    length = float(np.linalg.norm(pose.quat_wxyz))
+    length = math.hypot(*pose.quat_wxyz)
     if not report.expect(abs(length - 1) < TOLERANCE, f"{where}: the quaternion has length {length:.7f}"):
         return False
     spelled = from_position_quat(pose.position, pose.quat_wxyz)
@@ -48,6 +51,7 @@ def same_pose(a: Array, b: Array, where: str, report: Report, leeway: float = 0.
 
     They may differ by a leeway (rad, and m at a decimetre) beyond the tolerance.
     """
-    distance, angle = (float(e) for e in pose_error(a, b))
+    with np.errstate(over="ignore", invalid="ignore"):  # of positions that no robot reaches
+        distance, angle = (float(e) for e in pose_error(a, b))
     text = f"{where}: off by {1e3 * distance:.4f} mm and {np.rad2deg(angle):.5f}°"
     return report.expect(distance <= TOLERANCE + 0.1 * leeway and angle <= TOLERANCE + leeway, text)

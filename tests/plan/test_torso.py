@@ -94,5 +94,7 @@ def test_hands_of_one_body_that_hold_the_object_are_clear_of_it():
                 c for c in world.pairs_within(arm, 0.1)
                 if not (c.reason.name == "OBJECT_COLLISION" and c.a.link in fingers)
             ]  # fmt: skip
-            assert hold.clearance == pytest.approx(min([0.1, *(0.1 - c.depth for c in pairs)]))
+            nearest = min([0.1, *(0.1 - c.depth for c in pairs)])
+            assert hold.clearance <= nearest
+            assert hold.clearance == pytest.approx(nearest, abs=2e-5)  # stated a little too low
             assert hold.clearance > world.clearance(arm, 0.1)

@@ -77,7 +77,9 @@ def crowded(name: str):
         return scene, [maker.map(arm, task) for arm in task.arms]
 
 
-def test_the_same_placements_as_by_trying_all():
+def test_the_same_placements_as_by_trying_all(monkeypatch):
+    # Both begin with the witnesses themselves, however near a limit they stand.
+    monkeypatch.setattr("symgrasp.planners.configurations.ease", lambda arm, q: np.ones(np.shape(q)[:-1]))
     scene, maps = crowded("log_four_robots")
     arms = [scene.arm(m.arm) for m in maps]
     gaps = PrintGaps(arms, scene.manifold)
