@@ -21,7 +21,7 @@ $(BIN)/python:
 	PYTHONPATH=$(VENV)-boot $(PYTHON) -m virtualenv $(VENV); }
 
 $(VENV)/app.stamp: pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --editable '.[robots]'
+	$(BIN)/python -m pip install --quiet --editable '.[motion,robots]'
 	touch $@
 
 $(VENV)/dev.stamp: pyproject.toml | $(BIN)/python
