@@ -395,7 +395,7 @@ def test_two_browsers_do_not_see_each_other(open_page, bottle_map):
 
 
 def test_a_long_computation_can_be_cancelled_and_begun_again(open_page, tmp_path, content):
-    content["map"] = {"heights": 100, "angles": 96, "redundancy": 512, "approach": 0.1}
+    content["map"] = {"heights": 300, "angles": 400, "redundancy": "auto", "approach": 0.1}
     long = open_page(str(write_scene(tmp_path, content)), wait_for_map=False)
     expect(long.text("Computing the map of pick")).to_be_visible()
     long.button("Cancel").click()
