@@ -77,9 +77,9 @@ def first_start() -> Iterator[Figure]:
     with TemporaryDirectory() as folder:
         one = _process(["map", "bottle_on_table"], folder).time
         yield times("a first map, with all that it compiles", "s", [one])
-        arm = _process(["plan", "sequential", "pick_pour_place"], folder).time
+        arm = _process(["plan", "sequential", "pick_pour_place", "--list", "1"], folder).time
         yield times("  a first plan of one arm after it", "s", [arm])
-        arms = _process(["plan", "bimanual", "log_two_robots"], folder).time
+        arms = _process(["plan", "bimanual", "log_two_robots", "--list", "1"], folder).time
         yield times("  a first plan of two arms after it", "s", [arms])
 
 
