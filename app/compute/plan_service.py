@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import combinations, islice
 from pathlib import Path
@@ -11,9 +12,8 @@ import numpy as np
 
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.motion.planning import MotionPlanner
+from symgrasp.motion.choosing import Failure, failures_in_words, moving_plans
 from symgrasp.motion.record import from_plan, with_motion
-from symgrasp.motion.timing import timed
 from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.plan.checked_plan import check_plan
 from symgrasp.plan.plan import Hold, Plan, PlanTask
@@ -28,11 +28,10 @@ from symgrasp.planners.planning import (
     plan_sequential,
     sequential_plans,
 )
-from symgrasp.progress import Progress, part_of
+from symgrasp.progress import Progress
 from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import open_world
 
 from ..choices.uploaded_scene import UploadedScene
 from ..files.scene_files import refuse_foreign_files
@@ -241,19 +240,13 @@ class PlanService:
         Raises:
             NoPlanError: none has one; says why.
         """
+        failures: list[Failure] = []
         scene = with_poses(request.scene, request.poses)
-        failures: list[str] = []
-        with open_world(scene) as world:
-            planner = MotionPlanner(scene, world)
-            for k, plan in enumerate(request.plans):
-                try:
-                    moving, motion = planner.plan(plan, progress=part_of(progress, k, len(request.plans)))
-                    motion = timed(motion)
-                except NoPlanError as error:
-                    failures.append(str(error))
-                else:
-                    return MotionOutcome(k, with_motion(moving, motion), tuple(failures))
-        raise NoPlanError(f"no motion of {len(failures)} plans, of the last: {failures[-1]}")
+        with closing(moving_plans(scene, request.plans, failures, progress=progress)) as found:
+            for plan, motion in found:
+                reasons = tuple(failure.reason for failure in failures)
+                return MotionOutcome(len(failures), with_motion(plan, motion), reasons)
+        raise NoPlanError("no motion: " + "; ".join(failures_in_words(failures)))
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
         """Read and verify a plan file; if the plan holds, return all that is needed to show it but its maps.

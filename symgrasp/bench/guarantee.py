@@ -1,6 +1,7 @@
 """How many feasible cells maps miss: with redundancy samples, and where all of the redundancy is searched.
 
-The truth is a map at 2,048 uniform samples. Pinocchio and Coal tell of some of the cells that are called
+The truth is a map at 2,048 uniform samples, or half or a quarter where a map may not have so many candidates.
+Pinocchio and Coal tell of some of the cells that are called
 infeasible whether one of those samples is free.
 """
 
@@ -48,10 +49,11 @@ class Guarantee:
         scene: name of the scene.
         task: name of the task.
         arm: name of the arm.
-        feasible: number of cells that some of 2,048 samples shows feasible.
+        samples: number of uniform samples of the truth.
+        feasible: number of cells that some of those shows feasible.
         missed_sampled: number of those that a map at 32 samples calls infeasible.
         missed: number of those that the map calls infeasible for which all of the redundancy was searched.
-        found: number of cells that it shows feasible, and 2,048 samples do not.
+        found: number of cells that it shows feasible, and those samples do not.
         infeasible: number of cells that it calls infeasible.
         proven: number of those that are proven to be.
         resolution: see `FeasibilityMap`.
@@ -63,6 +65,7 @@ class Guarantee:
     scene: str
     task: str
     arm: str
+    samples: int
     feasible: int
     missed_sampled: int
     missed: int
@@ -78,7 +81,8 @@ class Guarantee:
         """Return the figures as one line of text."""
         share = 100 * self.proven / max(1, self.infeasible)
         return (
-            f"{self.scene}, {self.task} with {self.arm}: of {self.feasible} feasible cells "
+            f"{self.scene}, {self.task} with {self.arm}: of {self.feasible} cells "
+            f"feasible at {self.samples} samples "
             f"{self.missed_sampled} missed by {AUTO_SAMPLES} samples, {self.missed} by auto, which finds "
             f"{self.found} more; {share:.0f} % of {self.infeasible} proven, others to "
             f"{self.resolution:.0e} rad; {self.refuted} of {self.tried} refuted; time × {self.ratio:.2f}"
@@ -122,11 +126,11 @@ def _measured(scene: Scene, task: Task, name: str) -> Guarantee:
     """Measure the maps of a task with an arm."""
     sampled, before = _timed(scene.with_settings(redundancy=AUTO_SAMPLES), task, name)
     searched, after = _timed(scene.with_settings(redundancy="auto"), task, name)
-    truth = _truth(scene, task, name)
+    truth, samples = _truth(scene, task, name)
     missed = truth & ~searched.feasible
     refuted, tried = _refuted(scene, task, name, searched)
     return Guarantee(
-        scene.name, task.name, name, int(truth.sum()), int((truth & ~sampled.feasible).sum()),
+        scene.name, task.name, name, samples, int(truth.sum()), int((truth & ~sampled.feasible).sum()),
         int(missed.sum()), int((searched.feasible & ~truth).sum()), int((~searched.feasible).sum()),
         int(searched.proven.sum()), searched.resolution, refuted, tried, after / before,
     )  # fmt: skip
@@ -141,8 +145,8 @@ def _timed(scene: Scene, task: Task, name: str) -> tuple[FeasibilityMap, float]:
         return maker.map(name, task), process_time() - start
 
 
-def _truth(scene: Scene, task: Task, name: str) -> np.ndarray:
-    """Return which cells 2,048 samples show feasible, by as many maps as that many candidates need."""
+def _truth(scene: Scene, task: Task, name: str) -> tuple[np.ndarray, int]:
+    """Return which cells some of many samples shows feasible, and how many samples a map may have."""
     samples = MOST_SAMPLES
     while True:
         try:
@@ -151,7 +155,7 @@ def _truth(scene: Scene, task: Task, name: str) -> np.ndarray:
             samples //= 2
             continue
         with open_world(dense) as world:
-            return MapMaker(world).map(name, task).feasible
+            return MapMaker(world).map(name, task).feasible, samples
 
 
 def _refuted(scene: Scene, task: Task, name: str, m: FeasibilityMap) -> tuple[int, int]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable
 from contextlib import closing
 from itertools import groupby, islice
 from typing import NamedTuple
 
+from symgrasp.errors import NoPlanError
 from symgrasp.motion.planning import MotionPlanner
 from symgrasp.motion.record import with_motion
 from symgrasp.motion.search import NoMotionError
@@ -55,10 +56,7 @@ def best_motion(
     """
     failures: list[Failure] = []
     with closing(plans):
-        found = [
-            (plan, timed(motion, progress))
-            for plan, motion in islice(moving_plans(scene, plans, failures, seed, progress), best)
-        ]
+        found = list(islice(moving_plans(scene, plans, failures, seed, progress), best))
     if not found:
         raise NoMotionError("no motion: " + "; ".join(failures_in_words(failures)))
     plan, motion = min(found, key=lambda pair: pair[1].duration)
@@ -71,8 +69,8 @@ def moving_plans(
     failures: list[Failure],
     seed: int = 0,
     progress: Progress | None = None,
-) -> Iterator[tuple[Plan, Motion]]:
-    """Yield the plans that have a motion, in their order, with it, without times.
+) -> Generator[tuple[Plan, Motion]]:
+    """Yield the plans that have a motion, in their order, with it.
 
     Args:
         scene: the scene.
@@ -85,9 +83,12 @@ def moving_plans(
         planner = MotionPlanner(scene, world)
         for number, plan in enumerate(islice(plans, MOST_TRIED), start=1):
             try:
-                yield planner.plan(plan, seed, progress)
-            except NoMotionError as error:
+                moving, motion = planner.plan(plan, seed, progress)
+                motion = timed(motion, progress)
+            except NoPlanError as error:  # no way, or none within the limits of speed
                 failures.append(Failure(number, str(error)))
+            else:
+                yield moving, motion
 
 
 def failures_in_words(failures: Iterable[Failure]) -> list[str]:

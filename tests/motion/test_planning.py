@@ -7,10 +7,11 @@ from itertools import groupby
 import numpy as np
 import pytest
 
-from symgrasp.errors import Cancelled, SceneError
+from symgrasp.errors import Cancelled, NoPlanError, SceneError
 from symgrasp.motion.choosing import Failure, best_motion, failures_in_words
 from symgrasp.motion.planning import plan_motion
 from symgrasp.motion.segments import Motion
+from symgrasp.motion.timing import timed
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
 from symgrasp.planners.planning import (
@@ -20,6 +21,7 @@ from symgrasp.planners.planning import (
     sequential_plans,
 )
 from symgrasp.poses import pose_error
+from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 from tests.conftest import load_small
@@ -141,6 +143,23 @@ def test_the_first_plan_with_a_motion_is_chosen_and_holds():
     assert numbers == list(range(1, len(numbers) + 1))
     report = verify(plan)
     assert report, report.failures
+
+
+def test_a_plan_whose_motion_has_no_times_is_passed_over(monkeypatch):
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    calls = []
+
+    def timed_the_second_time(motion: Motion, progress: Progress | None) -> Motion:
+        calls.append(motion)
+        if len(calls) == 1:
+            raise NoPlanError("no times")
+        return timed(motion, progress)
+
+    monkeypatch.setattr("symgrasp.motion.choosing.timed", timed_the_second_time)
+    plan, failures = best_motion(scene, sequential_plans(scene))
+    assert "no times" in [failure.reason for failure in failures]
+    assert len(calls) == 2
+    assert plan.motion
 
 
 def test_planning_can_be_cancelled():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +15,7 @@ from symgrasp.errors import SymgraspError
 from symgrasp.motion.proof import CLOSEST
 from symgrasp.motion.search import NoMotionError, connect, prove
 from symgrasp.motion.situation import MotionScene, Situation
+from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world
 from tests.conftest import load_small
@@ -66,14 +69,21 @@ def test_no_false_free(seed, torso):
                 assert distance_in_bullet(world, arm, q) >= 0.0
 
 
-def test_stated_clearance_is_below_the_true_one():
+@contextmanager
+def lines_of_the_panda(
+    seed: int, count: int
+) -> Iterator[tuple[BulletWorld, Arm, np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield a world, its arm, and starts, ends and proven clearances of random lines between bottles."""
     scene = load_small("pick_pour_place")
-    rng = np.random.default_rng(5)
     with open_world(scene) as world:
-        bodies = MotionScene(scene, world)
-        arm = scene.arm()
+        bodies, arm = MotionScene(scene, world), scene.arm()
         situation = bodies.situation(bodies.home(), [arm])
-        start, end, clearance, _ = random_lines(situation, arm, rng, 300)
+        start, end, clearance, _ = random_lines(situation, arm, np.random.default_rng(seed), count)
+        yield world, arm, start, end, clearance
+
+
+def test_stated_clearance_is_below_the_true_one():
+    with lines_of_the_panda(5, 300) as (world, arm, start, end, clearance):
         free = np.flatnonzero(clearance >= 0)
         for k in free[:: len(free) // 10]:
             for q in start[k] + np.linspace(0, 1, 60)[:, None] * (end[k] - start[k]):
@@ -83,13 +93,7 @@ def test_stated_clearance_is_below_the_true_one():
 
 def test_free_lines_are_mostly_proven():
     # The proof is conservative: of the lines that are free with a millimetre to spare, it finds nearly all.
-    scene = load_small("pick_pour_place")
-    rng = np.random.default_rng(2)
-    with open_world(scene) as world:
-        bodies = MotionScene(scene, world)
-        arm = scene.arm()
-        situation = bodies.situation(bodies.home(), [arm])
-        start, end, clearance, _ = random_lines(situation, arm, rng, 150)
+    with lines_of_the_panda(2, 150) as (world, arm, start, end, clearance):
         missed = 0
         for k in np.flatnonzero(clearance < 0):
             states = start[k] + np.linspace(0, 1, 80)[:, None] * (end[k] - start[k])
