@@ -1,17 +1,7 @@
 """The search that covers the redundancy φ of infeasible cells: it steps over nothing that is free. Compiled.
 
-The range of φ is divided into parts, and a part is halved until every branch is excluded on it, or it is
-narrower than `FINEST`. A branch is excluded on a part by what is the matter with it at both ends:
-
-* the same joint is outside its limits by more than joints deviate from a straight line in between;
-* the same pair of pieces collides, deeper than their motion deviates from a straight line (see
-  `symgrasp.engine.inner_pieces` for how deep). Between two ends, the distance of two convex bodies along a
-  fixed direction is at most the larger one, but for how much their points leave straight lines, and for a
-  quarter of the way that the turn of each body moves its far end: other points may be nearest at the
-  other end;
-* the same root of the closed form has a negative radicand, by more than it bends in between.
-
-Where two branches end in a root, they are one curve: it is excluded from one branch to the other.
+The range of φ is divided into parts, and a part is halved until every branch is excluded on it (see
+`symgrasp.engine.exclusion`), or it is narrower than `FINEST`.
 
 By how much curves bend is bounded by what is usual for arms, not by a proof: so an infeasible cell is
 infeasible to the resolution of the parts that were left. What does not depend on φ is proven: a hand that
@@ -27,9 +17,21 @@ import numpy as np
 
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED, check_arm
+from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm
 from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult, new_nodes
-from symgrasp.engine.distance import distance_bounds
+from symgrasp.engine.exclusion import (
+    EXCLUDED,
+    FALLS,
+    GONE,
+    HITS,
+    OUTSIDE,
+    SKIPPED,
+    SOFT,
+    STUCK,
+    UNSURE,
+    copy_pose,
+    what_is_known,
+)
 from symgrasp.engine.kinematics import MovingPieces, Scratch, copied, place_arm, place_hand
 from symgrasp.engine.pieces import PackedPieces
 from symgrasp.engine.retreat_search import arm_retreats, copy_row, tool_clearance, tool_retreats
@@ -59,33 +61,8 @@ COARSE = 3e-3
 """The same where both ends fail in a way of which no measure is known: balance, the retreat, pieces that
 all but touch."""
 
-UNKNOWN = 0.05
-"""The same where a branch exists at neither end, and no radicand is known."""
-
-GONE, OUTSIDE, HITS, FALLS, STUCK, UNSURE, SKIPPED = range(7)
-"""States of a branch at a value of φ: it does not exist, is outside the limits, collides, the robot falls,
-the retreat is blocked, only PyBullet can decide, or it is excluded all around there."""
-
-SAME_CURVE = 0.7
-"""Largest difference (rad) of joints of two configurations that are taken for ends of one smooth curve."""
-
-BEND = 1.5
-"""By how much (1/rad) joint values leave the range of their values at both ends of a curve, for the square
-of the largest difference of any joint."""
-
-SAGITTA = 0.25
-"""By how much (m/rad²) points of the arm leave a straight line between their places at both ends of a
-curve, for the square of the sum of the differences of the joints that move them."""
-
-RADICAND_BEND = 1.0
-"""The same (1/rad²) for radicands, for the square of the width of a part."""
-
 MOST_VISITED = 20_000
 """Values of φ of a cell after which the search gives up."""
-
-HARD, SOFT, EXCLUDED = 0, 1, 2
-"""What is known of a part of the range: nothing, nothing that a measure is known of, or that nothing is
-free."""
 
 
 def cover(
@@ -188,7 +165,7 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
         while count > 0 and not free:
             right = nodes.stack[count - 1]
             width = nodes.phi[right] - nodes.phi[left]
-            known = _known(nodes, scratch, moving, pieces, inputs, covered, left, right, width)
+            known = what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, width)
             if known != EXCLUDED:
                 ends = width <= FINEST or (known == SOFT and width <= COARSE)
                 if not ends and result.visited[i] < MOST_VISITED:
@@ -283,7 +260,7 @@ def _visit(
             for side in range(2):
                 piece = scratch.hit[side]
                 nodes.pair[at, b, side] = piece
-                _copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
+                copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
             nodes.depth[at, b], nodes.level[at, b] = -1.0, 0
             continue
         if gap != UNDECIDED and len(inputs.retreat):
@@ -308,211 +285,3 @@ def _visit(
         copy_row(q[b], result.q[i])
         return True
     return False
-
-
-@njit(**STRICT)
-def _known(nodes, scratch, moving, pieces, inputs, covered, left, right, width):
-    """Return what is known of the part of the range between two slots, and write down what is excluded."""
-    least = EXCLUDED
-    for b in range(nodes.state.shape[1]):
-        if nodes.excluded[right, b]:
-            continue
-        here, there = nodes.state[left, b] != GONE, nodes.state[right, b] != GONE
-        known = EXCLUDED
-        if here:
-            known = _curve(nodes, scratch, moving, pieces, inputs, covered, left, right, b)
-        elif not there:
-            known = _none(nodes.missing[left, b], nodes.missing[right, b], width)
-        if known != HARD and there and not (here and _apart(nodes, left, b, right, b) <= SAME_CURVE):
-            known = min(known, _curve(nodes, scratch, moving, pieces, inputs, covered, right, left, b))
-        least = min(least, known)
-        if not covered.locked.spherical:  # whose branches may change places
-            if least == HARD:
-                return HARD
-        elif known == EXCLUDED:
-            nodes.excluded[right, b] = True
-    return least
-
-
-@njit(**STRICT)
-def _none(here, there, width):
-    """Return what is known of a branch that exists at neither end of a part, from what is missing there."""
-    if here == 0.0 or there == 0.0:
-        return EXCLUDED if width <= UNKNOWN else HARD
-    root, other = _root(here), _root(there)
-    first, second = -(here + 10.0 * root), -(there + 10.0 * other)
-    if root == other:
-        bend = RADICAND_BEND * width * width + 0.1 * abs(first - second)
-        return EXCLUDED if min(first, second) > bend else HARD
-    # Where an earlier root ends, later radicands change like the square root of φ.
-    later = first if root > other else second
-    return EXCLUDED if later > 1.5 * math.sqrt(width) else HARD
-
-
-@njit(**STRICT)
-def _root(missing):
-    """Return the number of the root of which `symgrasp.ik.joints.miss` was told."""
-    return math.floor(-missing / 10.0)
-
-
-@njit(**STRICT)
-def _apart(nodes, one, a, other, b):
-    """Return the largest difference (rad) of the joints of two configurations."""
-    most = 0.0
-    for j in range(nodes.q.shape[2]):
-        most = max(most, abs(_turn(nodes.q[other, b, j] - nodes.q[one, a, j])))
-    return most
-
-
-@njit(**STRICT)
-def _turn(angle):
-    """Return an angle (rad) less full turns, from -π to π."""
-    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
-
-
-@njit(**STRICT)
-def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a):
-    """Return what is known of the curve that starts with a branch at one end of a part.
-
-    It leads to the nearest configuration: at the other end, or at this one where both end in between.
-    """
-    if nodes.state[other, a] != GONE and _apart(nodes, one, a, other, a) <= SAME_CURVE:
-        return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, a)
-    nearest, at, least = -1, other, math.inf
-    for b in range(nodes.state.shape[1]):
-        if nodes.excluded[one, b] or nodes.excluded[other, b]:
-            continue
-        if nodes.state[other, b] != GONE:
-            apart = _apart(nodes, one, a, other, b)
-            if apart < least:
-                nearest, at, least = b, other, apart
-        elif b != a and nodes.state[one, b] != GONE and nodes.state[other, a] == GONE:
-            apart = _apart(nodes, one, a, one, b)
-            if apart < least:
-                nearest, at, least = b, one, apart
-    if nearest < 0 or least > SAME_CURVE:
-        return HARD
-    return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, at, nearest)
-
-
-@njit(**STRICT)
-def _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b):
-    """Return what is known of a curve between two configurations: slots and branches."""
-    apart = _apart(nodes, one, a, other, b)
-    if _limits_exclude(nodes, one, a, other, b, apart):
-        return EXCLUDED
-    first, second = nodes.state[one, a], nodes.state[other, b]
-    if first == HITS and _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b):
-        return EXCLUDED
-    if second == HITS and _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, other, b, one, a):
-        return EXCLUDED
-    return SOFT if first >= FALLS and second >= FALLS else HARD
-
-
-@njit(**STRICT)
-def _limits_exclude(nodes, one, a, other, b, apart):
-    """Whether one joint is outside of its limits all along a curve."""
-    limits = nodes.chain.limits
-    for j in range(nodes.q.shape[2]):
-        half = 0.5 * (limits[1, j] - limits[0, j])
-        if not half < math.pi:
-            continue
-        here = _turn(nodes.q[one, a, j] - limits[2, j])
-        there = _turn(nodes.q[other, b, j] - limits[2, j])
-        outside = min(abs(here), abs(there)) - half
-        aside = here * there > 0.0 or abs(here) + abs(there) >= math.pi  # not through the range
-        if outside > BEND * apart * apart and aside:
-            return True
-    return False
-
-
-@njit(**STRICT)
-def _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b):
-    """Whether the pair that collides at one end of a curve does so all along it."""
-    first, second = nodes.pair[one, a, 0], nodes.pair[one, a, 1]
-    last = -1
-    for side in range(2):
-        piece = nodes.pair[one, a, side]
-        if moving.hand.shape[1] <= piece < len(moving.frame):
-            last = max(last, moving.frame[piece])
-    way = 0.0
-    for j in range(last + 1):
-        way += abs(_turn(nodes.q[other, b, j] - nodes.q[one, a, j]))
-    bend = SAGITTA * way * way
-    if not _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend):
-        return False
-    if (
-        nodes.state[other, b] == HITS
-        and nodes.pair[other, b, 0] == first
-        and nodes.pair[other, b, 1] == second
-    ):
-        for side in range(2):
-            angle = _turned(nodes.pose[one, a, side], nodes.pose[other, b, side])
-            bend += 0.25 * angle * _length(pieces.size, nodes.pair[one, a, side])
-        return _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend) and _deeper(
-            nodes, scratch, moving, pieces, inputs, covered, other, b, bend
-        )
-    place_arm(moving, pieces, scratch, nodes.q[other, b])
-    for side in range(2):
-        piece = nodes.pair[one, a, side]
-        angle = _turned(nodes.pose[one, a, side], scratch.pose[piece])
-        bend += 0.25 * angle * _length(pieces.size, piece)
-    for level in range(len(covered.inner)):
-        if _depth(scratch, moving, pieces, inputs, covered, first, second, level) > bend:
-            return _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend)
-    return False
-
-
-@njit(**STRICT)
-def _deeper(nodes, scratch, moving, pieces, inputs, covered, at, b, depth):
-    """Whether the pair that a candidate hits collides deeper than ``depth`` (m)."""
-    first, second = nodes.pair[at, b, 0], nodes.pair[at, b, 1]
-    while nodes.depth[at, b] <= depth:
-        level = nodes.level[at, b]
-        if level == len(covered.inner):
-            return False
-        _copy_pose(nodes.pose[at, b, 0], scratch.pose[first])
-        _copy_pose(nodes.pose[at, b, 1], scratch.pose[second])
-        known = _depth(scratch, moving, pieces, inputs, covered, first, second, level)
-        nodes.depth[at, b], nodes.level[at, b] = max(nodes.depth[at, b], known), level + 1
-    return True
-
-
-@njit(**STRICT)
-def _copy_pose(pose, out):
-    for i in range(12):
-        out[i] = pose[i]
-
-
-@njit(**STRICT)
-def _turned(pose, other):
-    """Return an upper bound of the angle (rad) between two poses (12,), up to a right angle."""
-    total = 0.0
-    for i in range(9):
-        total += (pose[i] - other[i]) ** 2
-    return 1.12 * math.sqrt(0.5 * total)
-
-
-@njit(**STRICT)
-def _length(size, k):
-    """Return the largest distance (m) of two points of a piece."""
-    x, y, z = size[k, 6], size[k, 7], size[k, 8]
-    return 2.0 * (math.sqrt(x * x + y * y + z * z) + size[k, 0])
-
-
-@njit(**STRICT)
-def _depth(scratch, moving, pieces, inputs, covered, first, second, level):
-    """Return by how much (m) more than it takes two pieces are certain to collide; else it is not positive.
-
-    Args:
-        level: which of the bodies inside the pieces tell.
-    """
-    bar = -HIT_BAND - pieces.size[first, 1] - pieces.size[second, 1]
-    if second > moving.objects[-1]:
-        bar += inputs.margin
-    if bar == -math.inf:
-        return -1.0
-    _, upper = distance_bounds(
-        covered.inner[level], scratch.pose, first, second, bar, math.inf, -math.inf, scratch.simplex
-    )
-    return bar - upper
