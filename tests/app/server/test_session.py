@@ -18,6 +18,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape, unescape
+from multiprocessing.connection import wait
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,7 @@ from app.server.session import Session
 from app.server.viser_server import any_port
 from symgrasp.world import BulletWorld
 from tests.app import failures
-from tests.app.wire import Wire
+from tests.app.wire import WAIT, Wire
 from tests.conftest import write_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -218,18 +219,26 @@ def signal_processes(number: int) -> None:
         os.kill(pid, number)
 
 
+def kill_processes() -> None:
+    """Kill them all, and wait until that can be known: the spare one must not be taken for alive."""
+    ends = [os.dup(process.sentinel) for process in multiprocessing.active_children()]
+    signal_processes(signal.SIGKILL)
+    for end in ends:
+        assert wait([end], timeout=WAIT)
+        os.close(end)
+
+
 @pytest.mark.parametrize("restart", ["Restart", "the next change"])
 def test_a_killed_process_is_reported_loses_nothing_and_can_be_restarted(server, restart):
     with server.visit() as visitor:
-        visitor.wait_for(ready)
+        first = picture(visitor.wait_for(ready))
         visitor.set("y (cm)", 1.0 if restart == "Restart" else 2.0)
-        visitor.wait_for("Computing the map of pick")
-        visitor.wait_for(ready)
+        visitor.wait_for(lambda html: picture(html) != first and ready(html))
         visitor.set("Rotation (°)", 20.0)
         signal_processes(signal.SIGSTOP)  # so that it cannot be done before it is killed
         visitor.set("x (cm)", 51.5 if restart == "Restart" else 51.0)
         visitor.wait_for("Computing the map of pick")
-        signal_processes(signal.SIGKILL)
+        kill_processes()
         visitor.wait_for("the process that computes ended unexpectedly (SIGKILL); what you set is kept")
         visitor.wait_for(lambda _: any(w.get("label") == "Restart" for w in visitor.widgets.values()))
         if restart == "Restart":
@@ -246,10 +255,9 @@ def test_a_killed_process_is_reported_loses_nothing_and_can_be_restarted(server,
 
 def test_cancelling_takes_effect_though_the_process_hears_nothing(server, monkeypatch):
     with server.visit() as visitor:
-        visitor.wait_for(ready)
+        first = picture(visitor.wait_for(ready))
         visitor.set("y (cm)", 3.0)
-        visitor.wait_for("Computing the map of pick")
-        visitor.wait_for(ready)
+        visitor.wait_for(lambda html: picture(html) != first and ready(html))
         signal_processes(signal.SIGSTOP)
         visitor.set("x (cm)", 52.5)
         visitor.wait_for("Computing the map of pick … 0 %")
