@@ -31,6 +31,7 @@ from symgrasp.caching import cache_folder
 __all__ = ["COMPILING_MESSAGE", "ENTRY", "SOURCES", "njit", "notify_on_compile"]
 
 SOURCES = (
+    "collision/*.py",
     "engine/*.py",
     "feasibility/margins.py",
     "ik/*.py",

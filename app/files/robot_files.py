@@ -17,13 +17,13 @@ from symgrasp.descriptions.xml_file import LARGEST_XML
 from symgrasp.errors import InputError, SceneError, UrdfError
 from symgrasp.feasibility.starter import robot_content
 from symgrasp.files import read_file
+from symgrasp.found_arms import find_arms
 from symgrasp.hands.measure import hand_yaml, measure_hand
 from symgrasp.references import package_dirs, resolve, sought
 from symgrasp.robot.catalogue import CatalogueRobot
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.format import ArmFile, HandFile, MountFile, RobotFile, xacro_texts
 from symgrasp.scene.scene import Scene
-from symgrasp.survey import find_arms
 
 from ..choices.robot_arms import arm_file, tool_link
 from .archives import unpack

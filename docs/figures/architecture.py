@@ -29,15 +29,16 @@ class Place(NamedTuple):
 
 
 PLACES = {
-    "symgrasp.compiling": Place(0, 1.5), "symgrasp.caching": Place(0.5, 0.75), "symgrasp.poses": Place(2, 0),
+    "symgrasp.compiling": Place(0, 1.2), "symgrasp.caching": Place(0.5, 0.75), "symgrasp.poses": Place(2, 0),
     "symgrasp.files": Place(1, 0),
     "symgrasp.errors": Place(4, 0), "symgrasp.progress": Place(6, 0), "symgrasp.meshes": Place(4.5, 1.15),
     "symgrasp.page": Place(5, 0.45), "symgrasp.references": Place(3, 0.75),
     "symgrasp.descriptions": Place(3, 1.55),
-    "symgrasp.object": Place(2, 2.2), "symgrasp.robot": Place(2, 3), "symgrasp.hands": Place(4, 3.5),
-    "symgrasp.survey": Place(4, 4.5),
+    "symgrasp.object": Place(2, 2.3), "symgrasp.robot": Place(2, 3), "symgrasp.hands": Place(4, 3.5),
+    "symgrasp.found_arms": Place(4, 4.5),
     "symgrasp.ik": Place(1, 4), "symgrasp.scene": Place(2, 4), "symgrasp.reason": Place(3, 4.5),
-    "symgrasp.world": Place(2, 5), "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),
+    "symgrasp.world": Place(2, 5), "symgrasp.collision": Place(0, 2),
+    "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),
     "symgrasp.plan": Place(2, 8), "symgrasp.planners": Place(2, 9), "symgrasp.motion": Place(1, 9.5),
     "symgrasp.bench": Place(2, 10),
     "symgrasp.cli": Place(2, 11), "symgrasp.__main__": Place(1, 12),

@@ -17,6 +17,7 @@ from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.starter import starter_scene
+from symgrasp.found_arms import find_arms
 from symgrasp.ik import ArmIK, GridSolvers, PitchedIK, solver_for
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
@@ -25,7 +26,6 @@ from symgrasp.robot.catalogue import CATALOGUE, CatalogueRobot
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.survey import find_arms
 from symgrasp.world import open_world
 
 __all__ = ["CHECKED", "GRID", "Check", "Refuted", "RobotRow", "check", "measure", "run"]

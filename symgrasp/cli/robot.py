@@ -11,8 +11,8 @@ from symgrasp.cli.shared import Commands, add_command, add_packages, say, write_
 from symgrasp.errors import InputError, SymgraspError, one_of
 
 if TYPE_CHECKING:
+    from symgrasp.found_arms import FoundArm
     from symgrasp.robot.model import RobotModel
-    from symgrasp.survey import FoundArm
 
 __all__ = ["add_parser", "run"]
 
@@ -54,8 +54,8 @@ def run(args: argparse.Namespace) -> int:
 
     from symgrasp.descriptions.srdf import find_srdf
     from symgrasp.feasibility.starter import robot_content, starter_scene
+    from symgrasp.found_arms import find_arms, in_catalogue
     from symgrasp.robot.model import RobotModel
-    from symgrasp.survey import find_arms, in_catalogue
 
     xacro_args = dict(args.xacro)
     model = RobotModel(path, srdf=find_srdf(path), xacro_args=xacro_args)

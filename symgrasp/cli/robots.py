@@ -10,8 +10,8 @@ from symgrasp.cli.shared import Commands, add_command, say
 from symgrasp.errors import SymgraspError
 
 if TYPE_CHECKING:
+    from symgrasp.found_arms import FoundArm
     from symgrasp.robot.catalogue import CatalogueArm, CatalogueRobot
-    from symgrasp.survey import FoundArm
 
 __all__ = ["add_parser", "run"]
 
@@ -23,10 +23,10 @@ def add_parser(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print every robot of the catalogue with its arms, solvers and hands; return the exit status."""
+    from symgrasp.found_arms import find_arms
     from symgrasp.references import resolve
     from symgrasp.robot.catalogue import CATALOGUE
     from symgrasp.robot.model import RobotModel
-    from symgrasp.survey import find_arms
 
     width = max(len(robot.name) for robot in CATALOGUE)
     for robot in CATALOGUE:

@@ -1,1 +1,1 @@
-"""The compiled search of maps: certified distances of convex pieces, and all cells in parallel."""
+"""The compiled search of maps: certificates for candidates, and all cells in parallel."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import njit
 from symgrasp.engine.search_types import Balance
-from symgrasp.engine.simplex import FAST
 from symgrasp.poses import Array
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.robot import Arm

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from symgrasp.collision.boxes import boxes_apart, oriented_boxes_apart
+from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
 from symgrasp.engine.kinematics import place_arm, place_hand
-from symgrasp.engine.simplex import FAST
 from symgrasp.ik.vectors import STRICT
 
 __all__ = ["mark_near"]

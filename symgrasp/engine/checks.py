@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import math
 
+from symgrasp.collision.boxes import boxes_apart, oriented_boxes_apart
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.simplex import FAST
+from symgrasp.collision.walk import next_near
 from symgrasp.compiling import njit
-from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
-from symgrasp.engine.distance import distance_bounds
-from symgrasp.engine.simplex import FAST
-from symgrasp.engine.walk import next_near
 
 __all__ = ["FREE_BAND", "HIT_BAND", "UNDECIDED", "check_arm", "check_hand", "check_row"]
 

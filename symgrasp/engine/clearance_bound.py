@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.kinematics import MovingPieces, compose, rotate
-from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.poses import Array, axis_frame, from_rotation, inverse
 
 __all__ = ["clearance_bound", "core"]

@@ -15,6 +15,8 @@ from functools import partial
 
 import numpy as np
 
+from symgrasp.collision.pieces import PackedPieces
+from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm
@@ -33,7 +35,6 @@ from symgrasp.engine.exclusion import (
     what_is_known,
 )
 from symgrasp.engine.kinematics import MovingPieces, Scratch, copied, place_arm, place_hand
-from symgrasp.engine.pieces import PackedPieces
 from symgrasp.engine.retreat_search import arm_retreats, copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
@@ -45,7 +46,6 @@ from symgrasp.engine.search_types import (
     new_branches,
 )
 from symgrasp.engine.threads import in_parallel
-from symgrasp.engine.tree import Tree
 from symgrasp.ik.at_phi import geometry_at
 from symgrasp.ik.branches import branch_count, branches_at
 from symgrasp.ik.chain import Chain

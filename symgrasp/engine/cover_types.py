@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.engine.pieces import PackedPieces
+from symgrasp.collision.pieces import PackedPieces
 from symgrasp.ik.at_phi import Locked
 from symgrasp.ik.chain import Chain
 from symgrasp.poses import Array

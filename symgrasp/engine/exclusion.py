@@ -4,7 +4,7 @@ A branch is excluded on a part by what is the matter with it at both ends:
 
 * the same joint is outside its limits by more than joints deviate from a straight line in between;
 * the same pair of pieces collides, deeper than their motion deviates from a straight line (see
-  `symgrasp.engine.inner_pieces` for how deep). Between two ends, the distance of two convex bodies along a
+  `symgrasp.collision.inner_pieces` for how deep). Between two ends, the distance of two convex bodies along a
   fixed direction is at most the larger one, but for how much their points leave straight lines, and for a
   quarter of the way that the turn of each body moves its far end: other points may be nearest at the
   other end;
@@ -17,9 +17,9 @@ from __future__ import annotations
 
 import math
 
+from symgrasp.collision.distance import distance_bounds
 from symgrasp.compiling import njit
 from symgrasp.engine.checks import HIT_BAND
-from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.kinematics import place_arm
 from symgrasp.ik.vectors import STRICT
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symgrasp.collision.boxes import box_of, boxes_of
+from symgrasp.collision.simplex import FAST
+from symgrasp.collision.walk import WAITING
 from symgrasp.compiling import njit
-from symgrasp.engine.boxes import box_of, boxes_of
-from symgrasp.engine.simplex import FAST
-from symgrasp.engine.walk import WAITING
 from symgrasp.poses import Array
 
 __all__ = [

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 
+from symgrasp.collision.boxes import boxes_apart, oriented_boxes_apart
+from symgrasp.collision.distance import between_centres, distance_bounds_from
+from symgrasp.collision.simplex import FAST
+from symgrasp.collision.walk import next_near
 from symgrasp.compiling import njit
-from symgrasp.engine.boxes import boxes_apart, oriented_boxes_apart
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED
-from symgrasp.engine.distance import between_centres, distance_bounds_from
 from symgrasp.engine.kinematics import compose, place_pieces
-from symgrasp.engine.simplex import FAST
-from symgrasp.engine.walk import next_near
 
 __all__ = ["check_path_of_arm", "check_path_of_hand", "write_tool"]
 

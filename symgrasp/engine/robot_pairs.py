@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symgrasp.collision.boxes import boxes_apart, boxes_of, oriented_boxes_apart
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.pieces import Piece, pack, pose_rows
+from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.engine.boxes import boxes_apart, boxes_of, oriented_boxes_apart
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
-from symgrasp.engine.distance import distance_bounds
-from symgrasp.engine.pieces import Piece, pack, pose_rows
-from symgrasp.engine.simplex import FAST
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Robot
 from symgrasp.world import BulletWorld

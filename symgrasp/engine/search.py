@@ -19,11 +19,12 @@ from queue import SimpleQueue
 
 import numpy as np
 
+from symgrasp.collision.pieces import PackedPieces
+from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm, check_row
 from symgrasp.engine.kinematics import MovingPieces, Scratch, place_arm, place_hand
-from symgrasp.engine.pieces import PackedPieces
 from symgrasp.engine.retreat_search import arm_retreats, copy_row, moved_along, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
@@ -42,7 +43,6 @@ from symgrasp.engine.search_types import (
     new_branches,
 )
 from symgrasp.engine.threads import in_parallel
-from symgrasp.engine.tree import Tree
 from symgrasp.ik.branches import branches_at
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.vectors import STRICT

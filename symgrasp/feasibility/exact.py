@@ -11,18 +11,18 @@ from time import perf_counter
 
 import numpy as np
 
+from symgrasp.collision.boxes import boxes_of
+from symgrasp.collision.inner_pieces import inner_pieces
+from symgrasp.collision.pieces import pose_rows
 from symgrasp.engine import search
 from symgrasp.engine.balance import loaded
-from symgrasp.engine.boxes import boxes_of
 from symgrasp.engine.broad_phase import mark_near
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.cover import FINEST, cover
 from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
-from symgrasp.engine.inner_pieces import inner_pieces
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
-from symgrasp.engine.pieces import pose_rows
 from symgrasp.engine.threads import core_count
 from symgrasp.feasibility.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.candidates import CandidateChecker

@@ -10,13 +10,13 @@ import yaml
 
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import MapMaker
+from symgrasp.found_arms import FoundArm
 from symgrasp.hands.measure import hand_yaml
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, inverse, translation
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.survey import FoundArm
 from symgrasp.world import check_homes, open_world, with_free_homes
 
 __all__ = ["robot_content", "scene_content", "starter_scene"]

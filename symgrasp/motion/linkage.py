@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.engine.boxes import boxes_of
-from symgrasp.engine.pieces import PackedPieces
+from symgrasp.collision.boxes import boxes_of
+from symgrasp.collision.pieces import PackedPieces
 from symgrasp.poses import Array
 
 __all__ = ["Linkage", "Workspace", "new_workspace"]

@@ -1,9 +1,9 @@
 """Proofs that straight lines in joint space are free, by conservative advancement. Compiled.
 
 At a point of the line every pair of pieces is certified to be apart by some distance, see
-`symgrasp.engine.distance`. No point of a piece moves further in the next stretch of the line than its speed
-and the largest acceleration allow, so a stretch in which no piece can use up the distance is free as a whole:
-the proof goes on at its end. Nothing is sampled.
+`symgrasp.collision.distance`. No point of a piece moves further in the next stretch of the line than its
+speed and the largest acceleration allow, so a stretch in which no piece can use up the distance is free as a
+whole: the proof goes on at its end. Nothing is sampled.
 
 For joint values ``q + t·d``, a point of a piece has the speed ``Σ dⱼ ∂p/∂qⱼ`` at ``t = 0``, and since
 ``∂²p/∂qᵢ∂qⱼ`` is no longer than ``∂p/∂qⱼ`` if i comes before j in the chain, its acceleration is at most
@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import math
 
+from symgrasp.collision.boxes import box_of, boxes_apart, oriented_boxes_apart
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.engine.boxes import box_of, boxes_apart, oriented_boxes_apart
 from symgrasp.engine.checks import FREE_BAND
-from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.kinematics import compose, rotate
-from symgrasp.engine.simplex import FAST
 
 __all__ = ["BLOCKED", "CLOSEST", "clearances", "line_clearance", "place", "tilt_excess"]
 

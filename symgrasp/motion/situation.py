@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from symgrasp.collision.pieces import PackedPieces, Piece, pack, pose_rows
+from symgrasp.collision.tree import Tree, build
 from symgrasp.engine.geometry import PlacedPiece, link_piece, object_piece, obstacle_pieces
-from symgrasp.engine.pieces import PackedPieces, Piece, pack, pose_rows
-from symgrasp.engine.tree import Tree, build
 from symgrasp.errors import NoPlanError
 from symgrasp.motion.joints import common_joint, joint_index, last_joint, moving_joints
 from symgrasp.motion.linkage import Linkage, Workspace, new_workspace

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.engine.simplex import FAST
 from symgrasp.motion.proof import line_clearance, place, tilt_excess
 from symgrasp.poses import Array
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.pieces import Piece, pack, pose_rows
 from symgrasp.compiling import njit
-from symgrasp.engine.distance import distance_bounds
-from symgrasp.engine.pieces import Piece, pack, pose_rows
 from symgrasp.poses import Array
 
 __all__ = ["Hands"]

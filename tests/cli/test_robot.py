@@ -8,11 +8,11 @@ import pytest
 
 from symgrasp.cli.main import main
 from symgrasp.feasibility.create import create_map
+from symgrasp.found_arms import find_arms
 from symgrasp.references import resolve
 from symgrasp.robot.catalogue import CATALOGUE
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
-from symgrasp.survey import find_arms
 
 CATALOGUED = {robot.name: robot for robot in CATALOGUE}
 

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.pieces import Piece, pack, pose_rows
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
-from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry
 from symgrasp.engine.kinematics import new_scratch, place_arm, place_hand
-from symgrasp.engine.pieces import Piece, pack, pose_rows
 from symgrasp.poses import axis_frame
 from symgrasp.robot.robot import Arm
 from symgrasp.world import BulletWorld

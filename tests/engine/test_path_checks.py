@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.pieces import pose_rows
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED
-from symgrasp.engine.distance import distance_bounds
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry
 from symgrasp.engine.kinematics import Scratch, new_scratch, place_arm, place_frames, place_hand
 from symgrasp.engine.path_checks import check_path_of_arm, check_path_of_hand, write_tool
-from symgrasp.engine.pieces import pose_rows
 from symgrasp.engine.search_types import Path
 from symgrasp.poses import axis_frame
 from symgrasp.robot.robot import Arm

@@ -15,6 +15,7 @@ from symgrasp.errors import UrdfError
 from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.starter import starter_scene
+from symgrasp.found_arms import find_arms
 from symgrasp.hands.measure import measure_hand
 from symgrasp.plan.verify import verify
 from symgrasp.planners.planning import plan_sequential
@@ -23,7 +24,6 @@ from symgrasp.references import resolve
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
-from symgrasp.survey import find_arms
 from symgrasp.world import open_world
 from tests.hands.test_finger_linkages import box
 

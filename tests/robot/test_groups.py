@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from symgrasp import survey
+from symgrasp import found_arms
 from symgrasp.cli.main import main
+from symgrasp.found_arms import find_arms
 from symgrasp.references import resolve
 from symgrasp.robot.groups import arm_group, arm_groups, group_links
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
-from symgrasp.survey import find_arms
 
 URDF = Path(__file__).parent.parent / "data/two_arms.urdf"
 EXAMPLES = "package://example-robot-data/robots/"
@@ -106,7 +106,7 @@ def test_an_end_effector_says_where_the_hand_is(tmp_path, monkeypatch, effector)
     groups = f"""<group name="arm"><chain base_link="torso_lift_link" tip_link="l_wrist_roll_link"/></group>
     <group name="gripper"><joint name="l_gripper_l_finger_joint"/><link name="l_gripper_palm_link"/></group>
     <end_effector name="hand" parent_link="{parent}" parent_group="arm" group="gripper"/>"""
-    monkeypatch.setattr(survey, "in_catalogue", lambda model: None)
+    monkeypatch.setattr(found_arms, "in_catalogue", lambda model: None)
     (arm,) = find_arms(described(tmp_path, groups, path))
     assert (arm.name, arm.tool, arm.named) == ("pr2", "l_gripper_palm_link", False)
     assert arm.hand is not None

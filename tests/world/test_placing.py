@@ -11,6 +11,7 @@ import trimesh
 
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.starter import robot_content
+from symgrasp.found_arms import find_arms
 from symgrasp.poses import translation
 from symgrasp.references import resolve
 from symgrasp.robot.catalogue import CATALOGUE
@@ -18,7 +19,6 @@ from symgrasp.robot.model import RobotModel
 from symgrasp.scene.format import RobotFile
 from symgrasp.scene.replacing import with_base, with_robot
 from symgrasp.scene.scene import Scene
-from symgrasp.survey import find_arms
 from symgrasp.world import placed
 
 coal = pytest.importorskip("coal")

@@ -20,9 +20,9 @@ import math
 
 import numpy as np
 
+from symgrasp.collision.pieces import SEED_GRID
+from symgrasp.collision.simplex import FAST, SURROUNDS, depth_inside, reduce_to_nearest
 from symgrasp.compiling import njit
-from symgrasp.engine.pieces import SEED_GRID
-from symgrasp.engine.simplex import FAST, SURROUNDS, depth_inside, reduce_to_nearest
 
 __all__ = ["between_centres", "distance_bounds", "distance_bounds_from"]
 

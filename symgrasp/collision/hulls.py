@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from symgrasp.engine.pieces import PackedPieces, Piece
-from symgrasp.engine.tree import Tree
+from symgrasp.collision.pieces import PackedPieces, Piece
+from symgrasp.collision.tree import Tree
 from symgrasp.poses import Array
 
 __all__ = ["with_hulls"]

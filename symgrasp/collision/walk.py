@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
+from symgrasp.collision.boxes import boxes_apart
+from symgrasp.collision.distance import between_centres, distance_bounds_from
+from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import njit
-from symgrasp.engine.boxes import boxes_apart
-from symgrasp.engine.distance import between_centres, distance_bounds_from
-from symgrasp.engine.simplex import FAST
 
 __all__ = ["WAITING", "next_near"]
 

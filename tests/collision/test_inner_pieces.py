@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symgrasp.engine.inner_pieces import inner_pieces
-from symgrasp.engine.pieces import Piece, pack
+from symgrasp.collision.inner_pieces import inner_pieces
+from symgrasp.collision.pieces import Piece, pack
 
 SEEDS = st.integers(0, 10_000)
 

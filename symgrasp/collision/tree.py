@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.engine.boxes import boxes_of
+from symgrasp.collision.boxes import boxes_of
 from symgrasp.poses import Array
 
 __all__ = ["Tree", "build", "grafted"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import njit
-from symgrasp.engine.simplex import FAST
 from symgrasp.poses import Array
 
 __all__ = ["box_of", "boxes_apart", "boxes_of", "oriented_boxes_apart"]

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from symgrasp.engine.pieces import PackedPieces
+from symgrasp.collision.pieces import PackedPieces
 from symgrasp.poses import Array
 
 __all__ = ["inner_pieces"]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from symgrasp.engine.flat_faces import FLATNESS, convex_faces
+from symgrasp.collision.flat_faces import FLATNESS, convex_faces
 
 
 def area(face: np.ndarray) -> float:

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from symgrasp.engine.boxes import box_of, boxes_of
-from symgrasp.engine.pieces import pose_rows
-from symgrasp.engine.tree import Tree, build
+from symgrasp.collision.boxes import box_of, boxes_of
+from symgrasp.collision.pieces import pose_rows
+from symgrasp.collision.tree import Tree, build
 
 
 def pieces(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:

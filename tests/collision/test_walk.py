@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from trimesh.creation import annulus, icosphere
 
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.flat_faces import convex_faces, fills_hull
+from symgrasp.collision.hulls import with_hulls
+from symgrasp.collision.pieces import Piece, joined, pack, pose_rows
+from symgrasp.collision.tree import build, grafted
+from symgrasp.collision.walk import next_near
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.engine.distance import distance_bounds
-from symgrasp.engine.flat_faces import convex_faces, fills_hull
-from symgrasp.engine.hulls import with_hulls
 from symgrasp.engine.kinematics import new_scratch
-from symgrasp.engine.pieces import Piece, joined, pack, pose_rows
-from symgrasp.engine.tree import build, grafted
-from symgrasp.engine.walk import next_near
 from symgrasp.poses import from_rotation, rotation_about
 
 SURE = 1e-3

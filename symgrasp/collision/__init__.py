@@ -1,0 +1,1 @@
+"""Convex pieces: certified distances, and trees to find near ones."""
