@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 PLACES = {
-    "symgrasp.compiling": Place(0, 1.2), "symgrasp.caching": Place(0.5, 0.75), "symgrasp.poses": Place(2, 0),
+    "symgrasp.compiling": Place(0, 1.3), "symgrasp.caching": Place(0.5, 0.7), "symgrasp.poses": Place(2, 0),
     "symgrasp.files": Place(1, 0),
     "symgrasp.errors": Place(4, 0), "symgrasp.progress": Place(6, 0), "symgrasp.meshes": Place(4.5, 1.15),
     "symgrasp.page": Place(5, 0.45), "symgrasp.references": Place(3, 0.75),
