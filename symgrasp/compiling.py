@@ -35,9 +35,9 @@ SOURCES = (
     "engine/*.py",
     "feasibility/margins.py",
     "ik/*.py",
-    "motion/linkage.py",
-    "motion/proof.py",
-    "motion/trees.py",
+    "motion/bodies/linkage.py",
+    "motion/paths/proof.py",
+    "motion/paths/trees.py",
     "object/manifold.py",
     "planners/*.py",
 )

@@ -8,11 +8,11 @@ from itertools import groupby, islice
 from typing import NamedTuple
 
 from symgrasp.errors import NoPlanError
+from symgrasp.motion.paths.search import NoMotionError
 from symgrasp.motion.planning import MotionPlanner
 from symgrasp.motion.record import with_motion
-from symgrasp.motion.search import NoMotionError
 from symgrasp.motion.segments import Motion
-from symgrasp.motion.timing import timed
+from symgrasp.motion.times.timing import timed
 from symgrasp.plan.plan import Plan
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.ik import Solver, redundancy_of, solver_for
-from symgrasp.motion.draft import MotionDraft
-from symgrasp.motion.search import NoMotionError
+from symgrasp.motion.bodies.situation import MotionScene
+from symgrasp.motion.drafting.draft import MotionDraft
+from symgrasp.motion.drafting.ways import Grip
+from symgrasp.motion.paths.search import NoMotionError
 from symgrasp.motion.segments import Motion
-from symgrasp.motion.situation import MotionScene
-from symgrasp.motion.ways import Grip
 from symgrasp.plan.plan import Hold, Plan
 from symgrasp.plan.writing import with_configurations
 from symgrasp.progress import Progress

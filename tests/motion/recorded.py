@@ -10,7 +10,7 @@ import numpy as np
 
 from symgrasp.motion.record import with_motion
 from symgrasp.motion.segments import Motion, Segment
-from symgrasp.motion.timing import timed
+from symgrasp.motion.times.timing import timed
 from symgrasp.plan.plan import Plan
 from symgrasp.scene.scene import Scene
 

@@ -11,7 +11,7 @@ from symgrasp.errors import Cancelled, NoPlanError, SceneError
 from symgrasp.motion.choosing import Failure, best_motion, failures_in_words
 from symgrasp.motion.planning import plan_motion
 from symgrasp.motion.segments import Motion
-from symgrasp.motion.timing import timed
+from symgrasp.motion.times.timing import timed
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
 from symgrasp.planners.planning import (

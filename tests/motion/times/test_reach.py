@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symgrasp.motion.reach import joint_reach
+from symgrasp.motion.times.reach import joint_reach
 from symgrasp.poses import Array
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene

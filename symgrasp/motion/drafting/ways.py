@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symgrasp.ik import Solver
-from symgrasp.motion.lines import configurations
+from symgrasp.motion.paths.lines import configurations
 from symgrasp.object.profile import Profile
 from symgrasp.plan.plan import Hold
 from symgrasp.poses import Array, from_rotation, pose_error, rotation_about, translation

@@ -12,9 +12,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from symgrasp.errors import SymgraspError
-from symgrasp.motion.proof import CLOSEST
-from symgrasp.motion.search import NoMotionError, connect, prove
-from symgrasp.motion.situation import MotionScene, Situation
+from symgrasp.motion.bodies.situation import MotionScene, Situation
+from symgrasp.motion.paths.proof import CLOSEST
+from symgrasp.motion.paths.search import NoMotionError, connect, prove
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symgrasp.ik import Solver
-from symgrasp.motion.search import NoMotionError, blockers, prove
-from symgrasp.motion.situation import Situation
+from symgrasp.motion.bodies.situation import Situation
+from symgrasp.motion.paths.search import NoMotionError, blockers, prove
 from symgrasp.poses import Array, inverse, pose_error
 
 __all__ = ["CLEAR", "LineTree", "configurations", "follow"]

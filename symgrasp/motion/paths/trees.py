@@ -14,7 +14,7 @@ import numpy as np
 
 from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.motion.proof import line_clearance, place, tilt_excess
+from symgrasp.motion.paths.proof import line_clearance, place, tilt_excess
 from symgrasp.poses import Array
 
 __all__ = ["Trees", "grow", "new_trees", "shorten"]

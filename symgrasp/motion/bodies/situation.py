@@ -11,9 +11,9 @@ from symgrasp.collision.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.collision.tree import Tree, build
 from symgrasp.engine.geometry import PlacedPiece, link_piece, object_piece, obstacle_pieces
 from symgrasp.errors import NoPlanError
-from symgrasp.motion.joints import common_joint, joint_index, last_joint, moving_joints
-from symgrasp.motion.linkage import Linkage, Workspace, new_workspace
-from symgrasp.motion.state import State
+from symgrasp.motion.bodies.joints import common_joint, joint_index, last_joint, moving_joints
+from symgrasp.motion.bodies.linkage import Linkage, Workspace, new_workspace
+from symgrasp.motion.bodies.state import State
 from symgrasp.poses import Array, inverse
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.robot import Arm, Robot

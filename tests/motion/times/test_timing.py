@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from symgrasp.motion.segments import Motion, Segment
-from symgrasp.motion.timing import GRIP_TIME, timed
+from symgrasp.motion.times.timing import GRIP_TIME, timed
 from symgrasp.poses import Array
 from symgrasp.scene.scene import Scene
 from tests.motion.straight import GRASPED, straight_motion

@@ -7,9 +7,9 @@ from collections import Counter
 import numpy as np
 
 from symgrasp.errors import NoPlanError
-from symgrasp.motion.proof import clearances
-from symgrasp.motion.situation import Situation
-from symgrasp.motion.trees import Trees, grow, new_trees, shorten
+from symgrasp.motion.bodies.situation import Situation
+from symgrasp.motion.paths.proof import clearances
+from symgrasp.motion.paths.trees import Trees, grow, new_trees, shorten
 from symgrasp.poses import Array
 from symgrasp.progress import Progress
 

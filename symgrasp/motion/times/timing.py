@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from symgrasp.errors import NoPlanError, SymgraspError
-from symgrasp.motion.reach import joint_reach
-from symgrasp.motion.rounding import RoundedPath, pieces
 from symgrasp.motion.segments import Motion, Segment
+from symgrasp.motion.times.reach import joint_reach
+from symgrasp.motion.times.rounding import RoundedPath, pieces
 from symgrasp.poses import Array, inverse
 from symgrasp.progress import Progress
 from symgrasp.robot.robot import Arm

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.errors import SceneError
-from symgrasp.motion.lines import LineTree, follow
-from symgrasp.motion.search import STATED, NoMotionError, blockers, connect, prove
+from symgrasp.motion.bodies.situation import MotionScene, Situation, State
+from symgrasp.motion.drafting.ways import LIFT, Grip, lifted, retreating, straight
+from symgrasp.motion.paths.lines import LineTree, follow
+from symgrasp.motion.paths.search import STATED, NoMotionError, blockers, connect, prove
 from symgrasp.motion.segments import Kind, Motion, Opening, Segment
-from symgrasp.motion.situation import MotionScene, Situation, State
-from symgrasp.motion.ways import LIFT, Grip, lifted, retreating, straight
 from symgrasp.plan.plan import Grasp, Hold, Plan, PlanTask
 from symgrasp.poses import Array
 from symgrasp.progress import Progress

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.motion.rounding import RoundedPath, pieces
+from symgrasp.motion.times.rounding import RoundedPath, pieces
 from symgrasp.poses import Array
 
 WEIGHT = np.array([1.0, 0.5, 2.0])

@@ -1,0 +1,1 @@
+"""What moves and what stands: the pieces of a scene as linkages."""

@@ -1,0 +1,1 @@
+"""The motion of a plan, part by part."""

@@ -1,0 +1,1 @@
+"""Paths that are proven free: straight ones of the tool, and free motion."""

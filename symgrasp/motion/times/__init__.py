@@ -1,0 +1,1 @@
+"""When a motion is where."""
