@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache
@@ -15,16 +16,28 @@ import numpy as np
 
 from symgrasp.files import write_atomically
 
-__all__ = ["cache_folder", "kept"]
+__all__ = ["cache_folder", "kept", "make_folder"]
 
-SOURCES = ("meshes/*.py", "robot/*.py", "world/*.py", "descriptions/*.py", "poses.py")
+SOURCES = (
+    "collision/*.py",
+    "descriptions/*.py",
+    "engine/clearance_bound.py",
+    "engine/kinematics.py",
+    "meshes/*.py",
+    "poses.py",
+    "robot/*.py",
+    "world/*.py",
+)
 """Files of this package with what is computed, and with what it is computed from."""
 
-LIBRARIES = ("numpy", "scipy", "trimesh", "pybullet")
+LIBRARIES = ("numba", "numpy", "pybullet", "scipy", "trimesh")
 """Packages that compute it."""
 
 MOST_BYTES = 200_000_000
 """When more than this is kept, the oldest half is removed: people may bring any number of robots."""
+
+STATES = 4
+"""Number of states of the files of this package whose folders are left, the present one among them."""
 
 
 def cache_folder(kind: str, sources: Iterable[str], versions: Iterable[str] = (), chosen: str = "") -> Path:
@@ -46,6 +59,23 @@ def cache_folder(kind: str, sources: Iterable[str], versions: Iterable[str] = ()
     return base / f"{kind}-{stamp.hexdigest()[:16]}"
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder of `cache_folder` if it is not there; then the oldest of its kind go, but for `STATES`.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    if folder.is_dir():
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    kind = folder.name.rpartition("-")[0]
+    with suppress(OSError):  # another process may do the same
+        others = [path for path in folder.parent.glob(f"{kind}-{'[0-9a-f]' * 16}") if path != folder]
+        others.sort(key=lambda path: path.stat().st_mtime)
+        for path in others[: -(STATES - 1)]:
+            shutil.rmtree(path, ignore_errors=True)
+
+
 def kept(key: tuple[object, ...], compute: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
     """Return arrays that were computed in this or an earlier run; compute and keep them if they were not.
 
@@ -61,7 +91,7 @@ def kept(key: tuple[object, ...], compute: Callable[[], tuple[np.ndarray, ...]])
         return tuple(found[f"arr_{k}"] for k in range(len(found.files)))
     arrays = compute()
     with suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(file.parent)
         with write_atomically(file) as stream:
             np.savez(stream, *arrays)
         _make_room(file.parent)

@@ -26,12 +26,13 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.typed_passes import NopythonTypeInference
 from numba.extending import register_jitable
 
-from symgrasp.caching import cache_folder
+from symgrasp.caching import cache_folder, make_folder
 
 __all__ = ["COMPILING_MESSAGE", "ENTRY", "SOURCES", "njit", "notify_on_compile"]
 
 SOURCES = (
     "collision/*.py",
+    "compiling.py",
     "engine/*.py",
     "feasibility/margins.py",
     "ik/*.py",
@@ -52,6 +53,9 @@ LOCK = "lock"
 ENTRY: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "_nrt": False}
 """Options of `njit` for functions that are called from Python and call inner ones. numba translates an inner
 function anew for entries with other options. Arrays are allocated by Python, not in compiled code."""
+
+MANGLED, ENVIRONMENT = "_ZN", "_ZN08NumbaEnv"
+"""How numba's names of compiled functions begin, and those of their environments."""
 
 log = logging.getLogger(__name__)
 
@@ -103,7 +107,7 @@ def njit(*, inner: bool = False, **options: Any) -> Callable[[Callable[..., Any]
         if _config.DISABLE_JIT:
             return function
         if inner:
-            return register_jitable(pipeline_class=_Compiler, **options)(function)
+            return register_jitable(pipeline_class=_Compiler, no_cfunc_wrapper=True, **options)(function)
         before = _config.CACHE_DIR
         _config.CACHE_DIR = _cache_dir(before)
         folder = _config.CACHE_DIR
@@ -115,6 +119,8 @@ def njit(*, inner: bool = False, **options: Any) -> Callable[[Callable[..., Any]
             _config.CACHE_DIR = before
         if settings["cache"]:
             compiled._cache.save_overload = _saving(compiled._cache.save_overload, folder)
+            if not options.get("_nrt", True):
+                compiled._cache.load_overload = compiled._cache._load_overload
         return compiled
 
     return compile_later
@@ -144,10 +150,15 @@ class _EntryLibrary(JITCodeLibrary):
     """The code of a function that is called from Python, with that of all inner functions that it calls."""
 
     def _optimize_final_module(self) -> None:
-        """Optimise all together; nobody else calls these copies, so LLVM may change how they are called."""
-        for function in self._final_module.functions:
-            if function.linkage == Linkage.linkonce_odr:
-                function.linkage = Linkage.internal
+        """Optimise all together; nobody else calls these copies, so LLVM may change how they are called.
+
+        Nor does anybody fill in their environments, which only functions called from Python have a use for.
+        numba keeps those that it finds, and imports the module of each when it loads the code again.
+        """
+        inner = [f for f in self._final_module.functions if f.linkage == Linkage.linkonce_odr]
+        unused = {ENVIRONMENT + function.name.removeprefix(MANGLED) for function in inner}
+        for value in [*inner, *(v for v in self._final_module.global_variables if v.name in unused)]:
+            value.linkage = Linkage.internal
         super()._optimize_final_module()
 
 
@@ -183,7 +194,7 @@ class _Compiler(CompilerBase):
 def _is_writable(folder: str) -> bool:
     """Whether files can be written in a folder, which is made; if not, a warning says so."""
     try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
+        make_folder(Path(folder))
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
         _warn_uncached(folder, error.strerror)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 __all__ = [
     "Array",
@@ -66,14 +65,41 @@ def rotation_z(angle: ArrayLike) -> Array:
 
 
 def from_position_quat(position: ArrayLike, quat: ArrayLike) -> Array:
-    """Assemble poses from positions (..., 3) and wxyz quaternions (..., 4) of any length."""
-    rotation = Rotation.from_quat(np.asarray(quat, dtype=float), scalar_first=True)
-    return from_rotation(rotation.as_matrix(), position)
+    """Assemble poses from positions (..., 3) and wxyz quaternions (..., 4) of any length.
+
+    Raises:
+        ValueError: a quaternion is zero.
+    """
+    quat = np.asarray(quat, dtype=float)
+    w, x, y, z = np.moveaxis(quat, -1, 0)
+    length = np.sqrt(x * x + y * y + z * z + w * w)
+    if (length == 0.0).any():
+        raise ValueError("a quaternion of length zero")
+    return from_rotation(_rotation(w / length, x / length, y / length, z / length), position)
 
 
 def from_position_rpy(position: ArrayLike, rpy: ArrayLike) -> Array:
     """Assemble a pose from a position (3,) and URDF roll, pitch, yaw (3,) in radians."""
-    return from_rotation(Rotation.from_euler("xyz", np.asarray(rpy, dtype=float)).as_matrix(), position)
+    half = np.asarray(rpy, dtype=float) / 2.0
+    (a, b, c), (d, e, f) = np.cos(half), np.sin(half)  # of roll, pitch, yaw
+    w, x, y, z = b * a, b * d, e * a, -e * d  # roll, then pitch
+    return from_rotation(_rotation(c * w - f * z, c * x - f * y, c * y + f * x, c * z + f * w), position)
+
+
+def _rotation(w: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
+    """Return the rotation matrices (..., 3, 3) of unit quaternions; every part has the batch shape.
+
+    The sums are those of `scipy.spatial.transform.Rotation`, whose import takes longer than most maps.
+    """
+    w, x, y, z = (np.asarray(part, dtype=float) for part in (w, x, y, z))
+    xx, yy, zz, ww = x * x, y * y, z * z, w * w
+    xy, zw, xz, yw, yz, xw = x * y, z * w, x * z, y * w, y * z, x * w
+    rows = [
+        [xx - yy - zz + ww, 2 * (xy - zw), 2 * (xz + yw)],
+        [2 * (xy + zw), -xx + yy - zz + ww, 2 * (yz - xw)],
+        [2 * (xz - yw), 2 * (yz + xw), -xx - yy + zz + ww],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def rpy(pose: ArrayLike) -> Array:
@@ -87,9 +113,33 @@ def rpy(pose: ArrayLike) -> Array:
 
 
 def quat_wxyz(pose: ArrayLike) -> Array:
-    """Return the wxyz quaternions (..., 4) of poses, with w >= 0."""
-    pose = np.asarray(pose, dtype=float)
-    return Rotation.from_matrix(pose[..., :3, :3]).as_quat(canonical=True, scalar_first=True)
+    """Return the wxyz quaternions (..., 4) of poses, with w >= 0.
+
+    Whichever of its four parts is largest is taken from the diagonal, which loses the fewest digits
+    (Shepperd, "Quaternion from rotation matrix", 1978).
+    """
+    R = np.asarray(pose, dtype=float)[..., :3, :3]
+    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    xy, xz, yz = R[..., 1, 0] + R[..., 0, 1], R[..., 2, 0] + R[..., 0, 2], R[..., 2, 1] + R[..., 1, 2]
+    xw, yw, zw = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    trace = xx + yy + zz
+    # Four times each quaternion's part w, x, y or z, times the quaternion (wxyz).
+    multiples = np.stack(
+        [
+            np.stack([1.0 + trace, xw, yw, zw], axis=-1),
+            np.stack([xw, 1.0 - trace + 2 * xx, xy, xz], axis=-1),
+            np.stack([yw, xy, 1.0 - trace + 2 * yy, yz], axis=-1),
+            np.stack([zw, xz, yz, 1.0 - trace + 2 * zz], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.stack([trace, xx, yy, zz], axis=-1).argmax(axis=-1)
+    quat = np.take_along_axis(multiples, largest[..., None, None], axis=-2)[..., 0, :]
+    w, x, y, z = np.moveaxis(quat, -1, 0)
+    quat = quat / np.sqrt(x * x + y * y + z * z + w * w)[..., None]
+    # Of the two quaternions of a rotation, that whose first part other than zero is positive.
+    first = np.take_along_axis(quat, (quat != 0.0).argmax(axis=-1)[..., None], axis=-1)
+    return np.where(first < 0.0, -quat, quat)
 
 
 def wxyz_to_xyzw(quat: ArrayLike) -> Array:

@@ -90,6 +90,25 @@ def test_the_folder_depends_on_sources_and_versions(tmp_path):
     assert caching.cache_folder("kept", ("files.py",), ("1",), str(tmp_path)) != at("1")
 
 
+def test_only_the_latest_states_are_left(tmp_path):
+    def make(digit, kind="kept"):
+        folder = tmp_path / f"{kind}-{digit * 16}"
+        caching.make_folder(folder)
+        os.utime(folder, (int(digit), int(digit)))
+        return folder
+
+    (tmp_path / "kept-by the user").mkdir()
+    other = make("1", "compiled")
+    folders = [make(digit) for digit in "123456"]
+    (folders[-1] / "file").touch()
+    caching.make_folder(folders[-1])  # is there already
+    left = [path for path in folders if path.is_dir()]
+    assert left == folders[-caching.STATES :]
+    assert (folders[-1] / "file").exists()
+    assert other.is_dir()
+    assert (tmp_path / "kept-by the user").is_dir()
+
+
 def test_a_mesh_that_changed_since_it_was_hashed_is_refused(folder, tmp_path):
     path = tmp_path / "box.off"
     path.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")

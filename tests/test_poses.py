@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from symgrasp import poses
@@ -23,6 +24,30 @@ def test_quaternion_round_trip_and_order(T):
         Rotation.from_quat(poses.wxyz_to_xyzw(quat)).as_matrix(), T[:3, :3], atol=1e-12
     )
     np.testing.assert_array_equal(poses.xyzw_to_wxyz(poses.wxyz_to_xyzw(quat)), quat)
+
+
+@given(random_poses(), st.tuples(angles, angles, angles), st.floats(0.1, 10))
+def test_rotations_agree_with_scipy(T, turns, length):
+    quat = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True, scalar_first=True)
+    np.testing.assert_allclose(poses.quat_wxyz(T), quat, atol=1e-15)
+    np.testing.assert_allclose(
+        poses.from_position_quat([1, 2, 3], length * quat)[:3, :3], T[:3, :3], atol=1e-12
+    )
+    expected = Rotation.from_euler("xyz", turns).as_matrix()
+    np.testing.assert_allclose(poses.from_position_rpy([1, 2, 3], turns)[:3, :3], expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "quat", [(0, 0, 0, 1), (0, 0, 1, 0), (0, 1, 0, 0), (0, 0.6, -0.8, 0), (0.5, -0.5, 0.5, -0.5)]
+)
+def test_quaternions_of_half_and_third_turns(quat):
+    R = Rotation.from_quat(quat, scalar_first=True).as_matrix()
+    np.testing.assert_allclose(poses.quat_wxyz(poses.from_rotation([R, R])), [quat, quat], atol=1e-15)
+
+
+def test_a_quaternion_of_no_length_is_refused():
+    with pytest.raises(ValueError, match="length zero"):
+        poses.from_position_quat(np.zeros((2, 3)), [[1, 0, 0, 0], [0, 0, 0, 0]])
 
 
 @given(random_poses())

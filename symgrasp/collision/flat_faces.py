@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import trimesh
-from scipy.spatial import ConvexHull, QhullError
 
 from symgrasp.poses import Array
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["convex_faces", "fills_hull"]
 
@@ -27,6 +30,8 @@ def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
 
     Triangles that share edges and lie in a plane are one polygon where they fill their convex hull.
     """
+    import trimesh
+
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices()
     single = np.ones(len(mesh.faces), dtype=bool)
@@ -41,6 +46,9 @@ def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
 
 def fills_hull(mesh: trimesh.Trimesh) -> bool:
     """Whether a mesh is the surface of its convex hull."""
+    import trimesh
+    from scipy.spatial import ConvexHull, QhullError
+
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices()
     if not mesh.is_watertight:
@@ -57,6 +65,8 @@ def fills_hull(mesh: trimesh.Trimesh) -> bool:
 
 def _polygon(triangles: Array) -> Array | None:
     """Return the corners (n, 3) of the convex polygon that triangles (k, 3, 3) form, None if they do not."""
+    from scipy.spatial import ConvexHull, QhullError
+
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     areas = 0.5 * np.linalg.norm(normals, axis=1)
     points = np.unique(triangles.reshape(-1, 3), axis=0)

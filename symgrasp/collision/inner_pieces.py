@@ -12,7 +12,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.poses import Array
@@ -55,6 +54,8 @@ def _ball(data: bytes, revolved: bool) -> tuple[Array, float, bool]:
     Returns:
         These, and whether the hull is a box or a cylinder along its axes.
     """
+    from scipy.spatial import ConvexHull, QhullError
+
     vertices = np.frombuffer(data).reshape(-1, 3)
     points = vertices
     if revolved:

@@ -7,13 +7,14 @@ contained in the piece, and smaller by at most the slack.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
+from symgrasp.caching import kept
 from symgrasp.poses import Array
 
 __all__ = ["SEEDS", "PackedPieces", "Piece", "joined", "pack", "pose_rows"]
@@ -141,10 +142,19 @@ def _hull(points: Array) -> tuple[Array, np.ndarray | None]:
         points = np.unique(points, axis=0)
     if len(points) <= BRUTE:
         return points, None
+    key = ("hull", hashlib.sha256(points.tobytes()).hexdigest())
+    corners, triangles = kept(key, lambda: _corners_and_triangles(points))
+    return corners, triangles if len(triangles) else None
+
+
+def _corners_and_triangles(points: Array) -> tuple[Array, np.ndarray]:
+    """Return the vertices of the hull of points, and its triangles: none where the points lie in a plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         hull = ConvexHull(points)
-    except QhullError:  # the points lie in a plane, so there are no triangles
-        return points, None
+    except QhullError:
+        return points, np.zeros((0, 3), dtype=int)
     order = np.full(len(points), -1)
     order[hull.vertices] = np.arange(len(hull.vertices))
     return points[hull.vertices], order[hull.simplices]

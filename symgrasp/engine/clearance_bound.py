@@ -11,14 +11,15 @@ the joints between two pieces drop out, so of up to three only one is left to be
 
 from __future__ import annotations
 
+import hashlib
 import math
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
+from symgrasp.caching import kept
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.compiling import ENTRY, njit
@@ -54,6 +55,27 @@ def clearance_bound(
         limits: (2, n) lower and upper limits (rad) of the arm's joints, infinite where there are none.
         most: distance (m) above which nothing matters.
     """
+    pairs = _pairs(moving, pieces, pose)
+    of_arm = (moving.joint_origin, moving.joint_axis, limits)
+    content = hashlib.sha256(b"".join(map(np.ndarray.tobytes, of_arm)))
+    for near, first, far, last in pairs:
+        for part in (near, far):
+            content.update(part.piece.vertices.tobytes() + part.pose.tobytes())
+        content.update(repr((first, last, near.piece[1:], far.piece[1:])).encode())
+
+    def compute() -> tuple[Array]:
+        found = most
+        for near, first, far, last in pairs:
+            found = _furthest(moving, limits, near, first, far, last, found)
+        return (np.array(found),)
+
+    (found,) = kept(("clearance bound", most, content.hexdigest()), compute)
+    return float(found)
+
+
+def _pairs(moving: MovingPieces, pieces: PackedPieces, pose: Array) -> list[tuple[_Part, int, _Part, int]]:
+    """Return the pairs of parts with one to three joints between them, each part with its joint."""
+    found = []
     count, hands = len(moving.frame), moving.hand.shape[1]
     frame = [*moving.frame.tolist(), *[-1] * (len(pose) - count)]
     finger = np.ptp(moving.hand, axis=0).max(axis=1, initial=0.0) > 0.0
@@ -62,8 +84,8 @@ def clearance_bound(
         if 1 <= frame[b] - frame[a] <= 3 and not (b < hands and finger[b]):
             near = _part(pieces, a, moving.local[a] if a < count else pose[a])
             far = _part(pieces, b, moving.local[b])
-            most = _furthest(moving, limits, near, frame[a], far, frame[b], most)
-    return most
+            found.append((near, frame[a], far, frame[b]))
+    return found
 
 
 def _part(pieces: PackedPieces, k: int, row: Array) -> _Part:
@@ -138,6 +160,8 @@ def _planes(vertices: bytes) -> Array | None:
 
     Links look the same in every engine, and around all of their axes.
     """
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         return ConvexHull(np.frombuffer(vertices).reshape(-1, 3)).equations
     except QhullError:

@@ -125,7 +125,7 @@ def _follow(limits, turns, q, inside, at):
             turn = 0.0
             for j in range(len(at)):
                 # A joint with a range above a full turn takes the value nearest to the present one.
-                near = q[b, j] + 2 * math.pi * np.round((at[j] - q[b, j]) / (2 * math.pi))
+                near = q[b, j] + 2 * math.pi * np.rint((at[j] - q[b, j]) / (2 * math.pi))
                 if limits[0, j] <= near <= limits[1, j]:
                     q[b, j] = near
                 turn = max(turn, abs(q[b, j] - at[j]))

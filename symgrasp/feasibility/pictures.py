@@ -11,12 +11,13 @@ import numpy as np
 
 from symgrasp.errors import printable, shortened
 from symgrasp.feasibility.color_by import ColoredMap
-from symgrasp.object.measure.measurement import Measurement
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from symgrasp.object.measure.measurement import Measurement
 
 __all__ = ["draw_errors", "draw_map", "draw_object", "draw_openings", "to_png", "to_svg"]
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import trimesh
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["depth_inside"]
 
@@ -13,6 +17,8 @@ def depth_inside(mesh: trimesh.Trimesh, point: np.ndarray) -> float:
 
     The signed solid angles of all triangles seen from the point add up to 4π inside and to 0 outside.
     """
+    import trimesh
+
     if not ((point >= mesh.bounds[0]) & (point <= mesh.bounds[1])).all():
         return 0.0
     corners = mesh.triangles - point

@@ -6,13 +6,15 @@ import io
 import logging
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
-from trimesh.resolvers import FilePathResolver
 
 from symgrasp.errors import MeshError, one_of
 from symgrasp.meshes.formats import FORMATS, Declared, ending_of_content
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["MESH_ENDINGS", "check_size", "joined", "read_groups", "read_mesh", "read_parts"]
 
@@ -70,6 +72,8 @@ def read_groups(path: Path, field: str = "mesh") -> list[trimesh.Trimesh]:
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Return several meshes as one, without colours."""
+    import trimesh
+
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     return trimesh.Trimesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces), process=False)
@@ -116,6 +120,9 @@ def _parts(
 
     An OBJ file is divided by its materials, or by its groups if these are asked for.
     """
+    import trimesh
+    from trimesh.resolvers import FilePathResolver
+
     declared = _declared(path, field)
     kind = path.suffix.lower()[1:]
     try:

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sized
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
 
 from symgrasp.errors import ProfileError
-from symgrasp.object.measure.measurement import Measurement, measure_mesh
 from symgrasp.poses import Array
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from symgrasp.object.measure.measurement import Measurement
 
 __all__ = ["COLLISION_FACETS", "MOST_KNOTS", "Profile"]
 
@@ -87,6 +91,8 @@ class Profile:
             MeshError: the file is unusable, or what it shows is no object of revolution; see
                 `symgrasp.object.measure.measurement.measure_mesh`, which also returns the deviations.
         """
+        from symgrasp.object.measure.measurement import measure_mesh
+
         return cls.measured(measure_mesh(path, scale=scale, tolerance=tolerance, flip=flip))
 
     @classmethod
@@ -176,6 +182,8 @@ class Profile:
 
     def mesh(self, facets: int = 96) -> trimesh.Trimesh:
         """Return the closed surface as a mesh in the object frame, with every circle as ``facets`` sides."""
+        import trimesh
+
         outline = np.column_stack([self._points[:, 1], self._points[:, 0]])
         ends = [(0.0, self.h_min)] if outline[0, 0] > 0 else []
         tail = [(0.0, self.h_max)] if outline[-1, 0] > 0 else []

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from symgrasp.object.manifold import Manifold, wrap
 from symgrasp.poses import Array
@@ -99,6 +98,8 @@ def handprint(hulls: Sequence[Array], manifold: Manifold, T_object_tool: Array) 
 
 def hull_edges(points: Array) -> np.ndarray:
     """Return the index pairs (m, 2) of the edges of the triangulated convex hull of points (n, 3)."""
+    from scipy.spatial import ConvexHull
+
     triangles = ConvexHull(points).simplices
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     low, high = np.sort(pairs, axis=1).astype(np.int64).T

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import trimesh
-import yourdfpy
-from scipy.spatial import ConvexHull, QhullError
 
 from symgrasp.caching import kept
+from symgrasp.descriptions.urdf import UrdfShape
 from symgrasp.errors import MeshError, UrdfError
 from symgrasp.files import file_sha256
 from symgrasp.meshes import check_size, joined, read_groups, read_mesh
 from symgrasp.poses import Array
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["CollisionShape", "collision_hulls", "link_shape", "shape_mesh"]
 
@@ -71,44 +72,28 @@ class CollisionShape(NamedTuple):
         return mesh
 
 
-def link_shape(path: Path, link: str, shape: yourdfpy.Collision) -> CollisionShape:
+def link_shape(path: Path, link: str, shape: UrdfShape) -> CollisionShape:
     """Return a collision shape of a URDF.
 
     Args:
         path: the URDF file, for error messages.
         link: the link that the shape belongs to.
-        shape: the shape as the parser has it; a mesh by its path.
+        shape: the shape as the URDF has it.
 
     Raises:
-        UrdfError: the shape has no geometry, a size is not a positive number, a scale is zero, or the file
-            of a mesh cannot be read.
+        UrdfError: a size is not a positive number, a scale is zero, or the file of a mesh cannot be read.
     """
-    geometry, field = shape.geometry, f"link {link}: collision"
-    if geometry is None:
-        raise UrdfError(path, field, None, "a geometry")
-    mesh, sha256 = None, ""
-    if geometry.box is not None:
-        kind, sizes = "box", np.ravel(geometry.box.size)
-    elif geometry.cylinder is not None:
-        kind, sizes = "cylinder", [geometry.cylinder.radius, geometry.cylinder.length]
-    elif geometry.sphere is not None:
-        kind, sizes = "sphere", [geometry.sphere.radius]
-    elif geometry.mesh is not None:
-        mesh, scale = Path(geometry.mesh.filename), geometry.mesh.scale
-        kind, sizes = "mesh", np.broadcast_to(np.ravel(1.0 if scale is None else scale), 3)
+    field, sha256 = f"link {link}: collision", ""
+    if shape.path is not None:
         try:
-            sha256 = file_sha256(mesh)
+            sha256 = file_sha256(shape.path)
         except OSError as error:
-            raise UrdfError(path, f"link {link}: mesh", str(mesh), "a readable mesh file") from error
-    else:
-        raise UrdfError(path, field, None, "a box, cylinder, sphere or mesh")
-    size = tuple(float(value) for value in sizes)
-    if not all(0 < (abs(value) if mesh else value) < LARGEST_SIZE for value in size):
-        raise UrdfError(path, field, list(size), "sizes that are positive numbers")
-    pose = np.eye(4) if shape.origin is None else np.asarray(shape.origin, dtype=float)
-    if not np.isfinite(pose).all():
-        raise UrdfError(path, f"{field}: origin", pose[:3, 3].tolist(), "finite numbers")
-    return CollisionShape(kind, size, mesh, pose, sha256=sha256)
+            raise UrdfError(path, f"link {link}: mesh", str(shape.path), "a readable mesh file") from error
+    if not all(0 < (abs(value) if shape.path else value) < LARGEST_SIZE for value in shape.size):
+        raise UrdfError(path, field, list(shape.size), "sizes that are positive numbers")
+    if not np.isfinite(shape.origin).all():
+        raise UrdfError(path, f"{field}: origin", shape.origin[:3, 3].tolist(), "finite numbers")
+    return CollisionShape(shape.kind, shape.size, shape.path, shape.origin, sha256=sha256)
 
 
 def shape_mesh(shape: CollisionShape, field: str, sides: int = SIDES) -> trimesh.Trimesh:
@@ -122,6 +107,8 @@ def shape_mesh(shape: CollisionShape, field: str, sides: int = SIDES) -> trimesh
     Raises:
         MeshError: its mesh is unusable.
     """
+    import trimesh
+
     if shape.kind == "box":
         mesh = trimesh.creation.box(extents=shape.size)
     elif shape.kind == "cylinder":
@@ -147,22 +134,26 @@ def collision_hulls(shape: CollisionShape, field: str) -> tuple[Array, ...]:
     Raises:
         MeshError: its mesh is unusable, or has no volume.
     """
-    if shape.kind == "box":
-        hulls = (trimesh.creation.box(extents=shape.size).vertices,)
-    elif shape.kind == "cylinder":
-        # Circumscribed, so that the hull contains the round shape.
-        radius, height = shape.size
-        around = radius / np.cos(np.pi / SIDES)
-        hulls = (trimesh.creation.cylinder(radius=around, height=height, sections=SIDES).vertices,)
-    elif shape.kind == "sphere":
-        ball = trimesh.creation.icosphere(subdivisions=3)
-        inradius = np.einsum("ij,ij->i", ball.face_normals, ball.triangles_center).min()
-        hulls = (ball.vertices * (shape.size[0] / inradius),)
-    else:
-        assert shape.path is not None
+    if shape.path is not None:
         hulls = _mesh_hulls(shape.path, shape.sha256, shape.size, field)
-    placed = (points @ shape.pose[:3, :3].T + shape.pose[:3, 3] for points in hulls)
-    return tuple(map(np.asarray, placed))  # trimesh tracks changes of its own arrays, which is slow
+    elif shape.kind == "box":
+        hulls = ((np.array(list(np.ndindex(2, 2, 2))) - 0.5) * shape.size,)
+    else:
+        hulls = kept(("hulls", shape.kind, shape.size), lambda: (_around(shape.kind, shape.size),))
+    return tuple(points @ shape.pose[:3, :3].T + shape.pose[:3, 3] for points in hulls)
+
+
+def _around(kind: str, size: tuple[float, ...]) -> Array:
+    """Return vertices (n, 3) whose hull contains a cylinder or a sphere: it is circumscribed."""
+    import trimesh
+
+    if kind == "cylinder":
+        radius, height = size
+        around = radius / np.cos(np.pi / SIDES)
+        return np.asarray(trimesh.creation.cylinder(radius=around, height=height, sections=SIDES).vertices)
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    inradius = np.einsum("ij,ij->i", ball.face_normals, ball.triangles_center).min()
+    return np.asarray(ball.vertices * (size[0] / inradius))
 
 
 @lru_cache(maxsize=1024)
@@ -196,6 +187,8 @@ def _computed_hulls(path: Path, size: tuple[float, ...], field: str) -> tuple[Ar
 
 def _scaled(mesh: trimesh.Trimesh, size: tuple[float, ...]) -> trimesh.Trimesh:
     """Return a mesh scaled by factors for x, y and z."""
+    import trimesh
+
     mirrored = np.prod(size) < 0  # a mirror image is inside out
     faces = mesh.faces[:, ::-1] if mirrored else mesh.faces
     return trimesh.Trimesh(mesh.vertices * size, faces, process=False)
@@ -209,6 +202,8 @@ def _is_closed(mesh: trimesh.Trimesh) -> bool:
 
 def _hull(mesh: trimesh.Trimesh) -> Array | None:
     """Return the vertices (n, 3) of the convex hull of a mesh, None where it is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         hull = ConvexHull(mesh.vertices)
     except QhullError:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import io
+import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yourdfpy
 from numpy.typing import ArrayLike
 
 from symgrasp.descriptions.description import read_description
 from symgrasp.descriptions.srdf import read_srdf
+from symgrasp.descriptions.urdf import UrdfJoint, UrdfRobot, read_urdf
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
@@ -72,19 +72,19 @@ class RobotModel:
         self.urdf = assemble(self.path, mounts, description.urdf)
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite are refused below
-                urdf = yourdfpy.URDF.load(io.BytesIO(self.urdf), build_scene_graph=False, load_meshes=False)
-            self.name = str(urdf.robot.name)
+                urdf = read_urdf(ET.fromstring(self.urdf))
+            self.name = urdf.name
             root = _root_link(urdf)
-        except Exception as error:  # the parser raises whatever its XML library raises
+        except (KeyError, ValueError) as error:
             raise UrdfError(path, "urdf", str(error), "a valid URDF document") from error
         self._shapes = {
             link.name: tuple(link_shape(self.path, link.name, shape) for shape in link.collisions)
-            for link in urdf.robot.links
+            for link in urdf.links
         }
-        inertials = {link.name: link_mass(self.path, link) for link in urdf.robot.links}
+        inertials = {link.name: link_mass(self.path, link) for link in urdf.links}
         self.sha256 = self._content_sha256()
         self._hulls: dict[str, tuple[tuple[Array, ...], ...]] = {}
-        self.joint_names = tuple(j.name for j in urdf.robot.joints if j.type in MOVING and j.mimic is None)
+        self.joint_names = tuple(j.name for j in urdf.joints if j.type in MOVING and j.mimic is None)
         self._indices = {name: k for k, name in enumerate(self.joint_names)}
         self._unusable_limits: dict[str, tuple[float, float] | None] = {}  # as the URDF states them
         self.joints, self.link_names = self._build_tree(urdf, root)
@@ -111,7 +111,7 @@ class RobotModel:
         disabled = self.srdf.disabled if self.srdf else frozenset[frozenset[str]]()
         return frozenset(pair for pair in disabled if pair <= self._shapes.keys())
 
-    def _build_tree(self, urdf: yourdfpy.URDF, root: str) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
+    def _build_tree(self, urdf: UrdfRobot, root: str) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
         """Return joints and link names in the order of a breadth-first walk from the root.
 
         Raises:
@@ -119,10 +119,10 @@ class RobotModel:
         """
         links = {root: 0}
         joints: list[Joint] = []
-        by_name = {j.name: j for j in urdf.robot.joints}
-        order = {j.name: k for k, j in enumerate(urdf.robot.joints)}
-        below: dict[str, list[yourdfpy.Joint]] = {}
-        for j in urdf.robot.joints:
+        by_name = {j.name: j for j in urdf.joints}
+        order = {j.name: k for k, j in enumerate(urdf.joints)}
+        below: dict[str, list[UrdfJoint]] = {}
+        for j in urdf.joints:
             below.setdefault(j.parent, []).append(j)
         ready = below.pop(root, [])
         while ready:
@@ -139,18 +139,15 @@ class RobotModel:
             raise UrdfError(self.path, "joint", hanging[0].name, "a parent link that hangs on the root")
         return tuple(joints), tuple(links)
 
-    def _joint(
-        self, j: yourdfpy.Joint, by_name: Mapping[str, yourdfpy.Joint], links: Mapping[str, int]
-    ) -> Joint:
+    def _joint(self, j: UrdfJoint, by_name: Mapping[str, UrdfJoint], links: Mapping[str, int]) -> Joint:
         """Convert a joint of the URDF; ``by_name`` holds all of them, ``links`` the indices of the links.
 
         Raises:
             UrdfError: its origin, axis or mimic reference is unusable.
         """
-        origin = np.eye(4) if j.origin is None else np.asarray(j.origin, dtype=float)
-        if not np.isfinite(origin).all():
-            raise UrdfError(self.path, f"joint {j.name}: origin", origin[:3, 3].tolist(), "finite numbers")
-        axis = np.array([1.0, 0.0, 0.0] if j.axis is None else j.axis, dtype=float)
+        if not np.isfinite(j.origin).all():
+            raise UrdfError(self.path, f"joint {j.name}: origin", j.origin[:3, 3].tolist(), "finite numbers")
+        axis = j.axis
         source, ratio, offset = -1, 1.0, 0.0
         lower, upper = -np.inf, np.inf
         if j.type in MOVING:
@@ -166,13 +163,11 @@ class RobotModel:
                 ends = [ratio * end + offset if ratio else offset for end in self._limits(followed)]
                 lower, upper = min(ends), max(ends)
         return Joint(
-            j.name, j.type, links[j.parent], links[j.child], origin, axis, lower, upper,
+            j.name, j.type, links[j.parent], links[j.child], j.origin, axis, lower, upper,
             source, ratio, offset, _stated_velocity(j),
         )  # fmt: skip
 
-    def _followed(
-        self, j: yourdfpy.Joint, by_name: Mapping[str, yourdfpy.Joint]
-    ) -> tuple[yourdfpy.Joint, float, float]:
+    def _followed(self, j: UrdfJoint, by_name: Mapping[str, UrdfJoint]) -> tuple[UrdfJoint, float, float]:
         """Return the joint that a joint follows in the end, itself unless it mimics, with ratio and offset.
 
         Raises:
@@ -187,14 +182,14 @@ class RobotModel:
             if name in seen:
                 raise UrdfError(self.path, where, name, "a joint that does not mimic this one in turn")
             seen.append(name)
-            offset += ratio * (0.0 if at.mimic.offset is None else float(at.mimic.offset))
-            ratio *= 1.0 if at.mimic.multiplier is None else float(at.mimic.multiplier)
+            offset += ratio * at.mimic.offset
+            ratio *= at.mimic.multiplier
             at = target
         if not (np.isfinite(ratio) and np.isfinite(offset)):
             raise UrdfError(self.path, f"joint {j.name}: mimic", [ratio, offset], "finite numbers")
         return at, ratio, offset
 
-    def _limits(self, j: yourdfpy.Joint) -> tuple[float, float]:
+    def _limits(self, j: UrdfJoint) -> tuple[float, float]:
         """Return the limits of a joint of the URDF, infinite where there are none.
 
         Those that are missing or not in order are noted: they matter only if the joint is used.
@@ -331,21 +326,21 @@ class RobotModel:
         return hash(self.sha256)
 
 
-def _stated_limits(j: yourdfpy.Joint) -> tuple[float, float] | None:
+def _stated_limits(j: UrdfJoint) -> tuple[float, float] | None:
     if j.limit is None or j.limit.lower is None or j.limit.upper is None:
         return None
-    return float(j.limit.lower), float(j.limit.upper)
+    return j.limit.lower, j.limit.upper
 
 
-def _stated_velocity(j: yourdfpy.Joint) -> float:
+def _stated_velocity(j: UrdfJoint) -> float:
     stated = j.limit.velocity if j.limit is not None else None
-    return float(stated) if stated is not None and 0 < stated < np.inf else DEFAULT_VELOCITY
+    return stated if stated is not None and 0 < stated < np.inf else DEFAULT_VELOCITY
 
 
-def _root_link(urdf: yourdfpy.URDF) -> str:
+def _root_link(urdf: UrdfRobot) -> str:
     """Return the only link that is no child of a joint; raise ValueError where there are none or several."""
-    children = {joint.child for joint in urdf.robot.joints}
-    roots = [link.name for link in urdf.robot.links if link.name not in children]
+    children = {joint.child for joint in urdf.joints}
+    roots = [link.name for link in urdf.links if link.name not in children]
     if len(roots) != 1:
         raise ValueError(f"{len(roots)} root links {roots}")
     return roots[0]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from symgrasp.poses import Array
 from symgrasp.robot.model import RobotModel
@@ -54,6 +53,8 @@ def area_of_feet(feet: Sequence[str], model: RobotModel, home: Array, T_world_ba
 
 def _convex(points: Array) -> Array | None:
     """Return the corners (k, 2) of the convex hull of points (n, 3) from above; None if it has no area."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         return points[ConvexHull(points[:, :2]).vertices, :2]
     except (QhullError, ValueError):

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import trimesh
 
 from symgrasp.errors import MeshError, SymgraspError
 from symgrasp.poses import Array
@@ -15,6 +14,9 @@ from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
 from symgrasp.world.client import link_names, load_urdf, pybullet, xyzw
 from symgrasp.world.collision import BodyName
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["MovableJoint", "SceneBodies"]
 
