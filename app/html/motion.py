@@ -24,7 +24,8 @@ def motion_html(state: State) -> str:
     if plan is None:
         return ""
     if plan.motion is None:
-        return f'<div class="sg sg-faint">{escape(NO_MOTION)}</div>'
+        changing = " sg-changing" if state.plan_results.changing else ""
+        return f'<div class="sg sg-faint{changing}">{escape(NO_MOTION)}</div>'
     moment = motion_state(state)
     now = "" if moment is None else _now(state, plan.motion.segments[moment.segment], moment.segment)
     return f'<div class="sg">{now}{_legend()}{_failures(state)}</div>'

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from html import escape
 from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import viser
+
+from symgrasp.errors import printable
 
 from ..render.playback import motion_state
 from ..scene3d.scene_view import SceneView
@@ -55,7 +58,9 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
         for t in _moments(state):
             recording.insert_sleep(FRAME)
             view.show(show_position(state, t), move_gizmo=False)
-        return recording.as_html(dark_mode=state.display.dark)
+        document = recording.as_html(dark_mode=state.display.dark)
+        title = f"<title>{escape(printable(state.scene.name))} · symgrasp</title>"
+        return document.replace("<title>Viser</title>", title, 1)
     finally:
         server.stop()
 

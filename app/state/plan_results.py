@@ -41,6 +41,9 @@ With most seeds they start apart, so that there is nothing to replay.
 SECONDS_PER_TASK = 2.0
 """Time (s) that the playback of a plan without a motion shows a task for."""
 
+FADE = 0.4
+"""Time (s) in which one picture of such a plan fades out, and that in which the next one fades in."""
+
 STEPS_PER_SECOND = 10.0
 """Speed of the replay of a climb."""
 
@@ -189,6 +192,13 @@ class PlanResults:
         if self.plan and self.plan.motion:
             return max(sum(start <= self.position for start, _ in self.plan.times) - 1, 0)
         return int(np.clip(np.floor(self.position + 0.5), 0, self.last))
+
+    @property
+    def changing(self) -> bool:
+        """Whether the picture of a task fades out: how the arms get to the next one is not planned."""
+        moves = self.plan is not None and self.plan.motion is not None
+        left = (self.nearest + 0.5 - self.position) * SECONDS_PER_TASK
+        return self.playing == "arms" and not moves and self.nearest < self.last and left < FADE
 
     def position_of(self, step: int) -> float:
         """Return the position of the playback at a task by its index."""

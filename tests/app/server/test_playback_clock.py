@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
+from app.html.motion import motion_html
 from app.server.playback_clock import INTERVAL, PlaybackClock
 from app.state import changes, plan_changes
-from app.state.plan_results import SECONDS_PER_TASK
+from app.state.plan_results import FADE, SECONDS_PER_TASK
 from tests.app.state.test_state import with_plan
 
 
@@ -54,3 +57,28 @@ def test_a_play_stops_where_the_person_has_moved_on(clock):
     state = clock.advanced(state, 1.0)
     assert not state.plan_results.playing
     assert clock.wait(state, 1.0) is None
+
+
+def test_a_picture_fades_out_before_the_next_and_the_last_one_stays(clock):
+    """The page hides the view while `changing`: what is drawn jumps only then, and is seen again after."""
+    state = clock.advanced(plan_changes.play_arms(with_plan("pick_pour_place", "sequential")), 0.0)
+    now, seen = 0.0, []
+    while state.plan_results.playing:
+        now += INTERVAL
+        seen.append((state.step, state.plan_results.changing))
+        state = clock.advanced(state, now)
+    steps = [step for step, _ in seen]
+    assert sorted(set(steps)) == [0, 1, 2]
+    for (step, hidden), (next_step, _) in pairwise(seen):
+        assert hidden or step == next_step
+    for step in (0, 1):
+        hidden = sum(hidden for at, hidden in seen if at == step)
+        assert hidden * INTERVAL == pytest.approx(FADE, abs=2 * INTERVAL)
+    assert (2, True) not in seen
+    assert motion_html(state).count("sg-changing") == 0
+
+
+def test_a_view_that_is_scrubbed_does_not_fade():
+    state = plan_changes.show_position(with_plan("pick_pour_place", "sequential"), 0.49)
+    assert not state.plan_results.changing
+    assert "sg-changing" in motion_html(plan_changes.play_arms(state))
