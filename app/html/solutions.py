@@ -2,31 +2,60 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+
+from symgrasp.plan.plan import CLEARANCE_LIMIT
 
 from ..state.plan_results import PlanResult
+from ..state.solution_list import listed, solution_numbers
+from ..state.solution_order import COLUMNS
 from ..state.state import State
 from .escaping import escape
-from .readout import pitch_text
 from .stack import margin_texts
 
 __all__ = ["solutions_html", "worst_margin_texts"]
 
 
-def solutions_html(state: State) -> str:
-    """List the plans, best first, the one that is shown marked; nothing if there is only one."""
-    plans = state.plan_results.plans
-    if len(plans) < 2:
+def solutions_html(state: State, target: Callable[[str], str]) -> str:
+    """List the plans in the chosen order, the one that is shown marked; nothing if there is only one.
+
+    Args:
+        state: the state.
+        target: gives the id of the button to press where a part of the list is clicked: by the index of a
+            plan as text, or by a column of `COLUMNS`, empty for the number.
+    """
+    results = state.plan_results
+    if len(results.plans) < 2:
         return ""
-    several = any(gap is not None for plan in plans for gap in plan.gaps)
-    headings = ("", "grasp", "gap" if several else "", "room along", "around", "clear")
-    rows = [_row(headings, "sg-faint")]
-    for k, plan in enumerate(plans):
-        css_class = "sg-now" if k == state.plan_results.index else ""
-        gaps = [gap for gap in plan.gaps if gap is not None]
-        gap = "" if not gaps else "overlap" if min(gaps) < 0 else f"{1e3 * min(gaps):.0f} mm"
-        rows.append(_row((str(k + 1), _grasps(plan), gap, *worst_margin_texts(plan)), css_class))
-    return f'<div class="sg-solutions" role="list" aria-label="solutions">{"".join(rows)}</div>'
+    numbers = [solution_numbers(plan) for plan in results.plans]
+    columns = [column for column in COLUMNS if any(row[column] for row in numbers)]
+    heads = []
+    for column in ("", *columns):
+        arrow = ("▲", "▼")[results.order.descending] if column == results.order.column else ""
+        name = column or "#"
+        heads.append(
+            f'<label for="{target(column)}" role="columnheader" title="sort by {escape(name)}">'
+            f"{escape(name)}{arrow}</label>"
+        )
+    rows = [f'<div role="row" class="sg-faint">{"".join(heads)}</div>']
+    for k in listed(results.plans, results.order):
+        texts = (str(k + 1), *(_text(column, numbers[k][column]) for column in columns))
+        cells = "".join(f'<span role="cell">{escape(text)}</span>' for text in texts)
+        now = ' class="sg-now" aria-selected="true"' if k == results.index else ""
+        rows.append(f'<label for="{target(str(k))}" role="row"{now}>{cells}</label>')
+    style = f"--columns: 2.2em repeat({len(columns)}, auto)"
+    return (
+        f'<div class="sg-solutions" role="table" aria-label="solutions" style="{style}">{"".join(rows)}</div>'
+    )
+
+
+def _text(column: str, numbers: tuple[float, ...]) -> str:
+    if column == "gap (mm)" and numbers and numbers[0] < 0:
+        return "overlap"
+    if column == "clear (mm)" and numbers[0] >= 1e3 * CLEARANCE_LIMIT:
+        return f"> {numbers[0]:.0f}"
+    digits = 1 if column in ("h (cm)", "θ (°)") else 0
+    return ", ".join(f"{round(number, digits) + 0.0:.{digits}f}" for number in numbers)
 
 
 def worst_margin_texts(plan: PlanResult) -> tuple[str, str, str]:
@@ -35,19 +64,3 @@ def worst_margin_texts(plan: PlanResult) -> tuple[str, str, str]:
     names = ("margin_along", "margin_around", "clearance")
     worst = {name: min(getattr(hold, name) for hold in holds) for name in names}
     return margin_texts(holds[0].model_copy(update=worst))
-
-
-def _grasps(plan: PlanResult) -> str:
-    """Return text for the grasps: height and roll of a single arm's, only the heights of several arms'."""
-    grasps = dict.fromkeys((hold.arm, hold.grasp) for task in plan.plan.tasks for hold in task.holds)
-    if len({arm for arm, _ in grasps}) > 1:
-        return "h = " + ", ".join(f"{100 * grasp.h:.1f}" for _, grasp in grasps) + " cm"
-    return ", ".join(
-        f"h = {100 * grasp.h:.1f} cm, roll {np.rad2deg(grasp.roll):.0f}°{pitch_text(grasp)}"
-        for _, grasp in grasps
-    )
-
-
-def _row(cells: tuple[str, ...], css_class: str) -> str:
-    spans = "".join(f"<span>{escape(cell)}</span>" for cell in cells)
-    return f'<div role="listitem" class="{css_class}">{spans}</div>'

@@ -14,6 +14,7 @@ from ..html.solutions import solutions_html
 from ..state import plan_changes
 from ..state.state import State
 from .actions import Actions
+from .click_targets import ClickTargets
 from .panel import Panel
 
 __all__ = ["PlanFilePanel", "PlanPanel"]
@@ -30,7 +31,10 @@ class PlanPanel(Panel):
         plans = actions.plans
         self.solution = gui.add_slider("Solution", 1, 2, 1, 1, visible=False)
         self.on(self.solution, lambda s, v: plan_changes.choose_plan(s, int(v) - 1), "scrub")
-        self.list = self.html()
+        self.folder = gui.add_folder("Solutions", visible=False)
+        with self.folder:
+            self.list = self.html()
+        self.targets = ClickTargets(gui, self.folder, self._clicked)
         self.text = self.html()
         self.more = self.button(
             "List more solutions", viser.Icon.LIST, plans.list_more, color="gray", visible=False
@@ -53,6 +57,13 @@ class PlanPanel(Panel):
             "With motion", viser.Icon.ROUTE, plans.find_motion, color="gray", visible=False
         )
 
+    def _clicked(self, target: str) -> None:
+        """Show the plan of a row, or sort by a heading."""
+        if target.isdigit():
+            self.actions.change(lambda s: plan_changes.choose_plan(s, int(target)))
+        else:
+            self.actions.change(lambda s: plan_changes.sort_solutions(s, target))
+
     def show(self, state: State) -> None:
         """List the plans and describe the one that is shown."""
         plan_results = state.plan_results
@@ -61,7 +72,8 @@ class PlanPanel(Panel):
             self.solution.max = len(plan_results.plans)
         self.solution.visible = several
         self.more.visible = plan_results.more
-        self.list.show(solutions_html(state))
+        self.list.show(solutions_html(state, self.targets.id))
+        self.folder.visible = several
         self.text.show(solution_html(state))
         moving = state.plan is not None and state.plan.motion is not None
         self.play.visible = plan_results.end > 0

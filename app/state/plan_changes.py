@@ -26,6 +26,7 @@ __all__ = [
     "show_position",
     "show_results",
     "show_step",
+    "sort_solutions",
 ]
 
 
@@ -35,9 +36,14 @@ def show_results(state: State, results: PlanResults) -> State:
 
 
 def more_listed(state: State, plans: tuple[PlanResult, ...], more: bool) -> State:
-    """Add further plans to the list, and show the first of them."""
-    after = replace(state, plan_results=state.plan_results.extended(plans, more=more))
-    return choose_plan(after, len(state.plan_results.plans)) if plans else after
+    """Add further plans to the list; the one that is shown stays."""
+    return replace(state, plan_results=state.plan_results.extended(plans, more=more))
+
+
+def sort_solutions(state: State, column: str) -> State:
+    """Sort the list of plans by a column, or the other way round if it is already; see `SolutionOrder`."""
+    results = state.plan_results
+    return replace(state, plan_results=replace(results, order=results.order.clicked(column)))
 
 
 def change_plan_results(state: State, change: Callable[[PlanResults], PlanResults]) -> State:

@@ -16,6 +16,7 @@ from symgrasp.planners.conflicts import Conflict
 from .cached import cached
 from .motion_times import task_times
 from .requests import Maps
+from .solution_order import SolutionOrder
 
 __all__ = [
     "FIRST_SEED",
@@ -136,6 +137,7 @@ class PlanResults:
         sequence_method, hands_method: the methods chosen.
         seed: of hill climbing.
         plans: the plans listed so far, best first.
+        order: what their list is sorted by.
         index: of the plan that is shown.
         more: whether there may be further plans.
         kind: which planner was run last.
@@ -155,6 +157,7 @@ class PlanResults:
     hands_method: str = "exact"
     seed: int = FIRST_SEED
     plans: tuple[PlanResult, ...] = ()
+    order: SolutionOrder = SolutionOrder()
     index: int = 0
     more: bool = False
     kind: PlanKind | None = None

@@ -28,6 +28,7 @@ FIGURES: dict[str, Callable[[], None]] = {
         holding.pick_pour_place,
         holding.tutorial,
         grids,
+        page.page_plays,
         page.page,
         page.page_two_robots,
     )
