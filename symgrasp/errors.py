@@ -7,6 +7,7 @@ through `printable` before it is shown, because names may hold anything.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from reprlib import Repr
@@ -34,6 +35,9 @@ LONGEST = 280
 _KEPT = 40
 """Characters of a source, a field and a value that a long text of what was expected leaves."""
 
+_AMOUNT = re.compile(r"[\d.,]+ [^\W\d_][^'\"]*")
+"""A number with its unit."""
+
 _SHORT = Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 4, 120, 120
 _SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = 8
@@ -58,11 +62,7 @@ class InputError(SymgraspError, ValueError):
         self.field = field
         self.value = value
         self.expected = expected
-        try:
-            shown = _SHORT.repr(value)
-        except ValueError:  # an integer of thousands of digits
-            shown = f"a very large {type(value).__name__}"
-        super().__init__(_line(self.source, field, shown, f"expected {expected}"))
+        super().__init__(_line(self.source, field, _shown(value), f"expected {expected}"))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arguments, because the default would pickle only the text."""
@@ -128,6 +128,22 @@ def shortened(text: str, most: int) -> str:
         return text
     tail = (most - 1) // 2
     return text[: most - 1 - tail] + "…" + text[len(text) - tail :]
+
+
+def _shown(value: object) -> str:
+    """Return a value as people say it: texts of files in quotes, amounts and what is not there in words."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (list, tuple, dict)) and not value:
+        return "an empty mapping" if isinstance(value, dict) else "an empty list"
+    if isinstance(value, str) and _AMOUNT.fullmatch(value):
+        return value
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # an integer of thousands of digits
+        return "a very large number"
 
 
 def _line(*parts: str) -> str:

@@ -19,3 +19,21 @@ def test_a_long_text_of_what_was_expected_leaves_the_rest():
     assert str(error).startswith("scene.yaml: robots[0].arms: 'panda")
     assert "one of 'arm'" in str(error)
     assert len(str(error)) <= LONGEST
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (None, "nothing"), ([], "an empty list"), ((), "an empty list"), ({}, "an empty mapping"),
+        (True, "true"), ("195.9 m", "195.9 m"), ("5,001 of them", "5,001 of them"),
+        ("panda", "'panda'"), ("", "''"), ("1 2", "'1 2'"), ("0.1", "'0.1'"), (0.1, "0.1"),
+    ],
+)  # fmt: skip
+def test_values_are_said_as_people_say_them(value, said):
+    assert (
+        str(InputError("scene.yaml", "robots", value, "more")) == f"scene.yaml: robots: {said}: expected more"
+    )
+
+
+def test_an_integer_of_thousands_of_digits_is_told():
+    assert "a very large number" in str(InputError("scene.yaml", "robots", 10**10_000, "a smaller one"))

@@ -20,6 +20,7 @@ from symgrasp.scene.scene import Scene
 from ..choices.object_choice import ObjectChoice
 from ..choices.scene_assets import BuiltScene
 from ..choices.uploaded_scene import UploadedScene
+from ..files.file_kinds import FileKind
 from ..state.plan_results import PlanResult
 from ..state.requests import (
     CompareRequest,
@@ -111,6 +112,10 @@ class ComputeProcess:
     def read_scene(self, name: str, content: bytes, folder: Path | None, progress: Progress) -> UploadedScene:
         """Read an uploaded scene; see `UploadService.read_scene`."""
         return self._call("read_scene", progress, name, content, folder, reads=name)
+
+    def file_kind(self, name: str, content: bytes, progress: Progress) -> FileKind | None:
+        """Return what an uploaded file is; see `UploadService.file_kind`."""
+        return self._call("file_kind", progress, content, reads=name)
 
     def read_robot(
         self,

@@ -28,7 +28,7 @@ from symgrasp.planners.planning import (
     plan_sequential,
     sequential_plans,
 )
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -54,6 +54,9 @@ __all__ = [
 
 PLANS_PER_BATCH = 10
 """How many plans are computed at a time."""
+
+SEARCH = 0.5
+"""Share of a planner's progress in which it searches; in the rest the plans are listed."""
 
 FeasibilityMaps = Mapping[tuple[str, str], FeasibilityMap]
 """(task, arm) → map."""
@@ -190,6 +193,7 @@ class PlanService:
         self._maps, self._folders = maps, folders
         self._plans: Plans | None = None
         self._scene: Scene | None = None
+        self._listed = 0
         self._progress: Progress | None = None
 
     def close(self) -> None:
@@ -220,7 +224,7 @@ class PlanService:
                 plan = plan_sequential(scene, request.name, maps, request.method, progress)
                 return PlanOutcome(request.kind, (plan_result(plan, scene),))
             self._progress, self._scene = progress, scene
-            self._plans = self._start_planner(request, scene, maps)
+            self._plans, self._listed = self._start_planner(request, scene, maps), 0
             plans, more = self._next_plans()
             assert plans  # without a plan it raises NoPlanError
             return PlanOutcome(request.kind, plans, more)
@@ -271,7 +275,8 @@ class PlanService:
     def _start_planner(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:
         def report_progress(share: float) -> None:
             assert self._progress  # replaced by every call, so that `more` reports its own
-            self._progress(share)
+            if not self._listed:
+                self._progress(SEARCH * share)
 
         if request.kind == "sequential":
             return sequential_plans(scene, request.name, maps, report_progress)
@@ -282,12 +287,16 @@ class PlanService:
     def _next_plans(self) -> tuple[tuple[PlanResult, ...], bool]:
         if self._plans is None or self._scene is None:
             return (), False
-        scene = self._scene
-        plans = tuple(plan_result(plan, scene) for plan in islice(self._plans, PLANS_PER_BATCH))
+        assert self._progress
+        plans: list[PlanResult] = []
+        for plan in islice(self._plans, PLANS_PER_BATCH):
+            plans.append(plan_result(plan, self._scene))
+            self._listed += 1
+            self._progress(SEARCH + (1 - SEARCH) * len(plans) / PLANS_PER_BATCH)
         more = len(plans) == PLANS_PER_BATCH
         if not more:
             self.close()
-        return plans, more
+        return tuple(plans), more
 
 
 def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: Progress) -> PlanOutcome:
@@ -295,14 +304,16 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
     steps: list[ClimbStep] = []
     climbed = exact = refusal = None
     try:
+        first = part_of(progress, 0, 2)
         plan = plan_bimanual(
-            scene, request.name, maps, "hill_climb", request.seed, progress=progress, trace=steps
+            scene, request.name, maps, "hill_climb", request.seed, progress=first, trace=steps
         )
         climbed = plan_result(plan, scene)
     except NoPlanError as error:
         refusal = Refusal(str(error))
     try:
-        exact = plan_result(plan_bimanual(scene, request.name, maps, progress=progress), scene)
+        exact_plan = plan_bimanual(scene, request.name, maps, progress=part_of(progress, 1, 2))
+        exact = plan_result(exact_plan, scene)
     except NoPlanError as error:
         refusal = Refusal(str(error))
     arms = request.tasks[0].arms

@@ -74,7 +74,8 @@ class _Server:
         self._methods: dict[str, Callable[..., Any]] = {
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
             "plan": plans.plan, "more": plans.more, "motion": plans.motion, "open": plans.open,
-            "read_scene": uploads.read_scene, "measure": uploads.measure, "mount": uploads.mount,
+            "read_scene": uploads.read_scene, "file_kind": uploads.file_kind,
+            "measure": uploads.measure, "mount": uploads.mount,
             "read_robot": uploads.read_robot, "put_robot": uploads.put_robot, "rearm": uploads.rearm,
         }  # fmt: skip
 

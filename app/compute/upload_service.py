@@ -20,6 +20,7 @@ from ..choices.object_choice import ObjectChoice, from_mesh
 from ..choices.scene_assets import BuiltScene, SceneAssets
 from ..choices.uploaded_scene import UploadedScene
 from ..files.archives import pack
+from ..files.file_kinds import FileKind, file_kind
 from ..files.robot_files import catalogue_entry, read_robot_entry, rearmed
 from ..files.scene_files import read_scene, read_scene_archive
 from ..scene3d.visual_meshes import read_visuals
@@ -59,6 +60,11 @@ class UploadService:
         progress(0.3)
         built = _checked(uploaded.scene, progress)
         return replace(uploaded, scene=built.scene, assets=SceneAssets(built.visuals))
+
+    def file_kind(self, content: bytes, progress: Progress) -> FileKind | None:
+        """Return what a file is; see `app.files.file_kinds.file_kind`."""
+        progress(0.0)
+        return file_kind(content)
 
     def measure(
         self, name: str, content: bytes, scale: float, tolerance: float | None, progress: Progress

@@ -151,7 +151,15 @@ def legend_html(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy = ColorBy
             f"<small>{count} · {escape(share)} %</small></div>"
         )
     scale = scale_html(colored.scale) if colored.scale else ""
-    return f'{scale}<div class="sg-legend">{"".join(rows)}</div>'
+    return f'{scale}<div class="sg-legend">{"".join(rows)}</div>{_counted(m, roll)}'
+
+
+def _counted(m: FeasibilityMap, roll: RollChoice) -> str:
+    """Say what a legend counts."""
+    rolls, heights, angles = m.reason.shape
+    which = f"the better of its {rolls} rolls" if roll is RollChoice.EITHER else f"roll {roll.value}"
+    text = f"{heights * angles} places on the object, each with {which}"
+    return f'<div class="sg sg-small sg-faint">{text}</div>'
 
 
 def scale_html(scale: Scale) -> str:

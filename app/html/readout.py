@@ -40,9 +40,11 @@ def comparison_html(state: State) -> str:
     if comparison is None:
         return '<div class="sg sg-faint">The map is being computed from scratch …</div>'
     turn, cells = np.rad2deg(comparison.request.delta), comparison.map.reason.size
+    rolls, heights, angles = comparison.map.reason.shape
     return (
         f'<div class="sg sg-check" role="status">Above: shifted. Below: from scratch for {turn:.2f}°: '
-        f"<b>{comparison.differing} of {cells} cells differ.</b></div>"
+        f"<b>{comparison.differing} of {cells} cells differ</b>: {heights * angles} places "
+        f"with {rolls} rolls each.</div>"
     )
 
 
@@ -153,7 +155,8 @@ def tasks_html(state: State) -> str:
         rows.append(
             f"<div{now}>{k} · {escape(task.name)} <small>{escape(', '.join(task.arms))}</small></div>"
         )
-    return f'<div class="sg sg-tasks">{"".join(rows)}</div>'
+    where = f"A new task comes after {state.task}, the chosen one."
+    return f'<div class="sg sg-tasks">{"".join(rows)}<small>{escape(where)}</small></div>'
 
 
 def solution_html(state: State) -> str:

@@ -29,7 +29,7 @@ class PlanActions(Protocol):
         """Find the motion of the plan that is shown, or of the first one after it that has one."""
 
     def open_file(self, name: str, content: bytes) -> None:
-        """Verify an uploaded plan file, and show the plan if it holds."""
+        """Verify an uploaded plan file, and show the plan if it holds; or open the scene, if it is one."""
 
     def download(self, format_name: str) -> None:
         """Send the plan to the browser in a format, a key of `app.files.plan_formats.FORMATS`."""
@@ -59,7 +59,7 @@ class Actions(Protocol):
         """Open a scene by its name in the menu."""
 
     def upload_scene(self, name: str, content: bytes) -> None:
-        """Open the scene in an uploaded file with this content."""
+        """Open the scene, or the plan, in an uploaded file with this content."""
 
     def save_scene(self) -> None:
         """Send the scene to the browser as a YAML file."""
@@ -75,6 +75,13 @@ class Actions(Protocol):
             content: of the file.
             scale: metres in one unit of the mesh.
             tolerance: largest deviation from symmetry (m), None for the default.
+        """
+
+    def measure_again(self, scale: float, tolerance: float | None) -> None:
+        """Measure the mesh that was refused last with another unit or tolerance; nothing if none was.
+
+        Args:
+            scale, tolerance: as of `upload_object`.
         """
 
     def choose_robot(self, option: str) -> None:

@@ -47,12 +47,12 @@ class ObjectPanel(Panel):
             hint="How far an uploaded mesh may deviate from symmetry; 0 for the larger of 1.5 mm and 3 % of "
             "the radius. The object may stick out of what is planned with by that much.",
         )  # fmt: skip
+        self.on_select(self.unit, lambda _: self.actions.measure_again(*self._measures()))
+        self.on_select(self.tolerance, lambda _: self.actions.measure_again(*self._measures()))
         self.upload = self.upload_button(
             "Upload a mesh",
             UPLOAD_LIMIT,
-            lambda name, content: self.actions.upload_object(
-                name, content, UNITS[self.unit.value], self.tolerance.value / 1e3 or None
-            ),
+            lambda name, content: self.actions.upload_object(name, content, *self._measures()),
             mime_type=",".join(MESH_ENDINGS),
             hint=limit,
         )
@@ -66,6 +66,10 @@ class ObjectPanel(Panel):
         )
         self.surface_colors = self.dropdown("Colours", SURFACE_COLORS, visible=False)
         self.on(self.surface_colors, lambda s, v: changes.switched(s, symmetry_error=v == SURFACE_COLORS[1]))
+
+    def _measures(self) -> tuple[float, float | None]:
+        """Return what is chosen: metres in a unit of a mesh, and the tolerance (m), None for the default."""
+        return UNITS[self.unit.value], self.tolerance.value / 1e3 or None
 
     def _build_pose(self) -> None:
         gui = self.gui

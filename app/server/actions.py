@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 
 import viser
 
@@ -16,7 +15,6 @@ from ..choices.object_choice import OWN, ObjectChoice, check_size, from_library
 from ..choices.robot_arms import IN_URDF, hand_option, tool_link
 from ..choices.robot_choice import OWN_ROBOT, UploadedRobot, catalogue_robot
 from ..choices.scene_assets import BuiltScene, UploadFolder
-from ..choices.uploaded_scene import UploadedScene
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
 from ..files.links import Link
@@ -29,7 +27,7 @@ from .browser_messages import UploadButton
 from .plan_actions import PlanActions
 from .session_api import SessionApi
 from .snapshot import snapshot_html
-from .viser_server import end_upload
+from .viser_server import end_upload, hide_upload
 
 __all__ = ["Actions", "camera_of"]
 
@@ -61,6 +59,7 @@ class Actions:
         self._process, self._address, self._upload_buttons = process, address, upload_buttons
         self.plans = PlanActions(session, process, cache)
         self.change = session.change
+        self._refused_mesh: tuple[str, bytes] | None = None
 
     # -- scene, object, hand ----------------------------------------------------------------
 
@@ -78,16 +77,8 @@ class Actions:
         )
 
     def upload_scene(self, name: str, content: bytes) -> None:
-        """Read an uploaded scene and show it."""
-
-        def run(progress: Progress) -> UploadedScene:
-            if not name.lower().endswith(".zip"):
-                return self._process.read_scene(name, content, None, progress)
-            folder = UploadFolder()
-            uploaded = self._process.read_scene(name, content, folder.path, progress)
-            return replace(uploaded, assets=replace(uploaded.assets, folders=(folder,)))
-
-        self._session.submit(f"Opening {name}", run, changes.open_upload)
+        """Open the scene in an uploaded file; or the plan, if it is one."""
+        self.plans.open_file(name, content, "scene")
 
     def choose_object(self, option: str) -> None:
         """Replace the scene's object by an option of the menu."""
@@ -104,12 +95,19 @@ class Actions:
         except SymgraspError as error:
             self._fail(error)
             return
-        self._change_object(
-            f"Measuring {name}",
-            lambda progress: _with_object(
-                state, self._process.measure(name, content, scale, tolerance, progress)
-            ),
-        )
+        self._refused_mesh = name, content
+
+        def run(progress: Progress) -> SceneWithObject:
+            measured = self._process.measure(name, content, scale, tolerance, progress)
+            self._refused_mesh = None
+            return _with_object(state, measured)
+
+        self._change_object(f"Measuring {name}", run)
+
+    def measure_again(self, scale: float, tolerance: float | None) -> None:
+        """Measure the mesh that was refused last in another way, see `app.panels.actions.Actions`."""
+        if self._refused_mesh:
+            self.upload_object(*self._refused_mesh, scale, tolerance)
 
     def choose_robot(self, option: str) -> None:
         """Replace the robot of the chosen arm by an option of the menu."""
@@ -227,7 +225,9 @@ class Actions:
             limits = f"{size / 1e6:.1f} MB", f"a file of at most {limit / 1e6:g} MB"
             self._fail(InputError(name, "size of the file", *limits))
 
-        self._upload_buttons[uuid] = UploadButton(limit, refuse)
+        self._upload_buttons[uuid] = UploadButton(
+            limit, refuse, lambda transfer: hide_upload(self._client, transfer)
+        )
 
     def save_map(self, kind: str) -> None:
         """Send the map that is shown as a picture, in a format of `app.render.map_picture.FORMATS`."""

@@ -9,11 +9,15 @@ from dataclasses import replace
 from symgrasp.errors import InputError
 from symgrasp.progress import Progress
 
+from ..choices.scene_assets import UploadFolder
+from ..choices.uploaded_scene import UploadedScene
 from ..compute.cache import SharedCache
 from ..compute.compute_process import ComputeProcess
 from ..compute.plan_service import MotionRequest, OpenedPlan, PlanRequest
+from ..files.file_kinds import FileKind
 from ..files.plan_formats import FORMATS
 from ..state.changes import open_upload
+from ..state.job_changes import failed
 from ..state.plan_changes import more_listed, motion_found, show_results
 from ..state.plan_results import PlanKind, PlanResults
 from ..state.requests import MapRequest, Maps
@@ -77,14 +81,39 @@ class PlanActions:
             lambda state, found: motion_found(state, first + found.index, found.plan, found.failures),
         )
 
-    def open_file(self, name: str, content: bytes) -> None:
-        """Verify an uploaded plan file, and show the plan if it holds."""
+    def open_file(self, name: str, content: bytes, expected: FileKind = "plan") -> None:
+        """Open an uploaded file as what it is: verify a plan, and show it if it holds; or show a scene.
 
-        def run(progress: Progress) -> tuple[OpenedPlan, Maps]:
+        Args:
+            name: of the file.
+            content: of the file.
+            expected: what it is taken for where it is neither, so that an error can say what is wrong.
+        """
+
+        def run(progress: Progress) -> UploadedScene | tuple[OpenedPlan, Maps]:
+            kind = self._process.file_kind(name, content, progress) or expected
+            if kind == "scene":
+                return self._read_scene(name, content, progress)
             opened = self._process.open(content, name, lambda share: progress(share / 2))
             return opened, self._maps(opened.maps, lambda share: progress((1 + share) / 2))
 
-        self._session.submit(f"Verifying {name}", run, lambda state, result: show_opened_plan(state, *result))
+        def show(state: State, result: UploadedScene | tuple[OpenedPlan, Maps]) -> State:
+            if isinstance(result, UploadedScene):
+                return open_upload(state, result)
+            after = show_opened_plan(state, *result)
+            if expected == "scene" and result[0].plan is None:
+                return failed(after, f"{name} is a plan that does not hold: the tab Sequence says why")
+            return after
+
+        self._session.submit(f"{'Verifying' if expected == 'plan' else 'Opening'} {name}", run, show)
+
+    def _read_scene(self, name: str, content: bytes, progress: Progress) -> UploadedScene:
+        """Read an uploaded scene; an archive is unpacked into a folder of its own."""
+        if not name.lower().endswith(".zip"):
+            return self._process.read_scene(name, content, None, progress)
+        folder = UploadFolder()
+        uploaded = self._process.read_scene(name, content, folder.path, progress)
+        return replace(uploaded, assets=replace(uploaded.assets, folders=(folder,)))
 
     def _maps(self, requests: Sequence[MapRequest], progress: Progress) -> Maps:
         """Return maps by task and arm, computing those that are not cached."""

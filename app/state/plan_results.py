@@ -16,7 +16,7 @@ from symgrasp.planners.conflicts import Conflict
 from .cached import cached
 from .motion_times import task_times
 from .requests import Maps
-from .solution_order import SolutionOrder
+from .solution_order import PLANNED, SolutionOrder
 
 __all__ = [
     "FIRST_SEED",
@@ -157,7 +157,7 @@ class PlanResults:
     hands_method: str = "exact"
     seed: int = FIRST_SEED
     plans: tuple[PlanResult, ...] = ()
-    order: SolutionOrder = SolutionOrder()
+    order: SolutionOrder = PLANNED
     index: int = 0
     more: bool = False
     kind: PlanKind | None = None

@@ -13,7 +13,7 @@ __all__ = ["listed", "solution_numbers"]
 
 
 def solution_numbers(plan: PlanResult) -> dict[str, tuple[float, ...]]:
-    """Return for each of `app.state.solution_order.COLUMNS` the numbers of a plan: of every grasp, or the least of all hands and tasks.
+    """Return for each of `COLUMNS` the numbers of a plan: of its grasps, or the least of all hands and tasks.
 
     Arms come in the order of the plan. Columns that say nothing of it are empty.
     """

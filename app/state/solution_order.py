@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-__all__ = ["COLUMNS", "SolutionOrder"]
+__all__ = ["COLUMNS", "PLANNED", "SolutionOrder"]
 
 COLUMNS: Mapping[str, bool] = {
     "h (cm)": False, "θ (°)": False, "roll (°)": False, "pitch (°)": False,
@@ -30,3 +30,7 @@ class SolutionOrder(NamedTuple):
         if column == self.column:
             return SolutionOrder(column, not self.descending)
         return SolutionOrder(column, COLUMNS.get(column, False))
+
+
+PLANNED = SolutionOrder()
+"""The order of the planner."""

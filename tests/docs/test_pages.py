@@ -120,7 +120,7 @@ def test_links_and_pictures_lead_somewhere(page):
 
 
 def test_every_picture_is_made_and_shown():
-    found = [p for page in PAGES for p in re.findall(r"[\w/]+\.(?:png|svg)(?=\))", page.read_text())]
+    found = [p for page in PAGES for p in re.findall(r"[\w/]+\.(?:png|svg|webp)(?=\))", page.read_text())]
     names = {Path(p).stem for p in found}
     assert {path.stem for path in IMAGES.iterdir()} == names
     assert {n for n in names if not n.startswith(TUTORIAL)} == {n for n in FIGURES if n != "tutorial"}

@@ -189,7 +189,7 @@ def test_a_scene_that_asks_for_the_servers_files_is_refused(open_page, content, 
     large.write_bytes(bytes(1_000_001))
     open_scene(page, large)
     expect(page.alerts).to_contain_text(
-        "large.yaml: size of the file: '1.0 MB': expected a scene of at most 1 MB"
+        "large.yaml: size of the file: 1.0 MB: expected a scene of at most 1 MB"
     )
     maps(page)
     page.expect_title("bottle_on_table")

@@ -372,7 +372,7 @@ def test_meshes_that_are_unusable_are_refused_in_a_line(open_page, bottle_map, t
     large = tmp_path / "large.stl"
     large.write_bytes(bytes(20_000_001))
     page.upload(large)
-    expect(page.alerts).to_contain_text("large.stl: size of the file: '20.0 MB'")
+    expect(page.alerts).to_contain_text("large.stl: size of the file: 20.0 MB")
     expect(page.alerts).to_contain_text("at most 20 MB")
     expect(page.page.get_by_label("Object", exact=True)).to_have_value("the scene's own")
     page.expect_title("bottle_on_table")

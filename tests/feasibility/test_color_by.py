@@ -69,6 +69,15 @@ def test_what_was_not_found_looks_like_no_other_reason(eyes):
     assert np.delete(apart, Reason.NOT_FOUND).min() > 15
 
 
+@pytest.mark.parametrize("eyes", SEEN)
+def test_no_two_reasons_look_equal(eyes):
+    seen = lab(np.array([[int(r.color[k : k + 2], 16) for k in (1, 3, 5)] for r in Reason]), eyes)
+    apart = np.linalg.norm(seen[:, None] - seen[None], axis=-1) + np.diag(np.full(len(Reason), np.inf))
+    assert apart.min() > 14
+    assert apart[Reason.SELF_COLLISION, Reason.OBJECT_COLLISION] > 25
+    assert apart[Reason.FEASIBLE, Reason.SCENE_COLLISION] > 20  # green and red differ in lightness as well
+
+
 @pytest.mark.parametrize("color_by", ColorBy)
 def test_every_cell_is_counted_and_coloured_as_the_legend_says(bottle_map, color_by):
     values = bottle_map.values(color_by)

@@ -100,5 +100,5 @@ def test_on_the_command_line(name, tmp_path, capsys):
     assert out.stat().st_size > 10_000
     recorded_plan().model_copy(update={"motion": None}).save(path)
     assert main(["export", name, str(path), "--out", str(tmp_path / "none")]) == 2
-    assert "motion: None: expected a plan with a motion" in capsys.readouterr().err
+    assert "motion: nothing: expected a plan with a motion" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()

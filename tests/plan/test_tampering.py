@@ -108,7 +108,7 @@ def around(content: dict) -> None:
         (sequential, lambda c: c.pop("units"), ["units: ", "this key is required"]),
         (sequential, lambda c: c["frames"].update(tool="elsewhere"), ["frames: ", "expected {'world': "]),
         (sequential, lambda c: c.pop("schema_version"), ["schema_version: ", "this key is required"]),
-        (sequential, lambda c: c.update(schema_version=True), ["schema_version: True: expected a whole"]),
+        (sequential, lambda c: c.update(schema_version=True), ["schema_version: true: expected a whole"]),
         (sequential, lambda c: c.update(schema_version=1.0), ["schema_version: 1.0: expected a whole"]),
         (sequential, lambda c: scene_of(c).update(schema_version=1.0), ["1.0: expected a whole number"]),
         (
@@ -206,7 +206,7 @@ def test_planners_say_where_nothing_holds_the_object_up():
     assert plan.scene.content["tasks"][0]["supported"] is False
     assert verify(plan)
     assert not verify(plan, scene=silent)
-    with pytest.raises(SceneError, match=r"task lift: supported: True: expected false"):
+    with pytest.raises(SceneError, match=r"task lift: supported: true: expected false"):
         plan_bimanual(scene.with_supported("lift", supported=True))
 
 

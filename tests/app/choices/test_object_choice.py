@@ -46,7 +46,7 @@ def test_a_mesh_is_measured_in_its_unit_and_leaves_no_file(unit, scratch):
 @pytest.mark.parametrize(
     ("name", "content", "line"),
     [
-        ("a.stl", stl(1000), r"^a\.stl: size: '300 m': expected .*unit of the mesh"),
+        ("a.stl", stl(1000), r"^a\.stl: size: 300 m: expected .*unit of the mesh"),
         ("a.step", stl(), r"^a\.step: ending: '\.step': expected one of .*'\.stl'"),
         ("a.ply", stl(), r"^a\.ply: content: 'STL data': expected a complete PLY file"),
         ("a.stl", b"", r"^a\.stl: content: 'empty file'"),

@@ -113,7 +113,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(folder, monkeypatch):
     monkeypatch.setattr(archives, "UNPACKED_LIMIT", 1_000_000)
     content = archive(*((f"{i}", bytes(300_000)) for i in range(4)))
     assert len(content) < 5_000
-    with pytest.raises(InputError, match=r"size unpacked: '1.2 MB'"):
+    with pytest.raises(InputError, match=r"size unpacked: 1.2 MB"):
         unpack("robot.zip", content, folder)
     assert tree(folder) == {}
 

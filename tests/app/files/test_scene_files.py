@@ -132,9 +132,12 @@ def test_an_uploaded_scene_reads_no_other_file_and_does_not_say_whether_there_is
         (b"\xff\xfe", "mine.yaml: file: .*expected a YAML document"),
         (b"[1, 2]", "mine.yaml: file: .*expected a YAML mapping"),
         (b"a: &a [*a]", "expected a YAML document"),
-        (b"schema_version: 1\nname: x\n", "mine.yaml: robots: None: expected a value; this key is required"),
+        (
+            b"schema_version: 1\nname: x\n",
+            "mine.yaml: robots: nothing: expected a value; this",
+        ),
         (b"!!python/object/apply:os.system ['true']", "expected a YAML document"),
-        (bytes(SCENE_LIMIT + 1), "mine.yaml: size of the file: '1.0 MB': expected a scene of at most 1 MB"),
+        (bytes(SCENE_LIMIT + 1), "mine.yaml: size of the file: 1.0 MB: expected a scene of at most 1 MB"),
     ],
 )
 def test_what_is_no_scene_is_one_line(text, message):
