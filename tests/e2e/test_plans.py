@@ -61,8 +61,16 @@ def test_a_sequence_is_planned_played_changed_and_explained(open_page):
     page.slide("Solution", 1)
     expect(page.text(first)).to_be_visible()
     page.button("List more solutions").click()
-    page.slide("Solution", 11)
-    expect(shown(page, ".sg-solutions .sg-now")).to_contain_text("11")
+    rows, chosen_row = shown(page, ".sg-solutions > label"), shown(page, ".sg-solutions > .sg-now > span")
+    expect(rows.nth(10)).to_be_visible()
+    expect(chosen_row.first).to_have_text("1")  # it stays
+    expect(page.text(first)).to_be_visible()
+    rows.nth(10).click()
+    expect(chosen_row.first).to_have_text("11")
+    expect(page.slider_box("Solution")).to_have_value("11")
+    shown(page, ".sg-solutions > div").get_by_text("#").click()
+    expect(rows.first.locator("span").first).not_to_have_text("1")
+    shoot(page, "solutions")
 
     before = page.settled_view()
     page.button("Play").click()
