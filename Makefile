@@ -21,7 +21,7 @@ $(BIN)/python:
 	PYTHONPATH=$(VENV)-boot $(PYTHON) -m virtualenv $(VENV); }
 
 $(VENV)/app.stamp: pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --editable '.[motion,robots]'
+	$(BIN)/python -m pip install --quiet --editable '.[motion,robots,survey]'
 	touch $@
 
 $(VENV)/dev.stamp: pyproject.toml | $(BIN)/python

@@ -7,13 +7,14 @@ import json
 from symgrasp.cli.schema import SCHEMAS_DIR
 from symgrasp.plan.plan import plan_schema
 from symgrasp.scene.format import scene_schema
+from symgrasp.survey.format import survey_schema
 
 __all__ = ["schemas"]
 
 
 def schemas() -> dict[str, str]:
     """Return what the files in `SCHEMAS_DIR` have to hold: name of the format → text."""
-    found = {"scene": scene_schema(), "plan": plan_schema()}
+    found = {"scene": scene_schema(), "plan": plan_schema(), "survey": survey_schema()}
     return {name: json.dumps(schema, indent=2) + "\n" for name, schema in found.items()}
 
 

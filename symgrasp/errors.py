@@ -22,6 +22,7 @@ __all__ = [
     "PlanError",
     "ProfileError",
     "SceneError",
+    "SurveyError",
     "SymgraspError",
     "UrdfError",
     "one_of",
@@ -91,6 +92,10 @@ class MapError(InputError):
 
 class PlanError(InputError):
     """A stored plan is missing or unusable."""
+
+
+class SurveyError(InputError):
+    """A survey, or a store of its results, is missing or unusable."""
 
 
 class NoPlanError(SymgraspError):

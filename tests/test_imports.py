@@ -16,7 +16,7 @@ ROOMS = [
     "symgrasp.descriptions", "symgrasp.robot", "symgrasp.hands", "symgrasp.found_arms",
     "symgrasp.ik", "symgrasp.scene", "symgrasp.world", "symgrasp.collision", "symgrasp.engine",
     "symgrasp.feasibility",
-    "symgrasp.plan", "symgrasp.planners", "symgrasp.motion", "symgrasp.bench",
+    "symgrasp.plan", "symgrasp.planners", "symgrasp.motion", "symgrasp.survey", "symgrasp.bench",
     "symgrasp.cli", "symgrasp.__main__",
     "app.choices", "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute",
     "app.panels", "app.server", "app.__main__",

@@ -40,8 +40,8 @@ PLACES = {
     "symgrasp.world": Place(2, 5), "symgrasp.collision": Place(0, 2),
     "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),
     "symgrasp.plan": Place(2, 8), "symgrasp.planners": Place(2, 9), "symgrasp.motion": Place(1, 9.5),
-    "symgrasp.bench": Place(2, 10),
-    "symgrasp.cli": Place(2, 11), "symgrasp.__main__": Place(1, 12),
+    "symgrasp.survey": Place(2, 10), "symgrasp.bench": Place(2, 11),
+    "symgrasp.cli": Place(2, 12), "symgrasp.__main__": Place(1, 13),
     "app.choices": Place(5.75, 9), "app.state": Place(5, 10), "app.files": Place(6, 11),
     "app.render": Place(5, 11),
     "app.html": Place(5, 12), "app.scene3d": Place(4, 12), "app.panels": Place(5, 13),
@@ -58,7 +58,7 @@ WIDTH, HEIGHT = 0.84, 0.58
 COLUMNS, FLOORS = 7.0, 16.3
 
 GROUNDS = {
-    "symgrasp": ("#e8eef7", [(-0.5, -0.5, 7.0, 8.0), (-0.5, 7.5, 3.6, 5.1)]),
+    "symgrasp": ("#e8eef7", [(-0.5, -0.5, 7.0, 8.0), (-0.5, 7.5, 3.6, 6.1)]),
     "app": ("#f6ecdd", [(3.4, 8.4, 3.1, 7.4)]),
 }
 """Package → its colour, and the rectangles (left, bottom, width, height) that it fills."""

@@ -26,11 +26,10 @@ def add_parser(commands: Commands) -> None:
     command = add_command(commands, "bench", run, text)
     text = (
         "measure the robots that packages ship instead: their inverse kinematics, or also a map of each, "
-        "which an independent search then tries to refute; or what maps miss"
+        "which an independent search then tries to refute; or what maps miss; or what surveys cost"
     )
-    command.add_argument(
-        "what", metavar="ik|robots|guarantee", nargs="?", choices=("ik", "robots", "guarantee"), help=text
-    )
+    kinds = ("ik", "robots", "guarantee", "survey")
+    command.add_argument("what", metavar="|".join(kinds), nargs="?", choices=kinds, help=text)
     text = "random configurations that `bench ik` and `bench robots` look for (default: %(default)s)"
     command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
     text = "maps of `bench guarantee` with objects at random places (default: %(default)s)"
@@ -45,9 +44,10 @@ def run(args: argparse.Namespace) -> int:
     check_out(args.out)
     if args.what:
         if args.compare:
-            expected = "only times of maps and planners: no ik, robots or guarantee"
+            expected = "only times of maps and planners: no other kind of bench"
             raise InputError("command line", "--compare", args.what, expected)
-        _write(args.out, _guarantee(args) if args.what == "guarantee" else _robots(args))
+        measured = {"guarantee": _guarantee, "survey": _surveys}.get(args.what, _robots)
+        _write(args.out, measured(args))
         return 0
     from symgrasp import bench
 
@@ -66,6 +66,20 @@ def run(args: argparse.Namespace) -> int:
 def _write(out: Path | None, content: dict[str, Any]) -> None:
     if out:
         write_out(out, (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode())
+
+
+def _surveys(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure what surveys cost beside their maps."""
+    from symgrasp.cli.survey import need_extra
+
+    need_extra()
+    from symgrasp.bench import report, survey
+
+    figures = []
+    for figure in survey.run():
+        say(figure.line())
+        figures.append(figure)
+    return report(figures)
 
 
 def _guarantee(args: argparse.Namespace) -> dict[str, Any]:

@@ -8,7 +8,21 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from symgrasp.cli import app, bench, explain, export, grid, hand, plan, robot, robots, scenes, schema, verify
+from symgrasp.cli import (
+    app,
+    bench,
+    explain,
+    export,
+    grid,
+    hand,
+    plan,
+    robot,
+    robots,
+    scenes,
+    schema,
+    survey,
+    verify,
+)
 from symgrasp.cli import map as map_
 from symgrasp.cli import object as object_
 from symgrasp.cli.shared import LONGEST_LINE, warn
@@ -24,6 +38,7 @@ COMMANDS = (
     grid,
     plan,
     verify,
+    survey,
     object_,
     hand,
     robot,

@@ -16,7 +16,7 @@ SCHEMAS_DIR = Path(__file__).resolve().parent.parent / "schemas"
 def add_parser(commands: Commands) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "schema", run, "Print the JSON Schema of a file format.")
-    command.add_argument("format", choices=("scene", "plan"))
+    command.add_argument("format", choices=("scene", "plan", "survey"))
 
 
 def run(args: argparse.Namespace) -> int:

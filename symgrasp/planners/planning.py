@@ -40,6 +40,7 @@ __all__ = [
     "plan_sequential",
     "sequential_maps",
     "sequential_plans",
+    "tasks_of_plan",
 ]
 
 BimanualMethod = Literal["exact", "hill_climb"]
@@ -218,16 +219,7 @@ def handover_plans(
 
     Arguments and errors are those of `plan_handover`.
     """
-    tasks = list(scene.tasks.values())
-    arms = dict.fromkeys(arm for task in tasks for arm in task.arms)
-    if len(tasks) < 2 or len(arms) < 2:
-        names = [task.name for task in tasks]
-        raise SceneError(scene.source, "tasks", names, "several tasks, done by several arms")
-    for before, after in pairwise(tasks):
-        still = np.array_equal(before.T_world_object, after.T_world_object)
-        if not still and not set(before.arms) & set(after.arms):
-            expected = f"an arm that carries the object there from task {before.name!r}"
-            raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
+    tasks = _tasks_handed_over(scene)
     with open_world(scene) as world:
         for before, after in pairwise(tasks):
             if not set(before.arms) & set(after.arms) and not world.object_rests(before.T_world_object):
@@ -259,6 +251,38 @@ def _with_supports(world: BulletWorld, tasks: Sequence[Task]) -> Scene:
 def _best(plans: Plans) -> Plan:
     with closing(plans):
         return next(plans)
+
+
+def tasks_of_plan(scene: Scene, kind: str, arm: str | None = None, task: str | None = None) -> list[Task]:
+    """Return the tasks that a plan is for.
+
+    Args:
+        scene: the scene.
+        kind: sequential, bimanual or handover.
+        arm: of a sequential plan, the arm; the first task's if None.
+        task: of a bimanual plan, the task; the first with several arms if None.
+
+    Raises:
+        SceneError: the scene has no tasks for such a plan.
+    """
+    if kind == "sequential":
+        return _tasks_alone(scene, arm)[1]
+    return [_task_together(scene, task)] if kind == "bimanual" else _tasks_handed_over(scene)
+
+
+def _tasks_handed_over(scene: Scene) -> list[Task]:
+    """Return all tasks; raise SceneError if one arm could do them, or the object moves between two alone."""
+    tasks = list(scene.tasks.values())
+    arms = dict.fromkeys(arm for task in tasks for arm in task.arms)
+    if len(tasks) < 2 or len(arms) < 2:
+        names = [task.name for task in tasks]
+        raise SceneError(scene.source, "tasks", names, "several tasks, done by several arms")
+    for before, after in pairwise(tasks):
+        still = np.array_equal(before.T_world_object, after.T_world_object)
+        if not still and not set(before.arms) & set(after.arms):
+            expected = f"an arm that carries the object there from task {before.name!r}"
+            raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
+    return tasks
 
 
 def _tasks_alone(scene: Scene, arm: str | None) -> tuple[str, list[Task]]:

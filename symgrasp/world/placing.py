@@ -16,7 +16,7 @@ from symgrasp.world.client import pybullet, xyzw
 from symgrasp.world.opening import open_world
 from symgrasp.world.tasks import RESTING_DEPTH
 
-__all__ = ["placed"]
+__all__ = ["placed", "stands_free"]
 
 TURNS = np.deg2rad([0, *(sign * turn for turn in range(15, 180, 15) for sign in (1, -1)), 180])
 """By how much the robot is moved around the object, in the order in which it is tried."""
@@ -70,18 +70,35 @@ def _body(robot: Robot, arms: Iterable[Arm]) -> frozenset[str]:
     return frozenset(body or links)
 
 
+def stands_free(world: BulletWorld, name: str) -> bool:
+    """Return whether a robot stands in no obstacle and no other robot.
+
+    That is asked of the links that its arms do not move: the others are checked wherever an arm is.
+
+    Args:
+        world: a world.
+        name: of the robot.
+    """
+    robot, bodies = world.scene.robots[name], world.bodies
+    arms = [arm for arm in world.scene.arms.values() if arm.robot is robot]
+    others = [body for other, body in bodies.robots.items() if other != name]
+    return _is_outside(world, name, _body(robot, arms), [*bodies.obstacles, *others])
+
+
 def _is_free(world: BulletWorld, name: str, T_world_base: Array, counted: frozenset[str]) -> bool:
     """Return whether none of some links of a robot is inside of anything, at a pose (4, 4) of its root."""
     bodies, body = world.bodies, world.bodies.robots[name]
-    index = bodies.link_indices(name)
-    checked = {index[link] for link in counted}
     position, orientation = T_world_base[:3, 3].tolist(), xyzw(T_world_base)
     pybullet.resetBasePositionAndOrientation(body, position, orientation, physicsClientId=bodies.client)
-    others = [
-        *bodies.obstacles,
-        *bodies.object,
-        *(other for other in bodies.robots.values() if other != body),
-    ]
+    others = [other for other in bodies.robots.values() if other != body]
+    return _is_outside(world, name, counted, [*bodies.obstacles, *bodies.object, *others])
+
+
+def _is_outside(world: BulletWorld, name: str, counted: frozenset[str], others: Iterable[int]) -> bool:
+    """Return whether none of some links of a robot is inside of any of some bodies."""
+    bodies, body = world.bodies, world.bodies.robots[name]
+    index = bodies.link_indices(name)
+    checked = {index[link] for link in counted}
     # Fields of a point: 3 is the link of the robot, 8 is the distance, negative for penetration.
     return all(
         point[3] not in checked or point[8] > -RESTING_DEPTH

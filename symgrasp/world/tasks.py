@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from symgrasp.errors import SceneError
+from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world.bullet import BulletWorld
+from symgrasp.world.collision import Collision
 from symgrasp.world.home import free_homes, home_notes
 from symgrasp.world.opening import open_world
 
-__all__ = ["RESTING_DEPTH", "check_tasks", "prepared"]
+__all__ = ["RESTING_DEPTH", "check_tasks", "object_contact", "prepared"]
 
 RESTING_DEPTH = 1e-3
 """How deep (m) the object may be inside another body and still count as resting on it."""
@@ -48,18 +50,26 @@ def check_tasks(scene: Scene) -> None:
         _check_tasks(world)
 
 
+def object_contact(world: BulletWorld, task: Task) -> Collision | None:
+    """Return where the object is deepest inside an obstacle, or a robot that does not hold it, in a task.
+
+    Contacts of at most `RESTING_DEPTH` do not count. The object stays at the pose of the task.
+    """
+    world.set_object(task.T_world_object)
+    holders = [world.scene.arm(name).robot.name for name in task.arms]
+    contacts = [*world.object_contacts(), *world.object_in_robots(holders)]
+    deepest = max(contacts, key=lambda c: c.depth, default=None)
+    return deepest if deepest and deepest.depth > RESTING_DEPTH else None
+
+
 def _check_tasks(world: BulletWorld) -> None:
     scene = world.scene
     for i, task in enumerate(scene.tasks.values()):
-        world.set_object(task.T_world_object)
-        holders = [scene.arm(name).robot.name for name in task.arms]
-        contacts = [*world.object_contacts(), *world.object_in_robots(holders)]
-        for c in sorted(contacts, key=lambda c: -c.depth)[:1]:
-            if c.depth > RESTING_DEPTH:
-                raise SceneError(
-                    scene.source,
-                    f"tasks[{i}].pose",
-                    task.name,
-                    f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
-                )
+        if c := object_contact(world, task):
+            raise SceneError(
+                scene.source,
+                f"tasks[{i}].pose",
+                task.name,
+                f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
+            )
     world.set_object(scene.task().T_world_object)

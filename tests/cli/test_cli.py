@@ -118,7 +118,7 @@ def test_tolerance_and_flip_of_a_mesh(tmp_path, capsys):
         assert f"object: {options[0][2:]}: 'wine_bottle': expected a mesh" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["scene", "plan"])
+@pytest.mark.parametrize("name", ["scene", "plan", "survey"])
 def test_schemas_are_schemas(name, capsys):
     assert main(["schema", name]) == 0
     printed = capsys.readouterr().out

@@ -7,7 +7,10 @@ import sys
 
 import pytest
 
-HEAVY = {"matplotlib", "numba", "numpy", "pybullet", "pydantic", "rich", "scipy", "trimesh", "viser", "yaml"}
+HEAVY = {
+    "dask", "distributed", "matplotlib", "numba", "numpy", "pybullet", "pydantic", "rich", "scipy", "trimesh",
+    "viser", "xarray", "yaml", "zarr",
+}  # fmt: skip
 
 PROGRAM = """
 import atexit, sys
@@ -32,6 +35,7 @@ def loaded(*arguments: str, status: int) -> set[str]:
         (["plan", "--help"], 0),
         (["schema", "scene"], 0),
         (["schema", "plan"], 0),
+        (["survey", "run"], 2),
         ([], 2),
         (["paln"], 2),
         (["plan", "sequential", "soda_can", "--list", "none"], 2),
@@ -46,5 +50,15 @@ def test_options_need_no_heavy_package(arguments, status):
     assert loaded(*arguments, status=status) == set()
 
 
-def test_the_list_of_scenes_needs_yaml_only():
-    assert loaded("scenes", status=0) == {"yaml"}
+@pytest.mark.parametrize("arguments", [["scenes"], ["survey", "list"]])
+def test_lists_of_what_ships_need_yaml_only(arguments):
+    assert loaded(*arguments, status=0) == {"yaml"}
+
+
+def test_a_map_needs_nothing_of_surveys():
+    assert not loaded("map", "soda_can", "--redundancy", "1", status=0) & {
+        "dask",
+        "distributed",
+        "xarray",
+        "zarr",
+    }

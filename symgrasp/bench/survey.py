@@ -1,0 +1,127 @@
+"""What a survey costs beside its maps: its rate in one and two processes, its overhead, and its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+import psutil
+
+from symgrasp.bench.figures import Figure
+from symgrasp.bench.timing import Time, ratios, time_of, times
+from symgrasp.engine.threads import CORES, use_cores
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.scene.format import MapSettings
+from symgrasp.scene.scene import Scene
+from symgrasp.survey.evaluation import Evaluator
+from symgrasp.survey.format import NumberAxis, SurveyFile
+from symgrasp.survey.running import Done, run_survey
+from symgrasp.survey.store import create_store
+from symgrasp.survey.survey import Survey
+from symgrasp.world import open_world
+
+__all__ = ["efficiency", "memory", "overhead", "run"]
+
+SCENE = "bottle_on_table"
+GRID = MapSettings(heights=24, angles=48, redundancy=16)
+SMALL = MapSettings(heights=4, angles=12, redundancy=2)
+
+
+def run() -> Iterator[Figure]:
+    """Run the benchmarks of surveys and yield their figures as they are measured."""
+    yield from overhead(side=16, rounds=3)
+    yield from efficiency(side=20, rounds=3)
+    yield from memory(side=100)
+
+
+def _survey(side: int, settings: MapSettings) -> Survey:
+    """Return a survey of side × side positions of the object on the table."""
+    axes = (
+        NumberAxis(name="x", of="position.x", from_=0.35, to=0.55, count=side),
+        NumberAxis(name="y", of="position.y", from_=-0.08, to=0.1, count=side),
+    )
+    file = SurveyFile(schema_version=1, name="bench", scene=SCENE, map=settings, axes=axes)
+    return Survey.of(file, Scene.load(SCENE))
+
+
+def overhead(side: int, rounds: int) -> Iterator[Figure]:
+    """Time the points of a survey, computed and written, and their maps alone, on one core."""
+    survey = _survey(side, GRID)
+    use_cores(1)
+    pairs = []
+    try:
+        with open_world(survey.scene) as world, Evaluator(survey) as evaluator:
+            maker, points = MapMaker(world), survey.points
+            tasks = [
+                evaluator.task_at(point, survey.scene)
+                for batch in range(survey.batches)
+                for point in survey.points_of(batch)
+            ]
+            maker.map(task=tasks[0])
+            evaluator.point((0, 0))
+            for _ in range(rounds):
+                with TemporaryDirectory() as folder:
+                    store = create_store(Path(folder) / "bench.zarr", survey)
+
+                    def whole() -> None:
+                        for batch in range(survey.batches):
+                            own = survey.points_of(batch)
+                            store.write(batch, {point: evaluator.point(point) for point in own})  # noqa: B023
+
+                    surveyed = time_of(whole)
+                alone = time_of(lambda: [maker.map(task=task) for task in tasks])
+                pairs.append((surveyed, alone))
+    finally:
+        use_cores(CORES)
+    yield times("a map alone, one core", "ms", [Time(*(t / points for t in alone)) for _, alone in pairs])
+    yield ratios("  a point of a survey, with all that is written, over it", pairs)
+
+
+def efficiency(side: int, rounds: int) -> Iterator[Figure]:
+    """Run a survey by one process and by two, and compare their rates: two would do twice as much.
+
+    CPU time tells this on a busy machine too, where two processes do not have a core each.
+    """
+    survey = _survey(side, GRID)
+    clock, cpu = [], []
+    for _ in range(rounds):
+        one, two = _rate(survey, 1), _rate(survey, 2)
+        clock.append(one.wall / two.wall)
+        cpu.append(2 * one.cpu / two.cpu)
+    yield Figure("a survey in two processes, over one", "×", tuple(clock))
+    yield Figure("  in CPU time", "×", tuple(cpu))
+
+
+def _rate(survey: Survey, workers: int) -> Time:
+    """Return the time (s) for a point once all workers are at work, by the clock and in CPU time of all."""
+    seen: list[tuple[int, float, float]] = []
+
+    def note(done: Done) -> None:
+        spent = 0.0
+        for child in psutil.Process().children(recursive=True):
+            used = child.cpu_times()
+            spent += used.user + used.system
+        seen.append((done.points, perf_counter(), spent))
+
+    with TemporaryDirectory() as folder:
+        run_survey(survey, Path(folder) / "bench.zarr", workers=workers, progress=note)
+    first, last = seen[len(seen) // 4], seen[-1]  # all have computed a batch by then
+    points = last[0] - first[0]
+    return Time((last[1] - first[1]) / points, (last[2] - first[2]) / points)
+
+
+def memory(side: int) -> Iterator[Figure]:
+    """Weigh a process that computes side × side points, after a tenth of them and at the end."""
+    survey, own = _survey(side, SMALL), psutil.Process()
+    with TemporaryDirectory() as folder, Evaluator(survey) as evaluator:
+        store = create_store(Path(folder) / "bench.zarr", survey)
+        early = 0.0
+        for batch in range(survey.batches):
+            store.write(batch, {point: evaluator.point(point) for point in survey.points_of(batch)})
+            if batch == survey.batches // 10:
+                early = own.memory_info().rss / 1e6
+        late = own.memory_info().rss / 1e6
+    yield Figure(f"memory after {survey.points // 10:,} points", "MB", (early,))
+    yield Figure(f"  after {survey.points:,} points", "MB", (late,))

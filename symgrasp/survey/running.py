@@ -1,0 +1,183 @@
+"""Running a survey on a Dask cluster: of this machine's cores, or any that is there already."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from dask import config
+from distributed import Client, LocalCluster, as_completed
+from distributed.security import Security
+
+from symgrasp.engine.threads import CORES, use_cores
+from symgrasp.errors import SurveyError
+from symgrasp.survey.evaluation import Evaluator
+from symgrasp.survey.store import SurveyStore, create_store
+from symgrasp.survey.survey import Survey
+
+__all__ = ["Done", "cluster", "run_on", "run_survey"]
+
+AHEAD = 3
+"""Batches for each thread of the cluster that are submitted before their turn, so that none waits."""
+
+FAILURES = 3
+"""A batch that so many workers died of is given up."""
+
+
+class Done(NamedTuple):
+    """How far a survey is: points that are computed, of all points."""
+
+    points: int
+    of: int
+
+
+def run_survey(
+    survey: Survey,
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[Done], None] | None = None,
+) -> None:
+    """Compute all points of a survey that a store does not hold yet.
+
+    Args:
+        survey: the survey.
+        out: the folder of the store; it is made if there is none.
+        workers: see `cluster`.
+        scheduler: see `cluster`.
+        progress: called at the beginning and after every batch; may raise `Cancelled`. What is written
+            stays.
+
+    Raises:
+        SurveyError: the store is another survey's, or the cluster cannot be reached or was lost.
+    """
+    if create_store(Path(out), survey).missing():
+        with cluster(workers, scheduler) as client:
+            run_on(client, survey, out, progress)
+    elif progress:
+        progress(Done(survey.points, survey.points))
+
+
+def run_on(
+    client: Client, survey: Survey, out: str | Path, progress: Callable[[Done], None] | None = None
+) -> None:
+    """Do what `run_survey` does on a cluster that is there.
+
+    Args:
+        client: of the cluster.
+        survey: the survey.
+        out: the folder of the store; it is made if there is none.
+        progress: called at the beginning and after every batch.
+
+    Raises:
+        SurveyError: the store is another survey's, or the cluster was lost.
+    """
+    path = Path(out).resolve()
+    missing = create_store(path, survey).missing()
+    total, left = survey.points, sum(_size(survey, batch) for batch in missing)
+    if progress:
+        progress(Done(total - left, total))
+    known: Any = client  # whose methods are coroutines too, for those who ask for that
+    threads = max(1, sum(known.nthreads().values()))
+    [shared] = known.scatter([(survey.to_dict(), str(path))], broadcast=True, hash=False)
+    waiting = (client.submit(run_batch, shared, batch, pure=False, retries=0) for batch in missing)
+    running = as_completed(list(islice(waiting, AHEAD * threads)), loop=client.loop)
+    for future in running:
+        left -= _size(survey, _result(future))
+        if progress:
+            progress(Done(total - left, total))
+        if following := next(waiting, None):
+            running.add(following)
+
+
+def _result(future: Any) -> int:
+    """Return the batch that was computed."""
+    if future.status in ("cancelled", "lost"):
+        raise SurveyError("scheduler", "state", "lost", "a cluster that goes on running; run it again")
+    return future.result()
+
+
+def _size(survey: Survey, batch: int) -> int:
+    size = 1
+    for part in survey.region(batch):
+        size *= part.stop - part.start
+    return size
+
+
+@contextmanager
+def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[Client]:
+    """Connect to a cluster; a local one listens to nobody but its own processes, and ends with the block.
+
+    Args:
+        workers: processes on this machine; as many as it has cores if None.
+        scheduler: address of the scheduler of a running Dask cluster, such as ``tcp://10.0.0.1:8786``, to use
+            instead. It is trusted: it can run anything here. Its workers see the store and the files of the
+            scene under the same paths.
+
+    Yields:
+        The client of the cluster.
+
+    Raises:
+        SurveyError: there is no scheduler at that address.
+    """
+    settings = {
+        "distributed.scheduler.allowed-failures": FAILURES,
+        "distributed.scheduler.work-stealing": False,
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.limit": "60s",
+    }
+    with config.set(settings):
+        if scheduler is not None:
+            try:
+                client = Client(scheduler, timeout=10, set_as_default=False)
+            except (OSError, ValueError) as error:
+                text = f"the address of a running Dask scheduler ({type(error).__name__})"
+                raise SurveyError("command line", "--scheduler", scheduler, text) from error
+            with client:
+                yield client
+            return
+        with (
+            LocalCluster(
+                n_workers=workers or CORES,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,  # pyright: ignore[reportArgumentType]  # no server
+                silence_logs=logging.CRITICAL,
+                memory_limit=0,
+                security=Security.temporary(),
+            ) as local,
+            Client(local, set_as_default=False) as client,
+        ):
+            yield client
+
+
+_own = threading.local()
+
+
+def run_batch(shared: tuple[Mapping[str, Any], str], batch: int) -> int:
+    """Compute a batch and write it, on a worker; return its number.
+
+    Worlds and engines stay between the batches of a thread. Maps are computed on one core: the others belong
+    to other workers.
+
+    Args:
+        shared: the survey as plain data, and the folder of the store.
+        batch: the number of the batch.
+    """
+    use_cores(1)
+    key = id(shared)
+    if getattr(_own, "key", None) != key:
+        if hasattr(_own, "evaluator"):
+            _own.evaluator.close()
+        survey = Survey.from_dict(shared[0])
+        _own.key, _own.shared = key, shared  # held, so that no other has its id
+        _own.evaluator, _own.store = Evaluator(survey), SurveyStore(shared[1], survey)
+    evaluator: Evaluator = _own.evaluator
+    _own.store.write(batch, {point: evaluator.point(point) for point in evaluator.survey.points_of(batch)})
+    return batch

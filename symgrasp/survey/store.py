@@ -1,0 +1,237 @@
+"""The store of a survey's results: a Zarr group whose dimensions are the axes, which xarray opens.
+
+A batch of points is a chunk of every variable. What a batch writes last is `STATE`, so a batch counts as
+computed when all its points have one and every chunk can be read; each carries a checksum.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+import zarr
+from zarr.codecs import Crc32cCodec, ZstdCodec
+
+from symgrasp.errors import SurveyError
+from symgrasp.object.manifold import ROLLS
+from symgrasp.reason import Reason
+from symgrasp.survey.evaluation import PointResult, State
+from symgrasp.survey.survey import Survey
+
+__all__ = ["SurveyStore", "create_store", "open_results"]
+
+STATE = "state"
+
+FORMAT = "symgrasp survey"
+FORMAT_VERSION = 1
+
+
+class SurveyStore:
+    """The store of a survey, as workers write it.
+
+    Args:
+        path: its folder; `create_store` has made it.
+        survey: the survey.
+    """
+
+    def __init__(self, path: str | Path, survey: Survey) -> None:
+        self.survey = survey
+        self._path = Path(path)
+        group: Any = zarr.open_group(str(path), mode="r+", use_consolidated=False)
+        every = {"write_empty_chunks": True}  # a chunk that is not there is missing
+        self._arrays = {name: group[name].with_config(every) for name in variables(survey)}
+        self._names = [name for name in self._arrays if name != STATE]
+
+    def write(self, batch: int, results: Mapping[tuple[int, ...], PointResult]) -> None:
+        """Write a batch.
+
+        Args:
+            batch: its number.
+            results: point (indices along each axis) → what is known of it, for all points of the batch.
+        """
+        region = self.survey.region(batch)
+        origin, shape = [s.start for s in region], tuple(s.stop - s.start for s in region)
+        kinds = variables(self.survey)
+        blocks = {name: np.full((*shape, *own.sizes), own.fill, own.kind) for name, own in kinds.items()}
+        for point, result in results.items():
+            where = tuple(k - o for k, o in zip(point, origin, strict=True))
+            blocks[STATE][where] = result.state
+            if result.state != State.COMPUTED:
+                continue
+            assert result.cells is not None and result.feasible is not None
+            values = {
+                "share": result.share,
+                "best": result.best,
+                "margin": result.margin,
+                "cells": result.cells,
+                "plan": result.plan,
+                "plan_margin": result.plan_margin,
+                "feasible": np.packbits(result.feasible, axis=-1),
+            }
+            for name in self._names:
+                blocks[name][where] = values[name]
+        for name in (*self._names, STATE):
+            array: Any = self._arrays[name]
+            array[region] = blocks[name]
+
+    def missing(self) -> list[int]:
+        """Return the batches that are not computed, or cannot be read."""
+        return [batch for batch in range(self.survey.batches) if not self._is_whole(batch)]
+
+    def _is_whole(self, batch: int) -> bool:
+        """Whether every chunk of a batch is there, as it was written."""
+        region, where = self.survey.region(batch), np.unravel_index(batch, self.survey.batch_grid)
+        with suppress(Exception):  # zarr, its codecs and the disk each raise their own
+            for name, own in variables(self.survey).items():
+                chunk = [*(str(k) for k in where), *("0" for _ in own.sizes)]
+                self._path.joinpath(name, "c", *chunk).stat()
+                array: Any = self._arrays[name]
+                if name == STATE and (array[region] == State.MISSING).any():
+                    return False
+                array[region]
+            return True
+        return False
+
+
+class _Variable(NamedTuple):
+    """What a store holds of a point: a value, or an array with further dimensions."""
+
+    kind: Any
+    fill: Any
+    sizes: tuple[int, ...]
+    dims: tuple[str, ...]
+    attributes: dict[str, Any]
+
+
+def variables(survey: Survey) -> dict[str, _Variable]:
+    """Return what the store of a survey holds of every point, by name."""
+    states = {
+        "flag_values": [int(state) for state in State],
+        "flag_meanings": " ".join(state.name.lower() for state in State),
+    }
+    m = survey.scene.settings
+    nan = np.nan
+    found = {
+        STATE: _Variable(np.uint8, 0, (), (), {"long_name": "what became of the point", **states}),
+        "share": _Variable(np.float64, nan, (), (), {"long_name": "share of the cells that are feasible"}),
+        "best": _Variable(np.int16, -1, (3,), ("cell",), {"long_name": "cell with the largest margin"}),
+        "margin": _Variable(np.float64, nan, (), (), {"long_name": "largest margin of a cell", "units": "m"}),
+        "cells": _Variable(
+            np.int32, 0, (len(Reason),), ("reason",), {"long_name": "number of cells by reason"}
+        ),
+    }
+    if survey.file.plan:
+        found["plan"] = _Variable(
+            np.bool_, False, (), (), {"long_name": f"whether a {survey.file.plan} plan exists"}
+        )
+        of = {"long_name": "smallest margin of the best plan", "units": "m"}
+        found["plan_margin"] = _Variable(np.float64, nan, (), (), of)
+    if survey.file.maps:
+        sizes = (len(ROLLS), m.heights, -(-m.angles // 8))
+        of = {"long_name": "which cells are feasible, a bit a cell", "angles": m.angles}
+        found["feasible"] = _Variable(np.uint8, 0, sizes, ("roll", "row", "byte"), of)
+    return found
+
+
+def create_store(path: Path, survey: Survey) -> SurveyStore:
+    """Open the store of a survey, which is made if there is none.
+
+    Raises:
+        SurveyError: the folder holds something else, or the results of another survey.
+        OSError: it cannot be written.
+    """
+    if path.exists() and not _is_empty(path):
+        attributes = _attributes(path)
+        if attributes["sha256"] != survey.sha256:
+            known = json.loads(attributes["survey"])["file"]["name"]
+            expected = f"the same {survey.file.name}, scene, robots and program as now, or another folder"
+            raise SurveyError(path, "survey", known, expected)
+        return SurveyStore(path, survey)
+    _make(path, survey)
+    return SurveyStore(path, survey)
+
+
+def _make(path: Path, survey: Survey) -> None:
+    """Write a store without results, in one piece."""
+    draft = path.parent / f".{path.name}.new"
+    shutil.rmtree(draft, ignore_errors=True)
+    names = [axis.name for axis in survey.axes]
+    data: dict[str, Any] = {}
+    encoding: dict[str, Any] = {}
+    for name, (kind, fill, sizes, dims, attributes) in variables(survey).items():
+        chunks = (*survey.batch_shape, *sizes)
+        blank = da.full((*survey.shape, *sizes), fill, dtype=kind, chunks=chunks)
+        data[name] = ((*names, *dims), blank, attributes)
+        codecs = (ZstdCodec(level=3), Crc32cCodec())
+        encoding[name] = {"chunks": chunks, "compressors": codecs, "fill_value": fill, "_FillValue": None}
+    coordinates: dict[str, Any] = {
+        "reason": [reason.name for reason in Reason],
+        "cell": ["roll", "row", "column"],
+    }
+    for axis in survey.axes:
+        attributes = {"long_name": axis.file.of, **({"units": axis.unit} if axis.unit else {})}
+        coordinates[axis.name] = (axis.name, np.array(axis.labels), attributes)
+    attributes = {
+        "format": FORMAT,
+        "version": FORMAT_VERSION,
+        "sha256": survey.sha256,
+        "survey": json.dumps(survey.to_dict()),
+        "map_units": "m, rad",
+    }
+    with _quiet():
+        dataset = xr.Dataset(data, coordinates, attributes)
+        dataset.to_zarr(draft, mode="w", compute=False, encoding=encoding, zarr_format=3, consolidated=False)
+    if path.exists():
+        path.rmdir()
+    draft.rename(path)
+
+
+def _is_empty(path: Path) -> bool:
+    return path.is_dir() and not any(path.iterdir())
+
+
+def _attributes(path: Path) -> dict[str, Any]:
+    """Return what a store says of itself; raise SurveyError if it is none."""
+    try:
+        attributes = dict(zarr.open_group(str(path), mode="r", use_consolidated=False).attrs)
+    except Exception as error:  # zarr raises its own, and what json raises
+        raise SurveyError(
+            path, "store", type(error).__name__, "a store written by symgrasp survey run"
+        ) from error
+    if attributes.get("format") != FORMAT:
+        raise SurveyError(path, "format", attributes.get("format"), FORMAT)
+    if attributes.get("version") != FORMAT_VERSION:
+        raise SurveyError(path, "version", attributes.get("version"), str(FORMAT_VERSION))
+    return attributes
+
+
+def open_results(path: str | Path) -> tuple[Survey, xr.Dataset]:
+    """Open the results of a survey, complete or not.
+
+    Returns:
+        The survey, and the results: a variable for each of `variables`, by the survey's axes.
+
+    Raises:
+        SurveyError: it is no store of a survey.
+    """
+    path = Path(path)
+    attributes = _attributes(path)
+    survey = Survey.from_dict(json.loads(attributes["survey"]))
+    with _quiet():
+        return survey, xr.open_zarr(path, consolidated=False, chunks=None)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence the warning that texts are no part of Zarr's specification yet."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="zarr")
+        yield

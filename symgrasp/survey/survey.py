@@ -1,0 +1,358 @@
+"""A survey: a scene, its axes with all names and files resolved, and the batches that its points come in."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from symgrasp.errors import SurveyError, SymgraspError, one_of
+from symgrasp.files import LARGEST_YAML, parse_yaml, read_file
+from symgrasp.planners.planning import tasks_of_plan
+from symgrasp.poses import rotation_z
+from symgrasp.scene.format import PoseFile, SceneFile, describe_error
+from symgrasp.scene.scene import Scene
+from symgrasp.survey.format import (
+    BASE,
+    LEAN,
+    POSITION,
+    AxisFile,
+    HandAxis,
+    NumberAxis,
+    ObjectAxis,
+    PositionAxis,
+    SurveyFile,
+    TaskAxis,
+    lengths,
+)
+from symgrasp.survey.paths import with_number
+from symgrasp.survey.shipped import shipped_surveys
+
+__all__ = ["Axis", "Survey"]
+
+BATCH = 64
+"""Most points of a batch. It decides how the store is cut, so it depends on nothing but the survey."""
+
+FEWEST_BATCHES = 32
+"""So many batches at least, where there are as many points, for workers to share."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis of a survey.
+
+    Attributes:
+        name: the dimension of the store.
+        file: the axis as the survey file has it.
+        values: n values: numbers, positions (m), names of tasks, or entries of scene files.
+        labels: n coordinates of the store: the numbers, or texts.
+    """
+
+    name: str
+    file: AxisFile
+    values: tuple[Any, ...]
+    labels: tuple[float, ...] | tuple[str, ...]
+
+    @property
+    def moves_object(self) -> bool:
+        """Whether points along the axis differ in the pose of the object or the task alone."""
+        return isinstance(self.file, PositionAxis | TaskAxis) or self.file.of in (*POSITION, *LEAN)
+
+    @property
+    def unit(self) -> str:
+        """The unit of its numbers; empty where there is none, or the scene file says."""
+        if self.file.of.endswith("_deg"):
+            return "°"
+        return "m" if self.file.of in (*POSITION, *BASE) else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """A survey with everything resolved.
+
+    Attributes:
+        source: the file it came from, for error messages.
+        file: the validated content of the file.
+        scene: the scene as its file has it, with the survey's map settings.
+        axes: the axes.
+    """
+
+    source: str
+    file: SurveyFile
+    scene: Scene
+    axes: tuple[Axis, ...]
+
+    @staticmethod
+    def load(survey: str | Path) -> Survey:
+        """Load a shipped survey by name, or any by path.
+
+        Raises:
+            SurveyError: there is no such survey, it is not YAML, or a field is wrong.
+            SymgraspError: its scene, or a file that it refers to, is unusable.
+        """
+        path = Path(survey)
+        if path.suffix not in (".yaml", ".yml"):
+            shipped = shipped_surveys()
+            if str(survey) not in shipped:
+                expected = one_of(shipped, survey) + ", or a .yaml file"
+                raise SurveyError("survey", "name", str(survey), expected)
+            path = shipped[str(survey)]
+        try:
+            content = parse_yaml(read_file(path, LARGEST_YAML).decode("utf-8"))
+        except OSError as error:
+            raise SurveyError(path, "file", str(path), f"a readable text file ({error})") from error
+        except ValueError as error:
+            raise SurveyError(path, "file", str(error), "a YAML document") from error
+        if not isinstance(content, dict):
+            raise SurveyError(path, "file", content, "a YAML mapping with schema_version, name, scene, axes")
+        try:
+            file = SurveyFile.model_validate(content)
+        except ValidationError as error:
+            raise SurveyError(path, *describe_error(error, content)) from None
+        of = Path(file.scene)
+        scene = Scene.load(path.parent / of if of.suffix in (".yaml", ".yml") else file.scene)
+        return Survey.of(file, scene, str(path), path.parent)
+
+    @staticmethod
+    def of(file: SurveyFile, scene: Scene, source: str = "survey", folder: Path = Path()) -> Survey:
+        """Resolve a survey of a scene.
+
+        Args:
+            file: the survey; its ``scene`` is only a name here.
+            scene: the scene.
+            source: its name for error messages.
+            folder: the folder that file references are relative to.
+
+        Raises:
+            SurveyError: a name is unknown, or a value cannot be put into the scene.
+        """
+        if file.map is not None:
+            scene = scene.with_settings(**file.map.model_dump())
+        if file.task is not None and file.task not in scene.tasks:
+            raise SurveyError(source, "task", file.task, one_of(scene.tasks, file.task))
+        if file.arm is not None and file.arm not in scene.arms:
+            raise SurveyError(source, "arm", file.arm, one_of(scene.arms, file.arm))
+        if file.plan is not None:
+            tasks_of_plan(scene, file.plan, file.arm, file.task)
+        axes = [
+            _resolved(f"axes[{i}]", axis, file, scene, source, folder) for i, axis in enumerate(file.axes)
+        ]
+        return Survey(source, file, scene, tuple(axes))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the survey as plain data, from which `from_dict` makes the same one anywhere."""
+        axes = [
+            {"file": a.file.model_dump(mode="json", by_alias=True, exclude_none=True), "values": a.values}
+            for a in self.axes
+        ]
+        file = self.file.model_dump(mode="json", by_alias=True, exclude_none=True)
+        plain = {"source": self.source, "file": file, "scene": self.scene.content, "axes": axes}
+        return json.loads(json.dumps(plain))
+
+    @staticmethod
+    def from_dict(plain: Mapping[str, Any]) -> Survey:
+        """Make a survey of what `to_dict` returned."""
+        file = SurveyFile.model_validate(plain["file"])
+        axes = tuple(
+            Axis(
+                own.name,
+                own,
+                tuple(tuple(v) if isinstance(own, PositionAxis) else v for v in entry["values"]),
+                tuple(_label(own, value) for value in _values(own)),
+            )
+            for own, entry in zip(file.axes, plain["axes"], strict=True)
+        )
+        return Survey(plain["source"], file, Scene.from_content(plain["scene"], plain["source"]), axes)
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of all that the results depend on: axes, scene, the files of its robots, this version."""
+        plain = {k: v for k, v in self.to_dict().items() if k != "source"}
+        plain |= {"map": self.scene.map_sha256, "version": version("symgrasp")}
+        return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis."""
+        return lengths(self.file)
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    @cached_property
+    def batch_shape(self) -> tuple[int, ...]:
+        """Number of points of a batch along each axis; the last batch along an axis may have fewer.
+
+        Along axes that move nothing but the object first: what a point needs besides a map is built once.
+        """
+        most = max(1, min(BATCH, self.points // FEWEST_BATCHES))
+        shape = [1] * len(self.axes)
+        order = sorted(range(len(self.axes)), key=lambda k: (not self.axes[k].moves_object, -k))
+        for k in order:
+            shape[k] = -(-self.shape[k] // -(-self.shape[k] // most))  # of equal size, as far as can be
+            most //= shape[k]
+        return tuple(shape)
+
+    @property
+    def batches(self) -> int:
+        """Number of batches."""
+        return math.prod(self.batch_grid)
+
+    @property
+    def batch_grid(self) -> tuple[int, ...]:
+        """Number of batches along each axis."""
+        return tuple(-(-n // b) for n, b in zip(self.shape, self.batch_shape, strict=True))
+
+    def region(self, batch: int) -> tuple[slice, ...]:
+        """Return the indices of a batch's points along each axis."""
+        where = np.unravel_index(batch, self.batch_grid)
+        return tuple(
+            slice(int(k) * b, min((int(k) + 1) * b, n))
+            for k, b, n in zip(where, self.batch_shape, self.shape, strict=True)
+        )
+
+    def points_of(self, batch: int) -> Iterator[tuple[int, ...]]:
+        """Yield the points of a batch as indices along each axis; those of one scene follow each other."""
+        region = self.region(batch)
+        order = sorted(range(len(self.axes)), key=lambda k: self.axes[k].moves_object)
+        sizes = [region[k].stop - region[k].start for k in order]
+        for where in np.ndindex(*sizes):
+            point = [0] * len(self.axes)
+            for k, at in zip(order, where, strict=True):
+                point[k] = region[k].start + at
+            yield tuple(point)
+
+    def scene_key(self, point: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the part of a point (indices along each axis) on which its scene depends."""
+        return tuple(k for k, axis in zip(point, self.axes, strict=True) if not axis.moves_object)
+
+    def scene_at(self, point: tuple[int, ...]) -> Scene:
+        """Return the scene of a point, with the object where the scene has it; see `task_at`.
+
+        Raises:
+            SymgraspError: the values of several axes do not go together.
+        """
+        content = self.scene.content
+        for axis, k in zip(self.axes, point, strict=True):
+            changed = _changed(content, self.file, self.scene, axis.file, axis.values[k])
+            content = content if changed is None else changed
+        return self.scene if content is self.scene.content else Scene.from_content(content, self.source)
+
+
+def _resolved(field: str, axis: AxisFile, file: SurveyFile, scene: Scene, source: str, folder: Path) -> Axis:
+    """Return an axis whose values are known to go into the scene, with what they refer to found and measured.
+
+    Raises:
+        SurveyError: a value cannot be put into the scene.
+    """
+    values = list(_values(axis))
+    labels = tuple(_label(axis, value) for value in values)
+    if len(set(labels)) < len(labels):
+        raise SurveyError(source, field, list(labels), "values that differ")
+    for k, value in enumerate(values):
+        changed = None
+        try:
+            changed = _changed(scene.content, file, scene, axis, value)
+            if isinstance(axis, NumberAxis) and changed is not None:
+                SceneFile.model_validate(changed)
+            elif isinstance(axis, ObjectAxis):
+                values[k] = Scene.from_content(changed or {}, source, folder).content["object"]
+            elif isinstance(axis, HandAxis):
+                built = Scene.from_content(changed or {}, source, folder)
+                values[k] = _arm_entry(built.content, _arm_of(axis, file, scene))["hand"]
+        except ValidationError as error:
+            expected = describe_error(error, changed)[-1]
+            raise SurveyError(source, f"{field} ({axis.name})", labels[k], expected) from None
+        except ValueError as error:
+            raise SurveyError(source, f"{field}.of", axis.of, str(error)) from None
+        except SymgraspError as error:
+            raise SurveyError(source, f"{field} ({axis.name})", labels[k], str(error)) from None
+    return Axis(axis.name, axis, tuple(values), labels)
+
+
+def _arm_of(axis: HandAxis, file: SurveyFile, scene: Scene) -> str:
+    """Return the arm whose hands an axis lists."""
+    return axis.arm or file.arm or next(iter(scene.arms))
+
+
+def _values(axis: AxisFile) -> tuple[Any, ...]:
+    return axis.numbers() if isinstance(axis, NumberAxis) else axis.values
+
+
+def _label(axis: AxisFile, value: Any) -> Any:
+    """Return the coordinate of a value: the number itself, or a text."""
+    if isinstance(axis, NumberAxis | TaskAxis) or isinstance(value, str):
+        return value
+    if isinstance(axis, PositionAxis):
+        return " ".join(f"{v:g}" for v in value)
+    return value["name"] if isinstance(value, Mapping) else value.name
+
+
+def _changed(
+    content: dict[str, Any], file: SurveyFile, scene: Scene, axis: AxisFile, value: Any
+) -> dict[str, Any] | None:
+    """Return the content of a scene with a value of an axis in it; None where it only moves the object.
+
+    Raises:
+        ValueError: the axis names something that the scene does not have; says what is expected.
+    """
+    if isinstance(axis, TaskAxis):
+        if value not in scene.tasks:
+            raise ValueError(one_of(scene.tasks, value))
+        return None
+    if isinstance(axis, PositionAxis) or axis.of in (*POSITION, *LEAN):
+        return None
+    if isinstance(axis, ObjectAxis):
+        if isinstance(value, str):
+            value = {"name": value, "library": value}
+        elif not isinstance(value, dict):
+            value = value.model_dump(mode="json", exclude_none=True)
+        return {**content, "object": value}
+    if isinstance(axis, HandAxis):
+        name = _arm_of(axis, file, scene)
+        if name not in scene.arms:
+            raise ValueError("an arm: " + one_of(scene.arms, name))
+        if not isinstance(value, str | dict):
+            value = value.model_dump(mode="json", exclude_none=True)
+        changed = json.loads(json.dumps(content))
+        _arm_entry(changed, name)["hand"] = value
+        return changed
+    if axis.of in BASE:
+        name = axis.robot or next(iter(scene.robots))
+        if name not in scene.robots:
+            raise ValueError("a robot: " + one_of(scene.robots, name))
+        return _moved_base(content, name, axis.of, value)
+    return with_number(content, axis.of, value)
+
+
+def _arm_entry(content: Mapping[str, Any], arm: str) -> dict[str, Any]:
+    """Return the entry of an arm in the content of a scene."""
+    entries = [entry for robot in content["robots"] for entry in robot.get("arms", [robot])]
+    return next(entry for entry in entries if entry["name"] == arm)
+
+
+def _moved_base(content: dict[str, Any], robot: str, of: str, value: float) -> dict[str, Any]:
+    """Return the content of a scene with a coordinate (m or °) of a robot's base changed."""
+    index = next(k for k, entry in enumerate(content["robots"]) if entry["name"] == robot)
+    entry = content["robots"][index]
+    T = PoseFile.model_validate(entry["base"]).matrix()
+    if of == "base.yaw_deg":
+        turn = rotation_z(math.radians(value) - math.atan2(T[1, 0], T[0, 0]))
+        T[:3, :3] = turn[:3, :3] @ T[:3, :3]
+    else:
+        T["xyz".index(of[-1]), 3] = value
+    base = PoseFile.of(T).model_dump(mode="json", exclude_none=True)
+    robots = list(content["robots"])
+    robots[index] = {**entry, "base": base}
+    return {**content, "robots": robots}

@@ -1,0 +1,198 @@
+"""However a survey is run, and whatever is killed meanwhile, its store is the same to the bit."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+from distributed import LocalCluster
+
+from symgrasp.cli.main import main
+from symgrasp.errors import SurveyError
+from symgrasp.feasibility.create import create_map
+from symgrasp.reason import Reason
+from symgrasp.scene.scene import Scene
+from symgrasp.survey.evaluation import Evaluator, State
+from symgrasp.survey.results import feasible_cells
+from symgrasp.survey.running import Done, run_survey
+from symgrasp.survey.store import SurveyStore, create_store, open_results
+from symgrasp.survey.survey import Survey
+
+TEXT = """
+schema_version: 1
+name: tiny
+scene: soda_can
+map: {heights: 3, angles: 12, redundancy: 4}
+maps: true
+axes:
+  - {name: table, of: obstacles.table.pose.position.2, values: [-0.05, -0.02]}
+  - {name: x, of: position.x, from: 0.45, to: 0.6, count: 4}
+  - {name: y, of: position.y, values: [-0.1, 0.2]}
+  - {name: tilt, of: tilt_deg, values: [0, 60]}
+"""
+
+KILLED = """
+import os, signal, sys
+from symgrasp.survey.running import run_survey
+from symgrasp.survey.survey import Survey
+
+def die(done):
+    if done.points:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+if __name__ == "__main__":
+    run_survey(Survey.load(sys.argv[1]), sys.argv[2], workers=1, progress=die)
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("survey") / "tiny.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def survey(file) -> Survey:
+    return Survey.load(file)
+
+
+@pytest.fixture(scope="module")
+def one_go(survey, tmp_path_factory) -> Path:
+    """A store that is written batch by batch, without a cluster."""
+    path = tmp_path_factory.mktemp("one_go") / "a.zarr"
+    store = create_store(path, survey)
+    with Evaluator(survey) as evaluator:
+        for batch in range(survey.batches):
+            store.write(batch, {p: evaluator.point(p) for p in survey.points_of(batch)})
+    return path
+
+
+def threads(count: int) -> Any:
+    """Return a cluster whose worker is this process."""
+    return LocalCluster(n_workers=1, threads_per_worker=count, processes=False, dashboard_address=":0")
+
+
+def content(path: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(path)): p.read_bytes() for p in sorted(path.rglob("*")) if p.is_file()}
+
+
+def test_points_are_what_plain_loops_give(survey, one_go):
+    """Every scene is written out anew, and its map computed alone."""
+    _, results = open_results(one_go)
+    cells = feasible_cells(survey, results)
+    base = Scene.load("soda_can").content
+    states = []
+    for k, point in enumerate(np.ndindex(survey.shape)):
+        table, x, y, tilt = (axis.values[i] for axis, i in zip(survey.axes, point, strict=True))
+        found = results.isel(dict(zip(("table", "x", "y", "tilt"), point, strict=True)))
+        states.append(int(found.state))
+        if found.state != State.COMPUTED or k % 3:
+            continue
+        pose = {"position": [x, y, base["tasks"][0]["pose"]["position"][2]], "rpy_deg": [0, tilt, 0]}
+        obstacles = [dict(o) for o in base["obstacles"]]
+        (own,) = [o for o in obstacles if o["name"] == "table"]
+        own["pose"] = {**own["pose"], "position": [*own["pose"]["position"][:2], table]}
+        tasks = [{**base["tasks"][0], "pose": pose}]
+        settings = {"heights": 3, "angles": 12, "redundancy": 4}
+        m = create_map(Scene.from_content({**base, "obstacles": obstacles, "tasks": tasks, "map": settings}))
+        assert float(found.share) == m.feasible.mean()
+        assert dict(zip(found.reason.values, found["cells"].values.tolist(), strict=True)) == {
+            reason.name: m.counts().get(reason, 0) for reason in Reason
+        }
+        where = dict(zip(("table", "x", "y", "tilt"), point, strict=True))
+        assert np.array_equal(cells.isel(where).values, m.feasible)
+        if m.feasible.any():
+            assert m.feasible[tuple(found.best.values)]
+    assert {State.COMPUTED, State.OBJECT_BLOCKED} == set(states)
+    assert (results.share > 0).any()
+
+
+def test_workers_that_die_change_nothing(survey, one_go, tmp_path):
+    killed = []
+
+    def kill(done: Done) -> None:
+        if done.points and not killed:
+            workers = [
+                p for p in psutil.Process().children(recursive=True) if "spawn_main" in str(p.cmdline())
+            ]
+            killed.append(workers[0])
+            workers[0].kill()
+
+    run_survey(survey, tmp_path / "b.zarr", workers=2, progress=kill)
+    assert killed
+    assert content(tmp_path / "b.zarr") == content(one_go)
+
+
+def test_a_killed_run_goes_on(survey, file, one_go, tmp_path):
+    out = tmp_path / "b.zarr"
+    script = tmp_path / "killed.py"
+    script.write_text(KILLED)
+    program = [sys.executable, str(script), str(file), str(out)]
+    assert subprocess.run(program, check=False).returncode == -signal.SIGKILL
+    assert 0 < len(SurveyStore(out, survey).missing()) < survey.batches
+    counts: list[Done] = []
+    with threads(8) as cluster:
+        run_survey(survey, out, scheduler=cluster.scheduler_address, progress=counts.append)
+    assert counts[0].points > 0
+    assert counts[-1] == (survey.points, survey.points)
+    assert content(out) == content(one_go)
+
+
+def test_a_lost_scheduler_leaves_a_good_store(survey, one_go, tmp_path):
+    out = tmp_path / "b.zarr"
+    cluster = threads(1)
+
+    def stop(done: Done) -> None:
+        if done.points:
+            cluster.close()
+
+    with pytest.raises(SurveyError, match="run it again"):
+        run_survey(survey, out, scheduler=cluster.scheduler_address, progress=stop)
+    store = SurveyStore(out, survey)
+    missing = store.missing()
+    assert 0 < len(missing) < survey.batches
+    with Evaluator(survey) as evaluator:
+        for batch in missing:
+            store.write(batch, {p: evaluator.point(p) for p in survey.points_of(batch)})
+    assert content(out) == content(one_go)
+
+
+def test_damage_is_found(survey, one_go, tmp_path):
+    """A chunk that is cut, changed or gone is computed anew."""
+    path = tmp_path / "b.zarr"
+    for name, data in content(one_go).items():
+        (path / name).parent.mkdir(parents=True, exist_ok=True)
+        (path / name).write_bytes(data)
+    store = SurveyStore(path, survey)
+    assert store.missing() == []
+    first, second, third, *_ = (c for c in sorted((path / "margin/c").rglob("*")) if c.is_file())
+    first.unlink()
+    second.write_bytes(second.read_bytes()[:-1])
+    data = bytearray(third.read_bytes())
+    data[0] ^= 1
+    third.write_bytes(data)
+    assert len(store.missing()) == 3
+
+
+def test_another_survey_does_not_mix(file, one_go, tmp_path, capsys):
+    other = tmp_path / "other.yaml"
+    other.write_text(file.read_text().replace("0.45", "0.4"))
+    assert main(["survey", "run", str(other), "--out", str(one_go)]) == 2
+    assert "another folder" in capsys.readouterr().err
+
+
+def test_interrupted(survey, tmp_path):
+    def interrupt(done: Done) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        run_survey(survey, tmp_path / "b.zarr", workers=1, progress=interrupt)
+    assert len(SurveyStore(tmp_path / "b.zarr", survey).missing()) == survey.batches
