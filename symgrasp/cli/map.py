@@ -37,6 +37,8 @@ def add_parser(commands: Commands) -> None:
     add_task_and_arm(command)
     text = "samples of what the arm leaves free, or auto: all of it is searched (default: the scene's)"
     command.add_argument("--redundancy", metavar="N|auto", type=_redundancy, help=text)
+    text = "prove of every cell that it holds as a whole, where that can be proven"
+    command.add_argument("--certify", action="store_true", help=text)
     add_out(command, "write the map: .npz, .png, .svg or .json")
 
 
@@ -54,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from symgrasp.reason import Reason
 
     with progress_of(f"map of {task.name}") as progress:
-        the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress)
+        the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress, certify=args.certify)
     cells = the_map.reason.size
     say(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
     for reason, count in the_map.counts().items():
@@ -65,6 +67,12 @@ def run(args: argparse.Namespace) -> int:
             f"  {100 * proven:.1f} % of the infeasible cells are proven to be, the others to "
             f"{the_map.resolution:.0e} rad of the redundancy"
         )
+    if the_map.certified is not None:
+        whole = the_map.certified
+        for what, these in (("feasible", the_map.feasible), ("infeasible", ~the_map.feasible)):
+            count, proven = int(these.sum()), int((whole & these).sum())
+            share = 100 * proven / max(1, count)
+            say(f"  {proven} of {count} {what} cells ({share:.1f} %) are proven to be so as a whole")
     if Reason.NOT_FOUND in the_map.counts():
         say("  (not found: by a search for configurations, which is no proof that there is none)")
     if args.out:

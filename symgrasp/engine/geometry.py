@@ -28,6 +28,7 @@ __all__ = [
     "ArmGeometry",
     "PlacedPiece",
     "arm_geometry",
+    "hand_poses",
     "link_piece",
     "object_piece",
     "obstacle_pieces",
@@ -162,7 +163,7 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
             joint_axis=np.array(axes),
             frame=np.array([last_joint[link] for link in moving_links], dtype=np.int64),
             local=local,
-            hand=_hand_poses(arm, links[:tool_count], openings),
+            hand=hand_poses(arm, links[:tool_count], openings),
             touch=np.array([link in arm.hand.touch_links for link in moving_links], dtype=bool),
             hand_pairs=pairs[together],
             base_pairs=pairs[base],
@@ -228,7 +229,7 @@ def link_piece(shape: Shape) -> Piece:
     return Piece(shape.vertices, shape.rounding, shape.slack)
 
 
-def _hand_poses(arm: Arm, links: list[str], openings: Array) -> Array:
+def hand_poses(arm: Arm, links: list[str], openings: Array) -> Array:
     """Return the poses (rows, G, 12) of G links in the tool frame at the opening of each row."""
     model = arm.robot.model
     index = [model.link_index(link) for link in links]

@@ -58,6 +58,7 @@ class MapMaker:
         method: Method = "exact",
         manifold: Manifold | None = None,
         progress: Progress | None = None,
+        certify: bool = False,
     ) -> FeasibilityMap:
         """Compute a map; see `create_map`. The task need not be one of the scene's."""
         the_arm, the_task = self._chosen(arm, task)
@@ -65,8 +66,11 @@ class MapMaker:
         if method == "reference":
             return create_map_reference(self.world, the_arm, the_task, grid, progress)
         if the_arm.robot.torso is not None:
-            return merged(self.maps_by_torso(the_arm.name, the_task, manifold=grid, progress=progress))
-        return self._map(the_arm, None, the_task, grid, progress)
+            maps = self.maps_by_torso(
+                the_arm.name, the_task, manifold=grid, progress=progress, certify=certify
+            )
+            return merged(maps)
+        return self._map(the_arm, None, the_task, grid, progress, certify=certify)
 
     def maps_by_torso(
         self,
@@ -75,6 +79,7 @@ class MapMaker:
         *,
         manifold: Manifold | None = None,
         progress: Progress | None = None,
+        certify: bool = False,
     ) -> list[FeasibilityMap]:
         """Compute the map of an arm for every sample of its robot's torso; see `map` for the arguments."""
         the_arm, the_task = self._chosen(arm, task)
@@ -83,7 +88,7 @@ class MapMaker:
         maps = []
         for t in range(len(the_arm.robot.torso)):
             tell = part_of(progress, t, len(the_arm.robot.torso))
-            own = self._map(the_arm.at(t), t, the_task, grid, tell)
+            own = self._map(the_arm.at(t), t, the_task, grid, tell, certify=certify)
             maps.append(at_torso(own, the_arm, t, self._samples(the_arm)))
         return maps
 
@@ -113,11 +118,12 @@ class MapMaker:
         grid: Manifold,
         progress: Progress | None,
         pitch: float | None = None,
+        certify: bool = False,
     ) -> FeasibilityMap:
         """Compute the map of an arm without a torso, or with its torso at a sample."""
         engine = self._engine(arm, torso, grid)
         if engine:
-            return engine.map(task, grid, progress, pitch)
+            return engine.map(task, grid, progress, pitch, certify)
         own = arm if pitch is None else arm.at_pitch(pitch)
         return create_map_reference(self.world, own, task, grid, progress)
 
@@ -183,6 +189,7 @@ def create_map(
     method: Method = "exact",
     manifold: Manifold | None = None,
     progress: Progress | None = None,
+    certify: bool = False,
 ) -> FeasibilityMap:
     """Compute the feasibility map of a task and an arm.
 
@@ -198,13 +205,16 @@ def create_map(
             largest clearance that it found, the reference's are the first.
         manifold: another grid than the scene's.
         progress: called with the finished share; may raise `Cancelled`.
+        certify: whether to prove which cells hold as a whole, see `FeasibilityMap.certified`. Algorithm 1
+            proves none.
 
     Raises:
         SceneError: there is no such arm or task.
         UrdfError: the arm has no closed-form inverse kinematics.
     """
     with open_world(scene) as world:
-        found = MapMaker(world).map(arm, task, method=method, manifold=manifold, progress=progress)
+        maker = MapMaker(world)
+        found = maker.map(arm, task, method=method, manifold=manifold, progress=progress, certify=certify)
     return replace(found, shown_in=scene)
 
 

@@ -7,6 +7,7 @@ through the very functions of the reference. So a cell is feasible here exactly 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -27,6 +28,7 @@ from symgrasp.engine.threads import core_count
 from symgrasp.feasibility.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
+from symgrasp.feasibility.certified import CellProver
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
@@ -88,6 +90,7 @@ class ExactEngine:
         self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
         self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces.size, arm.dof)
         self._copies: list[Scratch] = []
+        self._prover: CellProver | None = None
         # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.pairs_within(arm, self._reach)
@@ -118,6 +121,7 @@ class ExactEngine:
         manifold: Manifold | None = None,
         progress: Progress | None = None,
         pitch: float | None = None,
+        certify: bool = False,
     ) -> FeasibilityMap:
         """Compute the map of a task.
 
@@ -126,6 +130,7 @@ class ExactEngine:
             manifold: another grid than the engine's, with the same heights.
             progress: called with the finished share; may raise `Cancelled`.
             pitch: pitch (rad) at which a pitched arm holds its hand; free if None.
+            certify: whether to prove which cells hold as a whole.
 
         Raises:
             ValueError: the grid has other heights.
@@ -154,8 +159,20 @@ class ExactEngine:
                     draft.reason[:, row], draft.proven[:, row] = misfit, True
             self._search_rows(draft, part, T_base_tool, part_of(progress, part, parts))
             drafts.append(draft.finish(self.world.scene.name, task))
+        found = merged(drafts) if len(drafts) > 1 else drafts[0]
+        if certify:
+            found = replace(found, certified=self._certified(found, task))
         self.world.set_arms(())
-        return merged(drafts) if len(drafts) > 1 else drafts[0]
+        return found
+
+    def _certified(self, found: FeasibilityMap, task: Task) -> np.ndarray:
+        """Return which cells (R, H, A) of a map that was just computed hold as a whole."""
+        if self._fixed_bodies().collision is not None:
+            return np.ones(found.reason.shape, dtype=bool)  # bodies collide whatever the arm does
+        if self._prover is None:
+            scene, ik = self.world.scene, self._solvers.at(0, 0)
+            self._prover = CellProver(scene, self.arm, ik, self._geometry, self.manifold)
+        return self._prover.certified(found, task, self._scratches())
 
     def _place_object(self, T_world_object: Array) -> None:
         """Put the object at a pose (4, 4) in both worlds, PyBullet's and the engine's; the arm at home."""

@@ -15,7 +15,10 @@ from symgrasp.robot.hand import Hand
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["fit", "plot_openings"]
+__all__ = ["fit", "fits_all", "fits_none", "plot_openings"]
+
+ROUNDING = 1e-12
+"""What holds for a range of heights has to hold by that much (m): heights and radii are rounded."""
 
 ROWS = 400
 """Heights at which the picture of the openings asks whether a hand fits."""
@@ -37,6 +40,53 @@ def fit(hand: Hand, profile: Profile, h: float) -> Reason | None:
     if not hand.pads_rest(profile, h):
         return Reason.SURFACE_TOO_STEEP
     return None
+
+
+def fits_all(hand: Hand, profile: Profile, low: float, high: float, halvings: int = 4) -> bool:
+    """Whether a hand is known to fit at every height from ``low`` to ``high`` (m), by halving them."""
+    least, most = profile.radius_span(low, high)
+    _, palm = profile.radius_span(low - hand.palm_width / 2, high + hand.palm_width / 2)
+    bottom, top = low - hand.pad_width / 2, high + hand.pad_width / 2
+    smallest, largest = profile.radius_span(bottom, top)
+    if (
+        hand.min_opening <= 2 * least - ROUNDING
+        and 2 * most + ROUNDING <= hand.max_opening
+        and (not hand.palm_width or palm + ROUNDING <= hand.standoff(least) + hand.palm_depth)
+        and bottom >= profile.h_min - 1e-9 + ROUNDING
+        and top <= profile.h_max + 1e-9 - ROUNDING
+        and largest - smallest + ROUNDING <= hand.radius_tolerance
+    ):
+        return True
+    middle = 0.5 * (low + high)
+    if not halvings or fit(hand, profile, middle) is not None:
+        return False
+    return fits_all(hand, profile, low, middle, halvings - 1) and fits_all(
+        hand, profile, middle, high, halvings - 1
+    )
+
+
+def fits_none(hand: Hand, profile: Profile, low: float, high: float, halvings: int = 4) -> bool:
+    """Whether a hand is known to fit at no height from ``low`` to ``high`` (m), by halving them."""
+    least, most = profile.radius_span(low, high)
+    if 2 * least > hand.max_opening + ROUNDING or 2 * most < hand.min_opening - ROUNDING:
+        return True
+    bottom, top = high - hand.pad_width / 2, low + hand.pad_width / 2  # what is under the pads at all heights
+    if bottom < profile.h_min - 1e-9 - ROUNDING or top > profile.h_max + 1e-9 + ROUNDING:
+        return True
+    smallest, largest = profile.radius_span(bottom, top) if bottom <= top else (0.0, 0.0)
+    if largest - smallest > hand.radius_tolerance + ROUNDING:
+        return True
+    bottom, top = high - hand.palm_width / 2, low + hand.palm_width / 2
+    if hand.palm_width and bottom <= top:
+        _, largest = profile.radius_span(bottom, top)
+        if largest > hand.standoff(most) + hand.palm_depth + ROUNDING:
+            return True
+    middle = 0.5 * (low + high)
+    if not halvings or fit(hand, profile, middle) is None:
+        return False
+    return fits_none(hand, profile, low, middle, halvings - 1) and fits_none(
+        hand, profile, middle, high, halvings - 1
+    )
 
 
 def plot_openings(profile: Profile, hands: Mapping[str, Hand]) -> Figure:

@@ -77,6 +77,9 @@ class FeasibilityMap:
         pitches: pitches (rad) that the hand is held at: then the first axis has all rolls at the first pitch,
             all rolls at the second, and so on, and a cell's roll is an index into them. Empty where the pitch
             is free, or there is none. It is not saved: only planners have such maps.
+        certified: (R, H, A) bool, whether it is proven that a cell holds as a whole: a feasible one is so at
+            every height and angle inside it, an infeasible one at none; the others may be mixed. None where
+            that was not asked for.
     """
 
     scene: str
@@ -99,6 +102,7 @@ class FeasibilityMap:
     shown_in: Scene | None = None
     ease: Array | None = None
     pitches: tuple[float, ...] = ()
+    certified: np.ndarray | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
@@ -109,6 +113,8 @@ class FeasibilityMap:
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        if self.certified is not None:
+            self.certified.setflags(write=False)
 
     @cached_property
     def feasible(self) -> np.ndarray:
@@ -156,6 +162,17 @@ class FeasibilityMap:
             return f"a search of the redundancy to {self.resolution:.0e} rad"
         return f"{len(self.phi)} redundancy samples"
 
+    def holds(self, cell: Cell | tuple[int, int, int]) -> str:
+        """Say in words whether a cell is proven to hold as a whole; empty where that was not asked for."""
+        if self.certified is None:
+            return ""
+        return "proven for the whole cell" if self.certified[Cell(*cell)] else "not proven for the whole cell"
+
+    @property
+    def certified_share(self) -> float | None:
+        """Share of the cells that are proven to hold as a whole; None where that was not asked for."""
+        return None if self.certified is None else float(self.certified.mean())
+
     def counts(self) -> dict[Reason, int]:
         """Return how many cells each reason has, most frequent first."""
         values, counts = np.unique(self.reason, return_counts=True)
@@ -192,6 +209,8 @@ class FeasibilityMap:
         }
         if self.ease is not None:
             rolled["ease"] = np.roll(self.ease, -k, axis=2)
+        if self.certified is not None:
+            rolled["certified"] = np.roll(self.certified, -k, axis=2)
         turned = self.T_world_object @ rotation_z(delta)
         return replace(self, T_world_object=turned, manifold=manifold, **rolled)
 
@@ -206,6 +225,7 @@ class FeasibilityMap:
             branch=np.where(drop, -1, self.branch),
             clearance=np.where(drop, np.nan, self.clearance),
             proven=self.proven & ~drop,
+            certified=None if self.certified is None else self.certified & ~drop,
         )
 
     def values(self, color_by: ColorBy) -> Array:
@@ -293,12 +313,15 @@ class FeasibilityMap:
             "margin_along": self.margins[..., 0].tolist(),
             "margin_around": self.margins[..., 1].tolist(),
             "proven": self.proven.tolist(),
+            "certified": None if self.certified is None else self.certified.tolist(),
         }
 
     def to_npz(self) -> bytes:
         """Return the map as the content of an npz file."""
         buffer = io.BytesIO()
         arrays = {name: getattr(self, name) for name in _ARRAYS}
+        if self.certified is not None:
+            arrays["certified"] = self.certified
         meta = np.array(json.dumps(self._meta()))
         np.savez_compressed(buffer, meta=meta, profile=self.manifold.profile.points, **arrays)
         return buffer.getvalue()
@@ -318,7 +341,8 @@ class FeasibilityMap:
         try:
             with np.load(path, allow_pickle=False) as file:
                 names = (*_ARRAYS, "profile", "meta")
-                data = {name: file[name] for name in names if name != "proven" or name in file.files}
+                optional = {"proven", "certified"} - set(file.files)
+                data = {name: file[name] for name in (*names, "certified") if name not in optional}
             meta = json.loads(str(data.pop("meta")))
         except FileNotFoundError:
             raise MapError(path, "file", str(path), "an existing map file") from None
@@ -331,7 +355,8 @@ class FeasibilityMap:
                 Profile(data.pop("profile"), str(path)), meta["heights"], meta["angles"], meta["theta_start"]
             )
             shape = (len(ROLLS), manifold.heights, manifold.angles)
-            for name in ("reason", "sample", "branch", "clearance", "depth"):
+            shaped = {"reason", "sample", "branch", "clearance", "depth", "proven", "certified"}
+            for name in sorted(shaped.intersection(data)):
                 if data[name].shape != shape:
                     raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
             reasons = VERSION_2_REASONS if meta["version"] == 2 else meta["reasons"]

@@ -57,6 +57,11 @@ def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:
     names = ("reason", "q", "sample", "branch", "clearance", "depth")
     arrays = {name: pick([getattr(m, name) for m in maps]) for name in names}
     proven = np.logical_and.reduce([m.proven for m in maps])
+    certified = [m.certified for m in maps if m.certified is not None]
+    if len(certified) == len(maps):
+        whole = [c & m.feasible for c, m in zip(certified, maps, strict=True)]
+        none = [c & ~m.feasible for c, m in zip(certified, maps, strict=True)]
+        arrays["certified"] = np.logical_or.reduce(whole) | np.logical_and.reduce(none)
     return replace(maps[0], **arrays, pair=pick(pairs), bodies=bodies, proven=proven)
 
 

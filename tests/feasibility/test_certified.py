@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from symgrasp.feasibility.cell_rows import arm_reach, new_rows
+from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.fit import fit, fits_all, fits_none
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.manifold import Manifold
+from symgrasp.object.profile import Profile
+from symgrasp.poses import from_position_rpy
+from symgrasp.robot.hand import HANDS
+from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
+from symgrasp.world import open_world
+
+SAMPLES = 25
+"""Points of a cell along and around at which the engine is asked."""
+
+
+@pytest.mark.parametrize(
+    ("name", "task", "whole", "none"),
+    [("bottle_on_table", "pick", 5, 20), ("pick_pour_place", "pour", 20, 20), ("ur5_bottle", "pick", 40, 20)],
+)
+def test_no_point_contradicts_a_certificate(name, task, whole, none):
+    scene = Scene.load(name).with_settings(heights=8, angles=16)
+    _compare(scene, scene.task(task), whole, none)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_point_of_an_object_at_a_random_place_contradicts_a_certificate(seed):
+    rng = np.random.default_rng(seed)
+    scene = Scene.load("pick_pour_place").with_settings(heights=8, angles=16, redundancy=4, margin=0.003)
+    task = scene.task("pour")
+    T = task.T_world_object @ from_position_rpy(rng.normal(0, 0.08, 3), rng.normal(0, 0.4, 3))
+    _compare(scene, Task("moved", task.arms, T), 0, 1)
+
+
+def _compare(scene, task, whole, none):
+    """Compare a map with a finer one: at least so many feasible and infeasible cells must be certified."""
+    grid = scene.manifold
+    fine = Manifold(grid.profile, grid.heights * SAMPLES, grid.angles * SAMPLES)
+    with open_world(scene) as world:
+        maker = MapMaker(world)
+        m = maker.map(None, task, certify=True)
+        points = maker.map(None, task, manifold=fine).feasible
+    cells = points.reshape(2, grid.heights, SAMPLES, grid.angles, SAMPLES).transpose(0, 1, 3, 2, 4)
+    assert cells[m.certified & m.feasible].all()
+    assert not cells[m.certified & ~m.feasible].any()
+    assert (m.certified & m.feasible).sum() >= whole
+    assert (m.certified & ~m.feasible).sum() >= none
+
+
+def test_is_kept_in_files_shifts_and_merged_maps(tmp_path):
+    scene = Scene.load("soda_can").with_settings(heights=6, angles=12, redundancy=4)
+    m = create_map(scene, certify=True)
+    m.save(tmp_path / "map.npz")
+    again = FeasibilityMap.load(tmp_path / "map.npz")
+    assert np.array_equal(again.certified, m.certified)
+    assert again.to_dict()["certified"] == m.certified.tolist()
+    assert np.array_equal(m.shift(2 * m.manifold.dtheta).certified, np.roll(m.certified, -2, axis=2))
+    assert m.certified_share == m.certified.mean() > 0
+    assert not m.masked(np.zeros_like(m.feasible)).certified[m.feasible].any()
+    cell = tuple(np.argwhere(m.certified)[0])
+    assert m.holds(cell) == "proven for the whole cell"
+    plain = create_map(scene)
+    assert plain.certified is None
+    assert plain.holds(cell) == ""
+
+
+@st.composite
+def profiles(draw):
+    heights = np.cumsum(draw(st.lists(st.floats(0.002, 0.05), min_size=2, max_size=6)))
+    radii = draw(st.lists(st.floats(0.0, 0.06), min_size=len(heights), max_size=len(heights)))
+    return Profile(np.column_stack([heights, np.maximum(radii, 1e-3)]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(profiles(), st.floats(0, 1), st.floats(0, 1), st.sampled_from(["franka", "wsg50", "pr2"]))
+def test_fit_of_ranges_agrees_with_fit_at_heights(profile, a, b, name):
+    hand = HANDS[name]
+    low, high = profile.h_min + (profile.h_max - profile.h_min) * np.sort([a, b])
+    at = np.clip(np.linspace(low, high, 41), profile.h_min, profile.h_max)
+    fits = [fit(hand, profile, float(h)) is None for h in at]
+    assert all(fits) or not fits_all(hand, profile, float(low), float(high))
+    assert not (any(fits) and fits_none(hand, profile, float(low), float(high)))
+
+
+def test_arm_never_reaches_further():
+    rng = np.random.default_rng(0)
+    arm = Scene.load("bottle_on_table").arm("panda")
+    axes = np.cumsum(arm.P, axis=0)[:-1]
+    first, last, reach = arm_reach(axes, arm.H)
+    wrist = arm.R0.T @ (last - arm.P.sum(axis=0))
+    q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (20_000, arm.dof))
+    T = arm.tool_pose(q)
+    away = np.linalg.norm(T[:, :3, :3] @ wrist + T[:, :3, 3] - first, axis=-1)
+    assert away.max() <= reach
+    assert away.max() > 0.9 * reach
+
+
+@pytest.mark.parametrize("name", ["soda_can", "handover_between_robots", "g1_bottle"])
+def test_hands_move_no_further_than_their_play(name):
+    scene = Scene.load(name)
+    grid = scene.manifold
+    with open_world(scene) as world:
+        maker = MapMaker(world)
+        for arm in scene.arms.values():
+            engine = maker._engine(arm, None, grid)
+            geometry = engine._geometry
+            count = geometry.moving.hand.shape[1]
+            links = [n.link for n in geometry.names[:count]]
+            rows, first, _ = new_rows(arm, grid, 2, links, geometry.pieces)
+            for level in range(2):  # the rows of the next level lie in these
+                own = np.arange(first[level], first[level + 1])
+                finer = first[level + 1] + np.arange(2 * len(own))
+                parent = own[np.arange(len(finer)) // 2]
+                for k in range(count):
+                    start, end, _ = geometry.pieces.ranges[k]
+                    corners = geometry.pieces.vertices[start:end]
+                    placed = [
+                        np.einsum("rij,pj->rpi", T[:, :9].reshape(-1, 3, 3), corners) + T[:, None, 9:]
+                        for T in (rows.hand[finer, k], rows.hand[parent, k])
+                    ]
+                    moved = np.linalg.norm(placed[0] - placed[1], axis=-1).max(axis=1)
+                    assert (moved <= rows.play[parent, k] + 1e-12).all()
