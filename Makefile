@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench robots grids
+.PHONY: app test figures schemas bench robots grids cells
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -45,3 +45,6 @@ robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write th
 grids: $(VENV)/dev.stamp  ## measure coarse and fine grids of every shipped scene, and write docs/grids.md (minutes)
 	$(BIN)/python -m docs.grids
 	$(BIN)/python -m docs.figures grids
+
+cells: $(VENV)/dev.stamp  ## measure what is proven of the cells of every shipped scene, and write it to docs/grids.md
+	$(BIN)/python -m docs.cells

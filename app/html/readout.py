@@ -57,7 +57,7 @@ def grasp_html(state: State) -> str:
     if not state.is_fresh or state.map is None or state.cell is None:
         return f'<div class="sg"><b>{where}</b><br>waits for the map</div>'
     where += f", roll {np.rad2deg(ROLLS[state.cell.roll]):.0f}°"
-    why = escape(state.map.why(state.cell))
+    why = ", ".join(filter(None, [escape(state.map.why(state.cell)), state.map.holds(state.cell)]))
     witness = state.map.witness(state.cell)
     if witness is None and state.explanation and state.shown_candidate:
         best = "The best" if state.candidate == 0 else "One"
@@ -69,6 +69,7 @@ def grasp_html(state: State) -> str:
     if witness is None:
         return f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} cannot hold it here: {why}</div>'
     margin = state.map.margin(state.cell)
+    least = "" if state.map.refined is None else "at least "
     holds = state.shown_task.holds if state.shown_task else ()
     hold = next((hold for hold in holds if hold.arm == state.arm), None)
     arm = state.scene.arm(state.arm)
@@ -79,7 +80,7 @@ def grasp_html(state: State) -> str:
         joints += f"; hand pitched by {np.round(np.rad2deg(pitch)) + 0.0:.0f}°"
     return (
         f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} holds it: {why}; '
-        f"room for {100 * margin.along:.1f} cm along and {np.rad2deg(margin.around):.1f}° around"
+        f"room for {least}{100 * margin.along:.1f} cm along and {np.rad2deg(margin.around):.1f}° around"
         f"<br>Joints {joints}; fingers {100 * witness.opening:.1f} cm apart</div>"
     )
 

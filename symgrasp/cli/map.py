@@ -38,7 +38,7 @@ def add_parser(commands: Commands) -> None:
     text = "samples of what the arm leaves free, or auto: all of it is searched (default: the scene's)"
     command.add_argument("--redundancy", metavar="N|auto", type=_redundancy, help=text)
     text = "prove of every cell that it holds as a whole, where that can be proven"
-    command.add_argument("--certify", action="store_true", help=text)
+    command.add_argument("--certify", action="store_true", default=None, help=text)
     add_out(command, "write the map: .npz, .png, .svg or .json")
 
 
@@ -73,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
             count, proven = int(these.sum()), int((whole & these).sum())
             share = 100 * proven / max(1, count)
             say(f"  {proven} of {count} {what} cells ({share:.1f} %) are proven to be so as a whole")
+    if the_map.refined is not None:
+        say(f"  feasible area, with cells split to parts: {the_map.refined.area}")
     if Reason.NOT_FOUND in the_map.counts():
         say("  (not found: by a search for configurations, which is no proof that there is none)")
     if args.out:

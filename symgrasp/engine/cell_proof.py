@@ -280,11 +280,18 @@ def _refute(moving, pieces, tree, inputs, work, box):
     y = T[3] * w[0] + T[4] * w[1] + T[5] * w[2] + T[10]
     z = T[6] * w[0] + T[7] * w[1] + T[8] * w[2] + T[11]
     a = inputs.shoulder
-    beyond = math.sqrt((x - a[0]) ** 2 + (y - a[1]) ** 2 + (z - a[2]) ** 2) - inputs.reach
+    d0, d1, d2 = x - a[0], y - a[1], z - a[2]
+    along = (
+        d0 * (T[0] * w[3] + T[1] * w[4] + T[2] * w[5])
+        + d1 * (T[3] * w[3] + T[4] * w[4] + T[5] * w[5])
+        + d2 * (T[6] * w[3] + T[7] * w[4] + T[8] * w[5])
+    )
+    across = math.sqrt(max(0.0, d0 * d0 + d1 * d1 + d2 * d2 - along * along)) - w[6]
+    beyond = math.sqrt(along * along + across * across) - inputs.reach
     if beyond > ROUNDING:
         known = OPEN
         moves, _ = tool_motion(inputs, box, x, y, z)
-        if beyond > moves + ROUNDING:
+        if beyond > moves + 0.5 * inputs.width / (1 << box[1]) * w[6] + ROUNDING:
             return PROVEN
     _place_hand(moving, pieces, inputs, work, r)
     scratch = work.scratch

@@ -61,9 +61,10 @@ class CellInput(NamedTuple):
         limits: (2, n) limits (rad) of the joints, infinite where there are none.
         margin: distance (m) to keep from static pieces.
         inner: bodies inside the pieces, see `inner_pieces`.
-        shoulder: (3,) a point in the world of which the arm never takes a point fixed to the tool further
-            away than its reach.
-        wrist: (3,) that point in the tool frame.
+        shoulder: (3,) a point in the world from which the arm never takes a point of the wrist further away
+            than its reach.
+        wrist: (7,) middle, axis and radius (m) of the circle in the tool frame on which that point is: the
+            last joint turns it.
         reach: that distance (m).
     """
 

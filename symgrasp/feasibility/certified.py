@@ -27,7 +27,7 @@ from symgrasp.scene.scene import Scene
 __all__ = ["LEVELS", "CellProver"]
 
 LEVELS = 3
-"""How often a cell may be cut in two, along and around, to be proven."""
+"""How often the cells of a map may be cut in two, along and around, to be proven."""
 
 
 class CellProver:
@@ -41,13 +41,22 @@ class CellProver:
         ik: its inverse kinematics.
         geometry: what the arm moves, and may collide with.
         manifold: the grid; maps may be on others with the same heights.
+        levels: how often a cell may be cut in two, along and around, to be proven.
     """
 
-    def __init__(self, scene: Scene, arm: Arm, ik: Solver, geometry: ArmGeometry, manifold: Manifold) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        arm: Arm,
+        ik: Solver,
+        geometry: ArmGeometry,
+        manifold: Manifold,
+        levels: int = LEVELS,
+    ) -> None:
         self._scene, self._arm, self._geometry = scene, arm, geometry
         moving = geometry.moving
         links = [name.link for name in geometry.names[: moving.hand.shape[1]]]
-        self._rows, self._first, opening = new_rows(arm, manifold, LEVELS, links, geometry.pieces)
+        self._rows, self._first, opening = new_rows(arm, manifold, levels, links, geometry.pieces)
         if arm.pitched:
             return
         joints = [next(j for j in arm.robot.model.joints if j.name == name) for name in arm.joint_names]
@@ -56,20 +65,27 @@ class CellProver:
         frames = np.array([zero[j.child] for j in joints])
         tool = zero[arm.robot.model.link_index(arm.tool)]
         axes = (frames[:, :3, :3] @ np.array([j.axis for j in joints])[..., None])[..., 0]
-        self._shoulder, wrist, self._reach = arm_reach(frames[:, :3, 3], axes)
-        self._wrist = (inverse(tool) @ [*wrist, 1.0])[:3]
+        self._shoulder, wrist, self._reach = arm_reach(frames[:-1, :3, 3], axes[:-1])
+        away, last = wrist - frames[-1, :3, 3], axes[-1]
+        middle = frames[-1, :3, 3] + (away @ last) * last
+        into = inverse(tool)
+        radius = float(np.linalg.norm(wrist - middle))
+        self._wrist = np.array([*(into @ [*middle, 1.0])[:3], *into[:3, :3] @ last, radius])
         self._tool = pose_rows(inverse(frames[-1]) @ tool)
         locked = getattr(ik, "locked", None)
         self._free = np.array([j for j in range(arm.dof) if j != locked], dtype=np.int64)
         self._inner = inner_pieces(geometry.pieces)
 
-    def certified(self, m: FeasibilityMap, task: Task, scratches: Sequence[Scratch]) -> np.ndarray:
+    def certified(
+        self, m: FeasibilityMap, task: Task, scratches: Sequence[Scratch], only: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return which cells (R, H, A) of a map hold as a whole.
 
         Args:
             m: the map.
             task: its task.
             scratches: the poses of all pieces, for each thread, with the object where the task has it.
+            only: (R, H, A) of which cells that is asked; of all if None.
         """
         found = np.zeros(m.reason.shape, dtype=bool)
         if self._arm.pitched:
@@ -92,6 +108,8 @@ class CellProver:
             reach=self._reach,
         )
         wanted = ~m.feasible if settings.approach else np.ones_like(found)
+        if only is not None:
+            wanted &= only
         cells = np.argwhere(wanted)
         found[wanted] = prove_cells(
             geometry.moving, geometry.pieces, geometry.tree, scratches, inputs, self._loaded(task), cells,

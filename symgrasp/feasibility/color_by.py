@@ -95,14 +95,37 @@ class ColoredMap:
     scale: Scale | None = None
 
 
-def color_map(color_by: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap:
+LIGHTER = 0.55
+"""How much of the colour of what is not proven is white."""
+
+
+def color_map(
+    color_by: ColorBy, reason: np.ndarray, values: Array, certified: np.ndarray | None = None
+) -> ColoredMap:
     """Colour a map.
 
     Args:
         color_by: what its colours stand for.
         reason: (..., H, A) of `Reason`.
         values: (..., H, A) values in the unit of ``color_by``; NaN where there is none.
+        certified: (..., H, A) bool, which cells are proven to hold as a whole: reasons of the others are
+            lighter, and so is whether they are feasible. None where nothing is known of that.
     """
+    colored = _colored(color_by, reason, values)
+    if certified is None or colored.scale is not None:
+        return colored
+    shades = np.round((1 - LIGHTER) * colored.colors + LIGHTER * 255).astype(np.uint8)
+    open_cells = int(np.count_nonzero(~certified))
+    swatch = Swatch(_hex(NONE), "lighter: not proven as a whole", open_cells)
+    return ColoredMap(
+        np.where(certified, colored.index, colored.index + len(shades)).astype(np.uint8),
+        np.concatenate([colored.colors, shades]),
+        (*colored.swatches, swatch),
+    )
+
+
+def _colored(color_by: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap:
+    """Colour a map, whatever is proven of it."""
     if color_by is ColorBy.REASON:
         colors = np.array([_channels(r.color) for r in Reason], dtype=np.uint8)
         counts = np.bincount(reason.ravel(), minlength=len(Reason))

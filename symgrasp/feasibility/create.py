@@ -13,10 +13,12 @@ import numpy as np
 from symgrasp.errors import InputError
 from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.certified import LEVELS
 from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.pitch_maps import at_pitches
+from symgrasp.feasibility.refined import refined
 from symgrasp.feasibility.torso_maps import at_torso, merged
 from symgrasp.ik import Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold, wrap
@@ -47,7 +49,7 @@ class MapMaker:
 
     def __init__(self, world: BulletWorld) -> None:
         self.world, self.scene = world, world.scene
-        self._engines: dict[tuple[str, int | None], ExactEngine | None] = {}
+        self._engines: dict[tuple[str, int | None, int], ExactEngine | None] = {}
         self._solvers: dict[str, Solver] = {}
 
     def map(
@@ -58,7 +60,7 @@ class MapMaker:
         method: Method = "exact",
         manifold: Manifold | None = None,
         progress: Progress | None = None,
-        certify: bool = False,
+        certify: bool | None = None,
     ) -> FeasibilityMap:
         """Compute a map; see `create_map`. The task need not be one of the scene's."""
         the_arm, the_task = self._chosen(arm, task)
@@ -79,7 +81,7 @@ class MapMaker:
         *,
         manifold: Manifold | None = None,
         progress: Progress | None = None,
-        certify: bool = False,
+        certify: bool | None = None,
     ) -> list[FeasibilityMap]:
         """Compute the map of an arm for every sample of its robot's torso; see `map` for the arguments."""
         the_arm, the_task = self._chosen(arm, task)
@@ -118,14 +120,29 @@ class MapMaker:
         grid: Manifold,
         progress: Progress | None,
         pitch: float | None = None,
-        certify: bool = False,
+        certify: bool | None = None,
     ) -> FeasibilityMap:
         """Compute the map of an arm without a torso, or with its torso at a sample."""
         engine = self._engine(arm, torso, grid)
-        if engine:
-            return engine.map(task, grid, progress, pitch, certify)
-        own = arm if pitch is None else arm.at_pitch(pitch)
-        return create_map_reference(self.world, own, task, grid, progress)
+        if engine is None:
+            own = arm if pitch is None else arm.at_pitch(pitch)
+            return create_map_reference(self.world, own, task, grid, progress)
+        settings = self.scene.settings
+        if certify is None:
+            certify = settings.resolution is not None
+        finer = settings.finer(grid) if certify and not arm.pitched else []
+        tell = part_of(progress, 0, 1 + len(finer))
+        found = engine.map(task, grid, tell, pitch, certify)
+        if settings.resolution is None or not certify or arm.pitched:
+            return found
+
+        def map_on(parts: Manifold, wanted: np.ndarray) -> FeasibilityMap:
+            level = 1 + finer.index(parts)
+            own = self._engine(arm, torso, parts, max(1, LEVELS - level))
+            assert own is not None  # as there is one for the map
+            return own.map(task, parts, part_of(progress, level, 1 + len(finer)), None, True, wanted)
+
+        return replace(found, refined=refined(found, finer, map_on))
 
     def explain(
         self,
@@ -152,7 +169,7 @@ class MapMaker:
             own = the_arm.grasping(grid, where.row, where.roll)
             self._solvers[the_arm.name] = ik = solver_for(own, self.scene.settings.samples)
         if self.scene.settings.redundancy == "auto":
-            witness = self.map(the_arm.name, the_task, manifold=grid).witness(where)
+            witness = self.map(the_arm.name, the_task, manifold=grid, certify=False).witness(where)
             if witness is not None and not the_arm.pitched:
                 ik = solver_for(the_arm, self.scene.settings.samples, more=[witness.phi])
         return explain_cell(self.world, ik, the_task, grid, where, progress)
@@ -169,15 +186,17 @@ class MapMaker:
         chosen = task if isinstance(task, Task) else self.scene.task(task)
         return self.scene.arm(arm or chosen.arms[0]), chosen
 
-    def _engine(self, arm: Arm, torso: int | None, grid: Manifold) -> ExactEngine | None:
+    def _engine(
+        self, arm: Arm, torso: int | None, grid: Manifold, levels: int = LEVELS
+    ) -> ExactEngine | None:
         """Return an arm's engine for a grid's heights, or None where the engine does not know the arm."""
-        known = self._engines.get((arm.name, torso))
+        known = self._engines.get((arm.name, torso, grid.heights))
         if known and not np.array_equal(known.manifold.h, grid.h):
             known = None
         if known is None:
             with suppress(NotImplementedError):
-                known = ExactEngine(self.world, arm, grid)
-        self._engines[arm.name, torso] = known
+                known = ExactEngine(self.world, arm, grid, levels)
+        self._engines[arm.name, torso, grid.heights] = known
         return known
 
 
@@ -189,7 +208,7 @@ def create_map(
     method: Method = "exact",
     manifold: Manifold | None = None,
     progress: Progress | None = None,
-    certify: bool = False,
+    certify: bool | None = None,
 ) -> FeasibilityMap:
     """Compute the feasibility map of a task and an arm.
 
@@ -205,8 +224,9 @@ def create_map(
             largest clearance that it found, the reference's are the first.
         manifold: another grid than the scene's.
         progress: called with the finished share; may raise `Cancelled`.
-        certify: whether to prove which cells hold as a whole, see `FeasibilityMap.certified`. Algorithm 1
-            proves none.
+        certify: whether to prove which cells hold as a whole, see `FeasibilityMap.certified`; if None, where
+            the scene asks for a resolution, to which cells are then split too. Algorithm 1 proves none, and
+            cells of arms with five joints are not split.
 
     Raises:
         SceneError: there is no such arm or task.

@@ -28,7 +28,7 @@ from symgrasp.engine.threads import core_count
 from symgrasp.feasibility.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
-from symgrasp.feasibility.certified import CellProver
+from symgrasp.feasibility.certified import LEVELS, CellProver
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
@@ -70,14 +70,15 @@ class ExactEngine:
         world: a world of the scene's robots, obstacles and object.
         arm: the arm.
         manifold: the grid; maps may be asked for others with the same heights.
+        levels: see `CellProver`.
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm.
         NotImplementedError: the arm is not of the kinds the engine knows; see `knows`.
     """
 
-    def __init__(self, world: BulletWorld, arm: Arm, manifold: Manifold) -> None:
-        self.world, self.arm, self.manifold = world, arm, manifold
+    def __init__(self, world: BulletWorld, arm: Arm, manifold: Manifold, levels: int = LEVELS) -> None:
+        self.world, self.arm, self.manifold, self._levels = world, arm, manifold, levels
         self._settings = world.scene.settings
         self._solvers = self._new_solvers(manifold)
         if compiled_parts(self._solvers.at(0, 0)) is None or not supports(arm):
@@ -122,6 +123,7 @@ class ExactEngine:
         progress: Progress | None = None,
         pitch: float | None = None,
         certify: bool = False,
+        only: np.ndarray | None = None,
     ) -> FeasibilityMap:
         """Compute the map of a task.
 
@@ -131,6 +133,7 @@ class ExactEngine:
             progress: called with the finished share; may raise `Cancelled`.
             pitch: pitch (rad) at which a pitched arm holds its hand; free if None.
             certify: whether to prove which cells hold as a whole.
+            only: (R, H, A) which cells to search; of the others nothing is known then.
 
         Raises:
             ValueError: the grid has other heights.
@@ -157,22 +160,22 @@ class ExactEngine:
             for row, misfit in enumerate(self._misfit):
                 if misfit is not None:
                     draft.reason[:, row], draft.proven[:, row] = misfit, True
-            self._search_rows(draft, part, T_base_tool, part_of(progress, part, parts))
+            self._search_rows(draft, part, T_base_tool, part_of(progress, part, parts), only)
             drafts.append(draft.finish(self.world.scene.name, task))
         found = merged(drafts) if len(drafts) > 1 else drafts[0]
         if certify:
-            found = replace(found, certified=self._certified(found, task))
+            found = replace(found, certified=self._certified(found, task, only))
         self.world.set_arms(())
         return found
 
-    def _certified(self, found: FeasibilityMap, task: Task) -> np.ndarray:
-        """Return which cells (R, H, A) of a map that was just computed hold as a whole."""
+    def _certified(self, found: FeasibilityMap, task: Task, only: np.ndarray | None) -> np.ndarray:
+        """Return which cells (R, H, A) of a map that was just computed hold as a whole, of some or all."""
         if self._fixed_bodies().collision is not None:
             return np.ones(found.reason.shape, dtype=bool)  # bodies collide whatever the arm does
         if self._prover is None:
             scene, ik = self.world.scene, self._solvers.at(0, 0)
-            self._prover = CellProver(scene, self.arm, ik, self._geometry, self.manifold)
-        return self._prover.certified(found, task, self._scratches())
+            self._prover = CellProver(scene, self.arm, ik, self._geometry, self.manifold, self._levels)
+        return self._prover.certified(found, task, self._scratches(), only)
 
     def _place_object(self, T_world_object: Array) -> None:
         """Put the object at a pose (4, 4) in both worlds, PyBullet's and the engine's; the arm at home."""
@@ -193,7 +196,14 @@ class ExactEngine:
             copy.pose[objects], copy.box[objects] = self._scratch.pose[objects], self._scratch.box[objects]
         return self._copies[: core_count()]
 
-    def _search_rows(self, draft: MapDraft, part: int, T_base_tool: Array, progress: Progress | None) -> None:
+    def _search_rows(
+        self,
+        draft: MapDraft,
+        part: int,
+        T_base_tool: Array,
+        progress: Progress | None,
+        only: np.ndarray | None,
+    ) -> None:
         """Fill the rows at which the hand fits, some at a time so that progress is told often enough.
 
         Args:
@@ -201,15 +211,17 @@ class ExactEngine:
             part: which of the solvers of a pitched arm is used, see `PitchedIK.parts`; 0 for other arms.
             T_base_tool: (R, H, A, 4, 4) tool poses of all cells.
             progress: called with the finished share; may raise `Cancelled`.
+            only: (R, H, A) which cells to search, or all.
         """
         fixed, bodies = self._fixed_bodies(), self._bodies(draft)
-        rows = np.array([row for row, misfit in enumerate(self._misfit) if misfit is None], dtype=np.int64)
+        wanted = np.array([misfit is None for misfit in self._misfit])
+        rows = np.flatnonzero(wanted if only is None else wanted & only.any(axis=(0, 2)))
         first, count = 0, 1
         while first < len(rows):
             start = perf_counter()
             some = rows[first : first + count]
             for batch in batches(self._solvers, self._geometry, some, part):
-                for _ in self._search(draft, bodies, batch, T_base_tool, fixed):
+                for _ in self._search(draft, bodies, batch, T_base_tool, fixed, only):
                     if progress and perf_counter() - start > TELL:
                         progress(first / len(rows))  # PyBullet takes its time: here one may cancel, too
             first += len(some)
@@ -262,15 +274,23 @@ class ExactEngine:
         batch: Batch,
         T_base_tool: Array,
         fixed: FixedBodies,
+        only: np.ndarray | None,
     ) -> Iterator[None]:
         """Search some cells of the map; pause after every one that PyBullet decided."""
         rows, rolls = batch.rows, batch.rolls
-        tries = len(rows) * len(rolls) * draft.manifold.angles * len(batch.order)
+        roll, row, column = np.indices((len(rolls), len(rows), draft.manifold.angles)).reshape(3, -1)
+        cells, runs = (rolls[roll], rows[row], column), np.tile(rows, len(rolls))
+        if only is not None:
+            cells = tuple(part[only[cells]] for part in cells)
+            runs = cells[1]  # each cell for itself
+            if not len(runs):
+                return
+        tries = len(cells[0]) * len(batch.order)
         inputs = search.SearchInput(
             sample_order=batch.order,
             T_world_base=self._T_world_base,
-            T_base_tool=np.ascontiguousarray(T_base_tool[np.ix_(rolls, rows)].reshape(-1, 4, 4)),
-            row=np.tile(rows, len(rolls)),
+            T_base_tool=np.ascontiguousarray(T_base_tool[cells]),
+            row=runs,
             retreat=-retreat_distances(self._settings.approach),
             turns=retreat_turns(self.arm.velocity, self._settings.approach),
             margin=float(self._settings.margin),
@@ -288,8 +308,6 @@ class ExactEngine:
             self._balance,
             self.arm.dof,
         )
-        roll, row, column = np.indices((len(rolls), len(rows), draft.manifold.angles)).reshape(3, -1)
-        cells = (rolls[roll], rows[row], column)
         found.solution[:, 0] = batch.samples[found.solution[:, 0]]  # of cells without one it is not used
         record_search(draft, bodies, found, cells, fixed)
         covered = self._cover(draft, found, inputs, batch, cells)

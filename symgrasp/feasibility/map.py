@@ -18,6 +18,7 @@ from symgrasp.feasibility import pictures
 from symgrasp.feasibility.cell import Cell, Margin, Witness
 from symgrasp.feasibility.color_by import ColorBy, color_map
 from symgrasp.feasibility.margins import cells_to_infeasible
+from symgrasp.feasibility.refined import Refined
 from symgrasp.files import write_atomically
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.object.profile import Profile
@@ -80,6 +81,8 @@ class FeasibilityMap:
         certified: (R, H, A) bool, whether it is proven that a cell holds as a whole: a feasible one is so at
             every height and angle inside it, an infeasible one at none; the others may be mixed. None where
             that was not asked for.
+        refined: the cells that may be mixed, split down to the resolution that the scene asks for; None where
+            it asks for none.
     """
 
     scene: str
@@ -103,6 +106,7 @@ class FeasibilityMap:
     ease: Array | None = None
     pitches: tuple[float, ...] = ()
     certified: np.ndarray | None = None
+    refined: Refined | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
@@ -181,6 +185,18 @@ class FeasibilityMap:
 
     @cached_property
     def margins(self) -> Array:
+        """(R, H, A, 2) how far from cells' centres grasps stay feasible, along (m) and around (rad) the axis.
+
+        Where the scene asks for a resolution, these are proven lower bounds; else `cell_margins`.
+        """
+        if self.refined is None:
+            return self.cell_margins
+        margins = np.where(self.feasible[..., None], self.refined.margins(self.manifold), 0.0)
+        margins.setflags(write=False)
+        return margins
+
+    @cached_property
+    def cell_margins(self) -> Array:
         """(R, H, A, 2) distance along the axis (m) and angle around it (rad) to the nearest infeasible cell.
 
         Zero where infeasible. Both ends of the object count as infeasible; around the object
@@ -193,7 +209,7 @@ class FeasibilityMap:
         return margins
 
     def margin(self, cell: Cell | tuple[int, int, int]) -> Margin:
-        """Return how far a cell may be off along and around the object and still be feasible."""
+        """Return how far a grasp may be off a cell's centre along and around the object, see `margins`."""
         return Margin(*self.margins[Cell(*cell)].tolist())
 
     def shift(self, delta: float) -> FeasibilityMap:
@@ -211,6 +227,8 @@ class FeasibilityMap:
             rolled["ease"] = np.roll(self.ease, -k, axis=2)
         if self.certified is not None:
             rolled["certified"] = np.roll(self.certified, -k, axis=2)
+        if self.refined is not None:
+            rolled["refined"] = self.refined.shift(manifold, k)
         turned = self.T_world_object @ rotation_z(delta)
         return replace(self, T_world_object=turned, manifold=manifold, **rolled)
 
@@ -226,6 +244,7 @@ class FeasibilityMap:
             clearance=np.where(drop, np.nan, self.clearance),
             proven=self.proven & ~drop,
             certified=None if self.certified is None else self.certified & ~drop,
+            refined=self.refined and self.refined.masked(~drop),
         )
 
     def values(self, color_by: ColorBy) -> Array:
@@ -245,13 +264,17 @@ class FeasibilityMap:
     def plot(self, color_by: ColorBy = ColorBy.REASON, marks: Sequence[tuple[float, float]] = ()) -> Figure:
         """Draw both rolls of the map with axes, a legend and counts, or the scale of the values.
 
+        Where the scene asks for a resolution, reasons are those of the parts that cells are split into, and
+        counts are of parts. What is not proven to hold as a whole is lighter, if that was asked for.
+
         Args:
             color_by: what the colours stand for.
             marks: grasps (h, θ) (m, rad) to circle.
         """
         m = self.manifold
         title = f"{self.scene} · {self.task} · {self.arm}"
-        coloured = color_map(color_by, self.reason, self.values(color_by))
+        parts = self.refined if self.refined and color_by in (ColorBy.REASON, ColorBy.FEASIBLE) else self
+        coloured = color_map(color_by, parts.reason, self.values(color_by), parts.certified)
         heights = (m.profile.h_min, m.profile.h_max)
         return pictures.draw_map(coloured, heights, m.theta_start, title, ("roll 0°", "roll 180°"), marks)
 
@@ -314,6 +337,7 @@ class FeasibilityMap:
             "margin_around": self.margins[..., 1].tolist(),
             "proven": self.proven.tolist(),
             "certified": None if self.certified is None else self.certified.tolist(),
+            "refined": self.refined and self.refined.to_dict(),
         }
 
     def to_npz(self) -> bytes:
@@ -322,6 +346,9 @@ class FeasibilityMap:
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         if self.certified is not None:
             arrays["certified"] = self.certified
+        if self.refined is not None:
+            arrays["refined_reason"] = self.refined.reason
+            arrays["refined_certified"] = self.refined.certified
         meta = np.array(json.dumps(self._meta()))
         np.savez_compressed(buffer, meta=meta, profile=self.manifold.profile.points, **arrays)
         return buffer.getvalue()
@@ -341,8 +368,8 @@ class FeasibilityMap:
         try:
             with np.load(path, allow_pickle=False) as file:
                 names = (*_ARRAYS, "profile", "meta")
-                optional = {"proven", "certified"} - set(file.files)
-                data = {name: file[name] for name in (*names, "certified") if name not in optional}
+                missing = {"proven", *_OPTIONAL} - set(file.files)
+                data = {name: file[name] for name in (*names, *_OPTIONAL) if name not in missing}
             meta = json.loads(str(data.pop("meta")))
         except FileNotFoundError:
             raise MapError(path, "file", str(path), "an existing map file") from None
@@ -361,6 +388,9 @@ class FeasibilityMap:
                     raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
             reasons = VERSION_2_REASONS if meta["version"] == 2 else meta["reasons"]
             data["reason"] = _renumbered(data["reason"], reasons)
+            if "refined_reason" in data:
+                parts = _renumbered(data.pop("refined_reason"), reasons), data.pop("refined_certified")
+                data["refined"] = _loaded_parts(path, manifold, *parts)
             data.setdefault("proven", np.zeros(shape, dtype=bool))  # files of earlier versions do not say
             names = {key: meta[key] for key in ("scene", "arm", "task")} | {
                 "resolution": meta.get("resolution", 0.0)
@@ -368,6 +398,23 @@ class FeasibilityMap:
             return FeasibilityMap(**names, manifold=manifold, bodies=tuple(meta["bodies"]), **data)
         except (KeyError, IndexError, TypeError, ProfileError) as error:
             raise MapError(path, "meta", str(error), "a map written by symgrasp") from error
+
+
+def _loaded_parts(path: str | Path, manifold: Manifold, reason: np.ndarray, certified: np.ndarray) -> Refined:
+    """Return the parts (R, H, A) of the cells of a grid.
+
+    Raises:
+        MapError: they do not cut the cells into whole parts.
+    """
+    rolls, heights, angles = reason.shape
+    if (
+        certified.shape != reason.shape
+        or rolls != 2
+        or heights % manifold.heights
+        or angles % manifold.angles
+    ):
+        raise MapError(path, "refined_reason", reason.shape, "whole parts of the cells")
+    return Refined(Manifold(manifold.profile, heights, angles, manifold.theta_start), reason, certified)
 
 
 def _renumbered(reason: np.ndarray, names: Sequence[str]) -> np.ndarray:
@@ -395,3 +442,6 @@ _ARRAYS = (
     "T_world_object", "reason", "q", "sample", "branch", "clearance", "phi", "opening", "pair", "depth",
     "proven",
 )  # fmt: skip
+
+_OPTIONAL = ("certified", "refined_reason", "refined_certified")
+"""Those that a map has only where that was asked for."""

@@ -1,4 +1,4 @@
-"""Margins of feasible cells, counted in cells."""
+"""Margins of feasible cells, counted in cells or in the parts that they are split into."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from symgrasp.compiling import njit
 
-__all__ = ["cells_to_infeasible"]
+__all__ = ["cells_to_infeasible", "way_to_unproven"]
 
 
 @njit(cache=True)
@@ -46,3 +46,44 @@ def cells_to_infeasible(feasible):
                 run = run + 1 if feasible[r, i, k % angles] else 0
                 around[r, i, k % angles] = min(around[r, i, k % angles], run)
     return steps
+
+
+def way_to_unproven(whole: np.ndarray, lines: int, cells: int, closed: bool) -> np.ndarray:
+    """Count the parts of a finer grid from the centres of cells to the nearest one that is not proven.
+
+    Args:
+        whole: (R, L, N) bool, which parts are proven, by lines that lie side by side.
+        lines: number of cells across the lines; a part of L.
+        cells: number of cells along them; a part of N.
+        closed: whether the lines are closed; else both ends count as not proven.
+
+    Returns:
+        (R, lines, cells) number of parts to the nearer side, halves included.
+    """
+    rolls, count, length = whole.shape
+    across, along = count // lines, length // cells
+    # The centre of a cell lies on the middle line, or on the edge of two: either of them will do.
+    middle = [across // 2] if across % 2 else [across // 2 - 1, across // 2]
+    found = np.zeros((rolls, lines, cells))
+    for line in middle:
+        own = whole[:, line::across]
+        if closed:
+            own = np.tile(own, 3)
+        ahead = _run(own)
+        behind = _run(own[..., ::-1])[..., ::-1]
+        start = length if closed else 0
+        at = start + np.arange(cells) * along + along // 2
+        if along % 2:  # the centre is in the middle of a part
+            way = np.minimum(ahead[..., at], behind[..., at]) - 0.5
+        else:
+            way = np.minimum(ahead[..., at], behind[..., at - 1])
+        found = np.maximum(found, np.maximum(way, 0.0))
+    return np.minimum(found, 0.5 * length) if closed else found
+
+
+def _run(whole: np.ndarray) -> np.ndarray:
+    """Return how many parts (..., N) in a row are proven, from each one on."""
+    index = np.arange(whole.shape[-1])
+    ends = np.where(whole, whole.shape[-1], index)
+    first = np.minimum.accumulate(ends[..., ::-1], axis=-1)[..., ::-1]
+    return first - index

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.refined import merged_parts
 from symgrasp.robot.robot import Arm
 
 __all__ = ["at_torso", "merged"]
@@ -62,7 +63,9 @@ def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:
         whole = [c & m.feasible for c, m in zip(certified, maps, strict=True)]
         none = [c & ~m.feasible for c, m in zip(certified, maps, strict=True)]
         arrays["certified"] = np.logical_or.reduce(whole) | np.logical_and.reduce(none)
-    return replace(maps[0], **arrays, pair=pick(pairs), bodies=bodies, proven=proven)
+    parts = [m.refined for m in maps if m.refined is not None]
+    refined = merged_parts(parts) if len(parts) == len(maps) else None
+    return replace(maps[0], refined=refined, **arrays, pair=pick(pairs), bodies=bodies, proven=proven)
 
 
 def _with_one_phi(maps: Sequence[FeasibilityMap]) -> list[FeasibilityMap]:

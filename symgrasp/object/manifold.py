@@ -124,6 +124,19 @@ class Manifold:
         """Angles (angles,) of the cell centres (rad), wrapped into [-π, π)."""
         return wrap(self.theta_start + (np.arange(self.angles) + 0.5) * self.dtheta)
 
+    def finer(self, along: float, around: float) -> list[Manifold]:
+        """Return finer grids, each with the cells of the one before cut in two along and around.
+
+        A side is cut no more once it is at most ``along`` (m) or ``around`` (rad): in the last grid, all are.
+        """
+        grids, grid = [], self
+        while grid.dh > along * (1 + 1e-9) or grid.dtheta > around * (1 + 1e-9):
+            heights = grid.heights * (2 if grid.dh > along * (1 + 1e-9) else 1)
+            angles = grid.angles * (2 if grid.dtheta > around * (1 + 1e-9) else 1)
+            grid = Manifold(self.profile, heights, angles, self.theta_start)
+            grids.append(grid)
+        return grids
+
     def project(self, points: ArrayLike) -> tuple[Array, Array]:
         """Map points (..., 3) in the object frame to (h, θ): f of equation 1."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)

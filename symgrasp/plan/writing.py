@@ -76,7 +76,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
     margins = support_margins(world.scene, turned, [h.configuration for h in held])
     entries = []
     for (arm, q, opening), m, cell, grasp, offset in held:
-        margin = m.margin(cell)
+        along, around = m.cell_margins[cell].tolist()
         h, theta = float(m.manifold.h[grasp.row]), float(m.manifold.theta[grasp.column])
         theta = float(wrap(theta + offset)) if offset else theta
         own, pitch = m.roll_and_pitch(grasp.roll)
@@ -91,8 +91,8 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
                 joints=dict(zip(arm.joint_names, q[: len(arm.joint_names)].tolist(), strict=True)),
                 hand_joints=arm.hand.joint_values(opening),
                 opening=opening,
-                margin_along=margin.along,
-                margin_around=margin.around,
+                margin_along=along,
+                margin_around=around,
                 **_of_configuration(world, arm, q, arms),
             )
         )

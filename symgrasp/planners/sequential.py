@@ -114,7 +114,7 @@ def surface_margin(m: FeasibilityMap) -> Array:
     singular pose only a part counts, the ease of the map.
     """
     radius = m.manifold.profile.radius(m.manifold.h)
-    along, around = np.moveaxis(m.margins, -1, 0)
+    along, around = np.moveaxis(m.cell_margins, -1, 0)
     margin = np.minimum(along, around * radius[None, :, None])
     return margin if m.ease is None else margin * m.ease
 

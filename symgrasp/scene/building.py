@@ -9,6 +9,7 @@ from typing import Any
 from symgrasp.errors import MeshError, SceneError, one_of
 from symgrasp.files import file_sha256
 from symgrasp.object.library import library_objects, load_object
+from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.references import portable, resolve, sought
 from symgrasp.robot.robot import Arm, Robot
@@ -25,20 +26,29 @@ from symgrasp.scene.format import (
 from symgrasp.scene.parts import Obstacle, SceneParts, Task
 from symgrasp.scene.robots import RobotBuilder
 
-__all__ = ["SceneBuilder", "check_approach"]
+__all__ = ["SceneBuilder", "check_settings"]
+
+MOST_PARTS = 2_000_000
+"""Most parts that the cells of a map are split into."""
 
 
-def check_approach(source: str, arms: Iterable[Arm], settings: MapSettings) -> None:
-    """Check that every arm can follow the approach that maps ask for.
+def check_settings(source: str, arms: Iterable[Arm], profile: Profile, settings: MapSettings) -> None:
+    """Check that maps can be computed as settings ask for.
 
     Raises:
-        SceneError: an arm has five joints, which do not keep the direction of its hand along a line.
+        SceneError: an arm cannot follow the approach, because it has five joints, which do not keep the
+            direction of its hand along a line; or maps have too many parts at the resolution.
     """
     for arm in arms:
         if arm.pitched and settings.approach:
             raise SceneError(
                 source, "map.approach", settings.approach, f"0 with an arm of five joints, {arm.name}"
             )
+    grid = Manifold(profile, settings.heights, settings.angles)
+    parts = [len(ROLLS) * finer.heights * finer.angles for finer in settings.finer(grid)]
+    if settings.resolution is not None and max(parts, default=0) > MOST_PARTS:
+        expected = f"a resolution at which a map has at most {MOST_PARTS:,} parts, not {parts[-1]:,}"
+        raise SceneError(source, "map.resolution", settings.resolution.model_dump(), expected)
 
 
 class SceneBuilder:
@@ -80,7 +90,7 @@ class SceneBuilder:
             arms |= {arm.name: arm for arm in built.arms}
             entries.append(built.file)
             notes += built.notes
-        check_approach(self.source, arms.values(), file.map)
+        check_settings(self.source, arms.values(), profile, file.map)
         return SceneParts(
             file.model_copy(update={"robots": tuple(entries)}),
             robots,

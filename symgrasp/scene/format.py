@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from symgrasp.object.manifold import ROLLS
+from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.object.profile import MOST_KNOTS
 from symgrasp.poses import Array, from_position_quat, from_position_rpy, quat_wxyz
 from symgrasp.robot.assembly import Frame
@@ -318,6 +318,13 @@ class CarryFile(_Strict):
     tasks: tuple[Name, Name] | None = None
 
 
+class ResolutionFile(_Strict):
+    """How small the parts are that cells which may be mixed are split into: along and around the object."""
+
+    mm: Annotated[float, Field(ge=0.01, allow_inf_nan=False)]
+    deg: Annotated[float, Field(ge=0.01, allow_inf_nan=False)]
+
+
 class MapSettings(_Strict):
     """How finely maps are computed."""
 
@@ -329,11 +336,25 @@ class MapSettings(_Strict):
     """length (m) of the straight radial retreat that must be free as well"""
     margin: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
     """distance (m) to keep from obstacles and other robots"""
+    resolution: ResolutionFile | None = None
+    """cells that are not proven to hold as a whole are split down to parts of at most this size"""
 
     @property
     def samples(self) -> int:
         """Number of redundancy samples: with auto, those with which the search begins."""
         return AUTO_SAMPLES if self.redundancy == "auto" else self.redundancy
+
+    def finer(self, grid: Manifold) -> list[Manifold]:
+        """Return the finer grids, down to the resolution, that the cells of a map are split into."""
+        if self.resolution is None:
+            return []
+        return grid.finer(1e-3 * self.resolution.mm, np.deg2rad(self.resolution.deg))
+
+    @model_validator(mode="after")
+    def _resolution_without_approach(self) -> MapSettings:
+        if self.resolution is not None and self.approach:
+            raise ValueError("a resolution only without an approach, with which no feasible cell is proven")
+        return self
 
     @model_validator(mode="after")
     def _not_too_many(self) -> MapSettings:

@@ -45,7 +45,7 @@ def map_content(
         "arms": [_arm(arm) for arm in arms.values()],
         "object": {"name": object_name, "profile": profile.points.tolist(), "mass": mass},
         "obstacles": [_obstacle(obstacle) for obstacle in obstacles],
-        "map": settings.model_dump(),
+        "map": settings.model_dump(exclude_none=True),
     }
 
 

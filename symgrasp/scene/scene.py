@@ -17,7 +17,7 @@ from symgrasp.files import LARGEST_YAML, parse_yaml, read_file
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.robot.robot import Arm, Robot
-from symgrasp.scene.building import SceneBuilder, check_approach
+from symgrasp.scene.building import SceneBuilder, check_settings
 from symgrasp.scene.format import (
     MOST_TASKS,
     MapSettings,
@@ -294,7 +294,7 @@ class Scene:
             settings = MapSettings.model_validate({**self.settings.model_dump(), **changes})
         except ValidationError as error:
             raise SceneError("map settings", *describe_error(error, changes)) from None
-        check_approach(self.source, self.arms.values(), settings)
+        check_settings(self.source, self.arms.values(), self.profile, settings)
         return replace(self, file=self.file.model_copy(update={"map": settings}))
 
 
