@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import process_time
 
+import numpy as np
+
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
@@ -44,19 +46,19 @@ def measure_cells(scene: Scene, factors: Sequence[int] = FACTORS) -> Iterator[Ce
     for factor in factors:
         own = scene.settings
         gridded = scene.with_settings(heights=own.heights * factor, angles=own.angles * factor)
-        counts, times = [0, 0, 0, 0], [0.0, 0.0]
+        grid, without, with_proofs = gridded.manifold, 0.0, 0.0
+        feasible = whole = infeasible = none = 0
         with open_world(gridded) as world:
             maker = MapMaker(world)
-            for task in gridded.tasks.values():
-                for arm in task.arms:
-                    maker.map(arm, task, certify=True)  # builds what maps of the arm have in common
-                    for k, certify in enumerate((False, True)):
-                        start = process_time()
-                        m = maker.map(arm, task, certify=certify)
-                        times[k] += process_time() - start
-                    proven = m.certified if m.certified is not None else m.feasible & False
-                    for k, these in enumerate((m.feasible, ~m.feasible)):
-                        counts[2 * k] += int(these.sum())
-                        counts[2 * k + 1] += int((these & proven).sum())
-        grid = gridded.manifold
-        yield CellShares(grid.heights, grid.angles, *counts, times[1] / times[0])
+            for task, arm in [(task, arm) for task in gridded.tasks.values() for arm in task.arms]:
+                maker.map(arm, task, certify=True)  # builds what maps of the arm have in common
+                start = process_time()
+                maker.map(arm, task, certify=False)
+                middle = process_time()
+                m = maker.map(arm, task, certify=True)
+                without, with_proofs = without + middle - start, with_proofs + process_time() - middle
+                proven = np.zeros_like(m.feasible) if m.certified is None else m.certified
+                feasible, whole = feasible + int(m.feasible.sum()), whole + int((proven & m.feasible).sum())
+                infeasible += int((~m.feasible).sum())
+                none += int((proven & ~m.feasible).sum())
+        yield CellShares(grid.heights, grid.angles, feasible, whole, infeasible, none, with_proofs / without)
