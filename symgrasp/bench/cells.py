@@ -50,12 +50,12 @@ def measure_cells(scene: Scene, factors: Sequence[int] = FACTORS) -> Iterator[Ce
         feasible = whole = infeasible = none = 0
         with open_world(gridded) as world:
             maker = MapMaker(world)
-            for task, arm in [(task, arm) for task in gridded.tasks.values() for arm in task.arms]:
-                maker.map(arm, task, certify=True)  # builds what maps of the arm have in common
+            for name, arm in [(task.name, arm) for task in gridded.tasks.values() for arm in task.arms]:
+                maker.map(arm, name, certify=True)  # builds what maps of the arm have in common
                 start = process_time()
-                maker.map(arm, task, certify=False)
+                maker.map(arm, name, certify=False)
                 middle = process_time()
-                m = maker.map(arm, task, certify=True)
+                m = maker.map(arm, name, certify=True)
                 without, with_proofs = without + middle - start, with_proofs + process_time() - middle
                 proven = np.zeros_like(m.feasible) if m.certified is None else m.certified
                 feasible, whole = feasible + int(m.feasible.sum()), whole + int((proven & m.feasible).sum())
