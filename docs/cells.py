@@ -42,8 +42,9 @@ def table(content: Mapping[str, Any]) -> str:
     """Return what `measure` returned as a table in Markdown."""
     head = ["on it", *(f"{factor} times finer" for factor in FACTORS[1:])]
     lines = [
-        "Share of the feasible, and of the infeasible cells that are proven to be so as a whole, and",
-        "processor time of the maps with these proofs, as a multiple of that without:",
+        "Share of the feasible, and of the infeasible cells that are proven to be so as a whole, for the",
+        "first task and arm of each scene, and processor time of the map with these proofs, as a multiple of",
+        "that without:",
         "",
         "| scene | own grid | " + " | ".join(head) + " |",
         f"|---|---:|{'---:|' * len(FACTORS)}",

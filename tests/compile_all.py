@@ -25,7 +25,7 @@ def fingerprint() -> str:
 if __name__ == "__main__":
     for name in PLAIN:
         create_map(load_small(name, 4, 8, 2))
-    create_map(load_small(PLAIN[0], 4, 8, 2).with_settings(redundancy="auto"))
+    create_map(load_small(PLAIN[0], 4, 8, 2).with_settings(redundancy="auto"), certify=True)
     sequence = load_small("pick_pour_place", 12, 24, 8)
     plan_motion(sequence, plan_sequential(sequence))
     plan_bimanual(load_small("log_two_robots", 20, 24, 6))

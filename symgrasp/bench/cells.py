@@ -14,22 +14,22 @@ from symgrasp.world import open_world
 
 __all__ = ["FACTORS", "CellShares", "measure_cells"]
 
-FACTORS = (1, 2, 4)
+FACTORS = (1, 2)
 """By how much the grids are finer than a scene's own, along and around."""
 
 
 @dataclass(frozen=True)
 class CellShares:
-    """What is proven of all maps of a scene on a grid.
+    """What is proven of the map of a scene's first task and arm on a grid.
 
     Attributes:
         heights: number of cells of the grid along the axis.
         angles: number of cells around it.
-        feasible: number of feasible cells, over all maps.
+        feasible: number of feasible cells.
         whole: number of those that are proven to be feasible as a whole.
         infeasible: number of infeasible cells.
         none: number of those that are proven to be infeasible as a whole.
-        ratio: processor time of the maps with proofs, divided by that without.
+        ratio: processor time of the map with proofs, divided by that without.
     """
 
     heights: int
@@ -42,23 +42,25 @@ class CellShares:
 
 
 def measure_cells(scene: Scene, factors: Sequence[int] = FACTORS) -> Iterator[CellShares]:
-    """Measure all maps of a scene on grids that are finer than its own by some factors."""
+    """Measure the map of a scene's first task and arm on grids finer than its own by some factors."""
     for factor in factors:
         own = scene.settings
         gridded = scene.with_settings(heights=own.heights * factor, angles=own.angles * factor)
-        grid, without, with_proofs = gridded.manifold, 0.0, 0.0
-        feasible = whole = infeasible = none = 0
         with open_world(gridded) as world:
             maker = MapMaker(world)
-            for name, arm in [(task.name, arm) for task in gridded.tasks.values() for arm in task.arms]:
-                maker.map(arm, name, certify=True)  # builds what maps of the arm have in common
-                start = process_time()
-                maker.map(arm, name, certify=False)
-                middle = process_time()
-                m = maker.map(arm, name, certify=True)
-                without, with_proofs = without + middle - start, with_proofs + process_time() - middle
-                proven = np.zeros_like(m.feasible) if m.certified is None else m.certified
-                feasible, whole = feasible + int(m.feasible.sum()), whole + int((proven & m.feasible).sum())
-                infeasible += int((~m.feasible).sum())
-                none += int((proven & ~m.feasible).sum())
-        yield CellShares(grid.heights, grid.angles, feasible, whole, infeasible, none, with_proofs / without)
+            maker.map(certify=True)  # builds what maps of the arm have in common
+            start = process_time()
+            maker.map(certify=False)
+            middle = process_time()
+            m = maker.map(certify=True)
+            ratio = (process_time() - middle) / (middle - start)
+        proven = np.zeros_like(m.feasible) if m.certified is None else m.certified
+        yield CellShares(
+            heights=m.manifold.heights,
+            angles=m.manifold.angles,
+            feasible=int(m.feasible.sum()),
+            whole=int((proven & m.feasible).sum()),
+            infeasible=int((~m.feasible).sum()),
+            none=int((proven & ~m.feasible).sum()),
+            ratio=ratio,
+        )

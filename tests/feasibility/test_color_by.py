@@ -48,6 +48,18 @@ def lab(colors: np.ndarray, eyes: str) -> np.ndarray:
     return np.stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])], axis=-1)
 
 
+def test_what_is_not_proven_is_lighter():
+    reason = np.array([[Reason.FEASIBLE, Reason.FEASIBLE], [Reason.UNREACHABLE, Reason.SCENE_COLLISION]])
+    certified = np.array([[True, False], [False, True]])
+    plain = color_map(ColorBy.REASON, reason, np.full((2, 2), np.nan))
+    colored = color_map(ColorBy.REASON, reason, np.full((2, 2), np.nan), certified)
+    before, after = plain.colors[plain.index].astype(int), colored.colors[colored.index].astype(int)
+    assert (after[certified] == before[certified]).all()
+    assert (after[~certified] > before[~certified]).all()
+    assert colored.swatches[:-1] == plain.swatches
+    assert colored.swatches[-1].cells == 2
+
+
 @pytest.mark.parametrize("eyes", SEEN)
 def test_the_colour_blind_can_tell_the_colours_apart(bottle_map, eyes):
     two = color_map(ColorBy.FEASIBLE, bottle_map.reason, bottle_map.values(ColorBy.FEASIBLE)).colors
