@@ -534,7 +534,7 @@ def link_in(html: str) -> str:
 
 
 def tasks(html: str) -> str:
-    return re.findall(r'<div class="sg sg-tasks">(.*?)</div></div>', html)[0]
+    return re.findall(r'<div class="sg sg-tasks">(.*?)</div><small>', html)[0]
 
 
 def title(html: str) -> str:
