@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symgrasp.errors import MeshError, one_of
-from symgrasp.meshes.formats import FORMATS, Declared, ending_of_content
+from symgrasp.meshes.declared import Declared
+from symgrasp.meshes.formats import FORMATS, ending_of_content
+from symgrasp.meshes.placed import collada_up
+from symgrasp.poses import Array
 
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["MESH_ENDINGS", "check_size", "joined", "read_groups", "read_mesh", "read_parts"]
+__all__ = ["MESH_ENDINGS", "check_size", "joined", "read_groups", "read_mesh", "read_parts", "read_up"]
 
 MESH_ENDINGS = tuple(FORMATS)
 """File endings of the mesh formats that are read."""
@@ -68,6 +71,20 @@ def read_groups(path: Path, field: str = "mesh") -> list[trimesh.Trimesh]:
     """Read a mesh of a URDF as `read_mesh` does, as one mesh for each object and group of an OBJ file."""
     parts = _parts(path, field, upright=False, groups=True)
     return parts if path.suffix.lower() == ".obj" else [joined(parts)]
+
+
+def read_up(path: Path, field: str = "mesh") -> Array:
+    """Return the rotation (4, 4) that takes a mesh to z up by what its file states; none unless COLLADA.
+
+    Raises:
+        MeshError: the file is missing, of another kind than its ending says, or states no vertical.
+    """
+    if path.suffix.lower() != ".dae":
+        return np.eye(4)
+    try:
+        return collada_up(_content(path, field))
+    except ValueError as error:
+        raise MeshError(path, field, str(error), "a COLLADA file with an up_axis") from error
 
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
