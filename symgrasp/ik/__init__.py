@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions
-from symgrasp.ik.chain import chain_geometries
 from symgrasp.ik.compiled import CompiledIK
+from symgrasp.ik.families import chain_geometries
 from symgrasp.ik.locking import joint_to_lock
 from symgrasp.ik.pitched import GridSolvers, PitchedIK
 from symgrasp.ik.torso import Solver, TorsoIK, over_torso

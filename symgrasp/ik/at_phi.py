@@ -126,7 +126,7 @@ def _put(g, place, v):
 
 @njit(**STRICT)
 def _constants(g, place, k, a, b):
-    """Write the constants (5,) of `symgrasp.ik.chain._cosine_constants`."""
+    """Write the constants (5,) of `symgrasp.ik.families.cosine_constants`."""
     part = dot(k, a) * dot(k, b)
     sine, cosine = dot(b, cross(k, a)), dot(a, b) - part
     length = math.sqrt(sine * sine + cosine * cosine)

@@ -8,7 +8,8 @@ import numpy as np
 
 from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions, Tolerance
 from symgrasp.ik.branches import branch_count, new_memory, solve_range
-from symgrasp.ik.chain import COSINE_TOLERANCE, EXACT, Chain, chain_geometries
+from symgrasp.ik.chain import COSINE_TOLERANCE, Chain
+from symgrasp.ik.families import EXACT, chain_geometries
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.poses import Array
 from symgrasp.robot.robot import AZIMUTH, Arm

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.errors import UrdfError
-from symgrasp.ik.chain import COARSE, EXACT, chain_geometries, has_exact_pair
+from symgrasp.ik.families import COARSE, EXACT, chain_geometries, has_exact_pair
 from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.robot.robot import PITCH, Arm
 

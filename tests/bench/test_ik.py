@@ -56,7 +56,7 @@ def test_the_solver_at_other_samples():
 
 @pytest.mark.parametrize(
     ("name", "seed", "which", "count"),
-    [("tiago_pro", 0, 463, 20000), ("tiago_pro", 0, 17693, 20000)],
+    [("tiago_pro", 0, 463, 20000), ("tiago_pro", 0, 17693, 20000), ("iiwa", 0, 5514, 20000)],
 )
 def test_beside_singular_poses(name, seed, which, count):
     """Of many random configurations, those beside which others of the same pose all but coincide."""

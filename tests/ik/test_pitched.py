@@ -11,7 +11,8 @@ import pytest
 from symgrasp.bench.ik import random_configurations, recall, sampled_solver
 from symgrasp.bench.numerical import reach
 from symgrasp.errors import UrdfError
-from symgrasp.ik import ArmIK, GridSolvers, PitchedIK, solver_for
+from symgrasp.ik import ArmIK, CompiledIK, GridSolvers, PitchedIK, solver_for
+from symgrasp.ik.arm_ik import Lock
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.poses import from_position_rpy, inverse, translation
@@ -197,3 +198,13 @@ def test_six_joints_are_as_they_were():
     assert not arm.pitched
     assert arm.grasping(GRID, 0, 0) is arm
     assert isinstance(solver_for(arm, 1), ArmIK)
+
+
+@pytest.mark.parametrize("beside", [1e-2, 1e-3, 1e-4])
+def test_beside_the_pitch_at_which_axes_are_parallel(beside):
+    """Straight above or below an object the azimuth of a hand does what the last joint does."""
+    arm = arm_with("across")
+    solver = CompiledIK(arm, 1, lock=Lock(PITCH, np.zeros(1)))
+    q = random_configurations(arm, 300, 0)
+    q[:, PITCH] = np.sign(q[:, PITCH]) * np.pi / 2 + np.sign(q[:, 0]) * beside
+    assert recall(solver, q) == len(q)

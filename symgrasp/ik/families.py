@@ -1,0 +1,287 @@
+"""Which closed form an arm has: its joint axes decide, up to the rounding of its URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.ik.chain import ChainGeometry, ParallelGeometry, SphericalGeometry
+from symgrasp.ik.pair_geometry import PairGeometry, pair_geometry
+from symgrasp.poses import Array, rotation_about
+from symgrasp.robot.robot import Arm
+
+__all__ = ["COARSE", "EXACT", "Precision", "chain_geometries", "cosine_constants", "has_exact_pair"]
+
+
+class Precision(NamedTuple):
+    """How far off axes may be that are taken to meet, or to be parallel.
+
+    Attributes:
+        distance: of axes that meet in a point (m).
+        sine: length of the cross product of unit axes that are parallel.
+    """
+
+    distance: float
+    sine: float
+
+
+EXACT = Precision(1e-8, 1e-8)
+"""Up to the rounding of numbers."""
+
+ROUNDED = Precision(2e-5, 1e-4)
+"""As rounding to four decimals leaves them: an angle is off by up to 5e-5 rad, which with the length of a
+link is 2e-5 m. What is more may be an offset that the arm was built with, and the closed form of axes without
+it would lose solutions beside singular poses."""
+
+COARSE = Precision(5e-4, 1e-3)
+"""As an angle of 1.57 leaves them, which is off by 8e-4 rad; for arms of which nothing else is known. The
+closed form of axes where they are meant to be only says where Newton's method starts on the true ones."""
+
+PARALLEL = 1e-6
+"""Unit axes whose cross product is shorter than this do not meet in a point that can be computed."""
+
+LEAST_OFFSET = 1e-3
+"""Axes of joints 5 and 6 that come closer than this (m) are taken to meet, up to rounding, or not solved."""
+
+LEAST_SKEW = 1e-7
+"""Least determinant (m) of the equations of joint 5 where its axis and that of joint 6 do not meet:
+near parallel axes have a smaller one. The rounding of the equations is divided by it."""
+
+SLACK_RATIO = 30.0
+"""Slack of the roots of a closed form (see `symgrasp.ik.joints.sine`) for each m or rad that axes are moved
+by. A root's radicand is the ratio of lengths, of which the shortest are some centimetres."""
+
+
+class _Joints(NamedTuple):
+    """Six free joints in the order of a closed form, at one value of the locked joint.
+
+    Attributes:
+        backwards: whether they are read from the tool to the base.
+        h: (6, 3) unit axes.
+        o: (6, 3) a point on each axis.
+        R0: (3, 3) orientation of the tool.
+        p0: (3,) position of the tool.
+        phi: value of the locked joint (rad).
+    """
+
+    backwards: bool
+    h: Array
+    o: Array
+    R0: Array
+    p0: Array
+    phi: float
+
+
+def chain_geometries(
+    arm: Arm, locked: int | None, phi: Array
+) -> tuple[Precision, Sequence[ChainGeometry]] | None:
+    """Return the arm's geometry at every redundancy value, or None where it is of no compiled family.
+
+    Exact closed forms go before rounded ones, these before the search, and coarse ones come last.
+
+    Args:
+        arm: the arm.
+        locked: index of the locked joint; None for a 6-joint arm.
+        phi: (K,) values of the locked joint (rad).
+
+    Returns:
+        Up to what its axes meet or are parallel, and K geometries of one family.
+    """
+    # For a pitched arm it is asked row by row, though the limits are all that differs.
+    return _geometries((arm.H.tobytes(), arm.P.tobytes(), arm.R0.tobytes()), locked, phi.tobytes())
+
+
+class _Screws(NamedTuple):
+    """The part of an arm's kinematics that decides; see `Arm`."""
+
+    H: Array
+    P: Array
+    R0: Array
+
+
+@lru_cache(maxsize=256)
+def _geometries(
+    screws: tuple[bytes, bytes, bytes], locked: int | None, values: bytes
+) -> tuple[Precision, Sequence[ChainGeometry]] | None:
+    """Do what `chain_geometries` does, for the bytes of H, P, R0 and phi."""
+    phi = np.frombuffer(values)
+    arm = _Screws(*(np.frombuffer(part).reshape(-1, 3) for part in screws))
+    for precision, find in _FAMILIES:
+        for backwards in (False, True):
+            rows = [find(_joints(arm, locked, float(value), backwards), precision) for value in phi]
+            known = [row for row in rows if row is not None]
+            # At single values the axes of a pair may be parallel, or so nearly that nothing can be computed.
+            if known and (
+                find is _meeting_pair or (find is _three_parallel_skew and 2 * len(known) > len(rows))
+            ):
+                nowhere = known[0]._replace(W=np.full(3, np.nan))  # nothing is found there
+                filled = zip(rows, phi, strict=True)
+                return precision, [row or nowhere._replace(phi=float(value)) for row, value in filled]
+            if len(known) == len(rows):
+                return precision, known
+    return None
+
+
+def has_exact_pair(arm: Arm, locked: int | None, phi: float) -> bool:
+    """Whether two axes at one end of an arm meet without being moved, with a joint locked at φ."""
+    return any(_meeting_pair(_joints(arm, locked, phi, end), EXACT) is not None for end in (False, True))
+
+
+def _joints(arm: Arm | _Screws, locked: int | None, phi: float, backwards: bool) -> _Joints:
+    """Return the free joints of an arm with a joint locked at φ."""
+    h, o = arm.H.copy(), np.cumsum(arm.P, axis=0)
+    R0, p0, o = arm.R0, o[-1], o[:-1].copy()
+    if locked is not None:
+        # The locked joint rotates all joints after it by a constant.
+        turn, centre = rotation_about(h[locked], phi), o[locked].copy()
+        h[locked + 1 :] = h[locked + 1 :] @ turn.T
+        o[locked + 1 :] = (o[locked + 1 :] - centre) @ turn.T + centre
+        R0, p0 = turn @ R0, turn @ (p0 - centre) + centre
+        h, o = np.delete(h, locked, axis=0), np.delete(o, locked, axis=0)
+    if backwards:
+        h, o = -h[::-1], o[::-1]
+    return _Joints(backwards, h, o, R0, p0, phi)
+
+
+def _spherical(joints: _Joints, precision: Precision) -> SphericalGeometry | None:
+    """Return the geometry of joints with a spherical triple and a pair that meet, else None."""
+    backwards, h, o, R0, p0, phi = joints
+    triple, pair = _common_point(h[:3], o[:3], precision), _common_point(h[4:], o[4:], precision)
+    if triple is None or pair is None:
+        return None
+    (S, off_S), (W, off_W) = triple, pair
+    slack = SLACK_RATIO * max(off_S, off_W) if precision is not EXACT else 0.0
+    a, b = S - o[3], W - o[3]
+    # h1ᵀ R2 h3 = h1ᵀ M h3
+    middle, turns = _distance_constants(h[3], a, b), cosine_constants(h[1], h[2], h[0])
+    if middle[1] <= PARALLEL * EXACT.distance or turns[1] <= PARALLEL:
+        return None
+    return SphericalGeometry(backwards, h, R0, p0, S, W, a, b, middle, turns, phi, slack)
+
+
+def _three_parallel(joints: _Joints, precision: Precision) -> ParallelGeometry | None:
+    """Return the geometry of joints of which 2, 3, 4 are parallel and 5, 6 meet, else None."""
+    pair = _common_point(joints.h[4:], joints.o[4:], precision)
+    return None if pair is None else _parallel_geometry(joints, precision, pair[0], pair[0], pair[1])
+
+
+def _three_parallel_skew(joints: _Joints, precision: Precision) -> ParallelGeometry | None:
+    """Return the geometry of joints of which 2, 3, 4 are parallel and 5, 6 do not meet, else None."""
+    h, o = joints.h, joints.o
+    normal = np.cross(h[4], h[5])
+    if np.linalg.norm(normal) < PARALLEL:
+        return None
+    x, y, _ = np.linalg.solve(np.array([h[4], -h[5], normal]).T, o[5] - o[4])
+    return _parallel_geometry(joints, precision, o[4] + x * h[4], o[5] + y * h[5], 0.0)
+
+
+def _parallel_geometry(
+    joints: _Joints, precision: Precision, O5: Array, W: Array, off: float
+) -> ParallelGeometry | None:
+    """Return the geometry of joints of which 2, 3, 4 are parallel, else None.
+
+    Args:
+        joints: the joints.
+        precision: up to what they are.
+        O5: point (3,) on the axis of joint 5 that is nearest to that of joint 6.
+        W: the point on that axis; the same where they are taken to meet.
+        off: how far off they are then (m).
+    """
+    backwards, h, o, R0, p0, phi = joints
+    aslant = np.linalg.norm(np.cross(h[1], h), axis=1)
+    if max(aslant[2:4]) > precision.sine or aslant[0] < max(precision.sine, PARALLEL):
+        return None
+    slack = 0.0
+    if precision is not EXACT:
+        slack = SLACK_RATIO * max(off, *aslant[2:4])
+        ways = np.sign(h[1:4] @ h[1])
+        mean = ways @ h[1:4]
+        h = h.copy()
+        h[1:4] = np.outer(ways, mean / np.linalg.norm(mean))
+    O2, O3, O4 = o[1:4] + np.outer((W - o[1:4]) @ h[1], h[1])
+    bend, turn = _distance_constants(h[2], O4 - O3, O2 - O3), cosine_constants(h[4], h[5], h[1])
+    if bend[1] <= PARALLEL * EXACT.distance or turn[1] <= PARALLEL:
+        return None
+    skew = np.zeros(7)
+    if O5 is not W:
+        along, matrix = np.zeros(2), np.zeros((2, 2))
+        for i, v in enumerate((W - O5, h[5])):
+            along[i] = (h[4] @ v) * (h[1] @ h[4])
+            matrix[i] = h[1] @ v - along[i], h[1] @ np.cross(h[4], v)
+        if np.linalg.norm(W - O5) < LEAST_OFFSET or abs(np.linalg.det(matrix)) < LEAST_SKEW:
+            return None
+        skew = np.concatenate([[1.0], along, np.linalg.inv(matrix).ravel()])
+    return ParallelGeometry(
+        backwards, h, R0, p0, o[0], W, O2, O3, O4 - O3, O5 - O4, bend, turn, W - O5, skew, phi, slack
+    )
+
+
+def _meeting_pair(joints: _Joints, precision: Precision) -> PairGeometry | None:
+    """Return the geometry of joints of which 5 and 6 meet, else None."""
+    backwards, h, o, R0, p0, phi = joints
+    pair = _common_point(h[4:], o[4:], precision)
+    return None if pair is None else pair_geometry(backwards, h, o, R0, p0, pair[0], phi)
+
+
+_FAMILIES: tuple[tuple[Precision, Callable[[_Joints, Precision], ChainGeometry | None]], ...] = (
+    (EXACT, _spherical),
+    (EXACT, _three_parallel),
+    (EXACT, _three_parallel_skew),
+    (ROUNDED, _spherical),
+    (ROUNDED, _three_parallel),
+    (ROUNDED, _three_parallel_skew),
+    (EXACT, _meeting_pair),
+    (COARSE, _spherical),
+    (COARSE, _three_parallel),
+    (COARSE, _three_parallel_skew),
+    (COARSE, _meeting_pair),
+)
+"""What is tried, best first."""
+
+
+def _distance_constants(k: Array, a: Array, b: Array) -> Array:
+    """Return the constants of subproblem 3, ``−½ |R(k, x) a − b|² = length·cos(x − middle) + constant``.
+
+    See `cosine_constants`, for ``|R a − b|² = |a|² + |b|² − 2 b·R a``.
+    """
+    return cosine_constants(k, a, b) + np.array([0.0, 0.0, -0.5 * (a @ a + b @ b), 0.0, 0.0])
+
+
+def cosine_constants(k: Array, a: Array, b: Array) -> Array:
+    """Return the constants of ``b·R(k, x) a = length·cos(x − middle) + constant``.
+
+    Args:
+        k: unit axis (3,) of the rotation by x.
+        a: vector (3,).
+        b: vector (3,).
+
+    Returns:
+        (5,) middle, length, constant, sin(middle), cos(middle).
+    """
+    part = float((k @ a) * (k @ b))
+    sine, cosine = float(b @ np.cross(k, a)), float(a @ b) - part
+    middle = np.arctan2(sine, cosine)
+    return np.array([middle, np.hypot(sine, cosine), part, np.sin(middle), np.cos(middle)])
+
+
+def _common_point(h: Array, o: Array, precision: Precision) -> tuple[Array, float] | None:
+    """Return the point (3,) where lines meet, and how far off it they are at most (m).
+
+    Args:
+        h: (m, 3) unit directions of the lines.
+        o: (m, 3) a point on each line.
+        precision: up to what they have to meet.
+
+    Returns:
+        None where they do not meet, or two successive ones are parallel.
+    """
+    parallel = PARALLEL if precision is EXACT else COARSE.sine
+    if (np.linalg.norm(np.cross(h[:-1], h[1:]), axis=1) < parallel).any():
+        return None
+    across = np.eye(3) - h[:, :, None] * h[:, None, :]
+    point = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, o))
+    off = float(np.linalg.norm(np.einsum("kij,kj->ki", across, point - o), axis=1).max())
+    return (point, off) if off < precision.distance else None
