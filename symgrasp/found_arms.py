@@ -56,11 +56,11 @@ class FoundArm:
     source: str = ""
 
 
-def in_catalogue(model: RobotModel) -> CatalogueRobot | None:
+def in_catalogue(path: Path) -> CatalogueRobot | None:
     """Return the robot of the catalogue that a URDF is, if any."""
     for robot in CATALOGUE:
-        path = resolve(robot.urdf, Path())
-        if path is not None and path.resolve() == model.path.resolve():
+        own = resolve(robot.urdf, Path())
+        if own is not None and own.resolve() == path.resolve():
             return robot
     return None
 
@@ -71,7 +71,7 @@ def find_arms(model: RobotModel) -> list[FoundArm]:
     An arm without a hand that can be measured gets a gripper, the WSG 50, mounted on its last link. The only
     arm of a robot is called what the robot is, where that is a plain word.
     """
-    known = in_catalogue(model)
+    known = in_catalogue(model.path)
     if known is not None:
         return [_known_arm(model, arm) for arm in known.arms]
     arms = (

@@ -8,6 +8,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -85,16 +86,17 @@ def catalogue_entry(robot: CatalogueRobot) -> RobotFile:
     if path is None:
         expected = f"{sought(robot.urdf, Path(), 'URDF')}; `pip install {robot.package}` installs it"
         raise UrdfError(robot.name, "urdf", robot.urdf, expected)
-    return _entry(robot.name, robot.urdf, RobotModel(path))
+    model = RobotModel(path, follow_up_axis=robot.follow_up_axis)
+    return _entry(robot.name, robot.urdf, model, robot.reading)
 
 
-def _entry(name: str, urdf: str, model: RobotModel) -> RobotFile:
+def _entry(name: str, urdf: str, model: RobotModel, reading: Mapping[str, Any] | None = None) -> RobotFile:
     arms = find_arms(model)
     usable = [arm for arm in arms if arm.joints and arm.hand is not None]
     if not usable:
         trouble = "; ".join(arm.trouble for arm in arms if arm.trouble) or "no arm"
         raise UrdfError(model.path.name, "arms", trouble, "an arm of five or more joints with a hand")
-    return RobotFile.model_validate(robot_content(name, urdf, usable))
+    return RobotFile.model_validate(robot_content(name, urdf, usable, reading))
 
 
 def plain_urdf(path: Path, folder: Path, xacro_args: Mapping[str, str] | None = None) -> Path:
@@ -158,7 +160,8 @@ def rearmed(scene: Scene, arm: str, link: str, hand: str | None) -> RobotFile:
     if path is None:
         raise SceneError(scene.source, "urdf", entry.urdf, "an existing file")
     if hand is None:
-        measured = measure_hand(RobotModel(path, xacro_args=xacro_texts(entry.xacro_args)), link)
+        args, follow = xacro_texts(entry.xacro_args), bool(entry.follow_up_axis)
+        measured = measure_hand(RobotModel(path, xacro_args=args, follow_up_axis=follow), link)
         held = HandFile.model_validate(yaml.safe_load(hand_yaml(measured))["hand"])
         mount, tool = None, None if measured.tool else link
     else:

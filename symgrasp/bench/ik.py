@@ -116,7 +116,7 @@ def bare_arm(robot: CatalogueRobot, which: CatalogueArm) -> Arm:
     path = resolve(robot.urdf, Path())
     if path is None:
         raise InputError(robot.name, "urdf", robot.urdf, f"pip install {robot.package}")
-    model = RobotModel(path)
+    model = RobotModel(path, follow_up_axis=robot.follow_up_axis)
     chain = [joint.name for joint in model.chain(which.tool)]
     first, last = (chain.index(joint) for joint in which.joints)
     others = frozenset(chain[:first] + chain[last + 1 :])

@@ -145,8 +145,8 @@ def measure(robot: CatalogueRobot, poses: int) -> RobotRow:
         path = resolve(robot.urdf, Path())
         if path is None:
             raise InputError(robot.name, "urdf", robot.urdf, f"pip install {robot.package}")
-        arm = find_arms(RobotModel(path))[0]
-        content = starter_scene(robot.name, robot.urdf, [arm])
+        arm = find_arms(RobotModel(path, follow_up_axis=robot.follow_up_axis))[0]
+        content = starter_scene(robot.name, robot.urdf, [arm], robot.reading)
         content["map"] = dict(GRID)
         return _measured(name, content, poses)
     except SymgraspError as error:

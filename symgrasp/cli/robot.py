@@ -27,6 +27,8 @@ def add_parser(commands: Commands) -> None:
     command.add_argument(
         "--xacro", metavar="NAME:=VALUE", type=_xacro_arg, action="append", default=[], help=text
     )
+    text = "turn COLLADA meshes so that the axis which they state as up is z, unlike RViz"
+    command.add_argument("--follow-up-axis", action="store_true", help=text)
     text = "write a scene to start from: the robot, and a can where its first arm reaches"
     command.add_argument("--scene", metavar="FILE.yaml", type=Path, help=text)
     command.add_argument(
@@ -58,24 +60,32 @@ def run(args: argparse.Namespace) -> int:
     from symgrasp.robot.model import RobotModel
 
     xacro_args = dict(args.xacro)
-    model = RobotModel(path, srdf=find_srdf(path), xacro_args=xacro_args)
-    known = in_catalogue(model)
+    known = in_catalogue(path)
+    reading: dict[str, Any] = dict(known.reading) if known else {}
+    if xacro_args:
+        reading["xacro_args"] = xacro_args
+    if args.follow_up_axis:
+        reading["follow_up_axis"] = True
+    follow = "follow_up_axis" in reading
+    model = RobotModel(path, srdf=find_srdf(path), xacro_args=xacro_args, follow_up_axis=follow)
     say(f"{model.name}: {len(model.link_names)} links, {len(model.joint_names)} joints that take a value")
     arms = find_arms(model)
     usable = [arm for arm in arms if arm.joints and arm.hand is not None]
     name = known.name if known else re.sub(r"\W+", "_", model.name).strip("_") or "robot"
     reference = portable(args.urdf, path) or str(path.resolve())
-    entry = robot_content(name, reference, usable, xacro_args) if usable else {}
+    entry = robot_content(name, reference, usable, reading) if usable else {}
     solved = []
     for arm in arms:
         _say_arm(arm)
         if arm in usable and _solver_said(entry, arm):
             solved.append(arm)
     if solved:
-        _say_home(robot_content(name, reference, solved, xacro_args), solved[0].name)
+        _say_home(robot_content(name, reference, solved, reading), solved[0])
     if not arms:
         say("  no arm: no chain of five or more joints that turn")
     _say_missing(model)
+    if not follow:
+        _say_sideways(model)
     if args.arm:
         if args.arm not in [arm.name for arm in solved]:
             raise InputError("command line", "--arm", args.arm, one_of(arm.name for arm in solved))
@@ -83,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     if args.scene:
         if not solved:
             raise InputError(path, "robot", name, "an arm with a solver and a hand")
-        _write_scene(args.scene, starter_scene(name, reference, solved, xacro_args), solved[0].name)
+        _write_scene(args.scene, starter_scene(name, reference, solved, reading), solved[0].name)
     return 0
 
 
@@ -92,7 +102,8 @@ def _write_scene(out: Path, content: dict[str, Any], arm: str) -> None:
     import yaml
 
     x, y, z = content["tasks"][0]["pose"]["position"]
-    say(f"  a can 5 cm thick at {x:g}, {y:g}, {z:g} m is in reach of {arm}")
+    thick = 200 * content["object"]["profile"][0][1]
+    say(f"  a can {thick:g} cm thick at {x:g}, {y:g}, {z:g} m is in reach of {arm}")
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=100)
     write_out(out, text.encode())
 
@@ -128,6 +139,21 @@ def _say_missing(model: RobotModel) -> None:
         say(f"  missing: limits of {', '.join(free)}")
 
 
+def _say_sideways(model: RobotModel) -> None:
+    """Print how many COLLADA meshes state another axis than z as up."""
+    import xml.etree.ElementTree as ET
+
+    import numpy as np
+
+    from symgrasp.meshes import read_up
+
+    files = {Path(mesh.get("filename", "")) for mesh in ET.fromstring(model.urdf).iter("mesh")}
+    sideways = sum(not np.array_equal(read_up(file), np.eye(4)) for file in files)
+    if sideways:
+        say(f"  {sideways} COLLADA meshes state another axis than z as up; they are not turned, as in RViz")
+        say("    --follow-up-axis turns them")
+
+
 def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     """Print how the configurations of an arm are found; return whether they can be."""
     from symgrasp.feasibility.starter import scene_content
@@ -136,7 +162,7 @@ def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
 
     one = {**entry, "arms": [a for a in entry["arms"] if a["name"] == arm.name]}
     try:
-        scene = Scene.from_content(scene_content(one, arm.name))
+        scene = Scene.from_content(scene_content(one, arm))
         solver = solver_for(scene.arm(arm.name), 1)
     except SymgraspError as error:
         say(f"    no solver: {error}")
@@ -151,7 +177,7 @@ def _solver_said(entry: dict[str, Any], arm: FoundArm) -> bool:
     return True
 
 
-def _say_home(entry: dict[str, Any], arm: str) -> None:
+def _say_home(entry: dict[str, Any], arm: FoundArm) -> None:
     """Print whether the robot is free of collisions at home."""
     from symgrasp.feasibility.starter import scene_content
     from symgrasp.scene.scene import Scene

@@ -35,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
             say(f"{robot.name:{width}}  {robot.title}: not installed; pip install {robot.package}")
             continue
         say(f"{robot.name:{width}}  {robot.title}: {robot.urdf}")
-        for arm, found in zip(robot.arms, find_arms(RobotModel(path)), strict=True):
+        model = RobotModel(path, follow_up_axis=robot.follow_up_axis)
+        for arm, found in zip(robot.arms, find_arms(model), strict=True):
             joints = f"{len(found.joints)} joints, {found.joints[0]} to {found.joints[-1]}"
             say(f"{'':{width}}  {arm.name}: {joints}; {_solver(robot, arm)}")
             say(f"{'':{width}}    {_hand(found)}")

@@ -13,7 +13,9 @@ from symgrasp.feasibility.create import MapMaker
 from symgrasp.found_arms import FoundArm
 from symgrasp.hands.measure import hand_yaml
 from symgrasp.object.manifold import Manifold
+from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, inverse, translation
+from symgrasp.robot.hand import Hand
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -22,7 +24,7 @@ from symgrasp.world import check_homes, open_world, with_free_homes
 __all__ = ["robot_content", "scene_content", "starter_scene"]
 
 RADIUS, HEIGHT = 0.025, 0.12
-"""Radius and height (m) of the can."""
+"""Radius and height (m) of the can, unless the hand needs another."""
 
 FAR = 100.0
 """Where the can stands (m) while no place is known for it."""
@@ -44,7 +46,7 @@ COARSE = (4, 16)
 
 
 def robot_content(
-    name: str, urdf: str, arms: Sequence[FoundArm], xacro_args: Mapping[str, str] | None = None
+    name: str, urdf: str, arms: Sequence[FoundArm], reading: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
     """Return a robot as scene files have it.
 
@@ -52,28 +54,28 @@ def robot_content(
         name: its name.
         urdf: the reference to its URDF.
         arms: its arms, all with joints and a hand.
-        xacro_args: values of the arguments of a xacro file.
+        reading: further keys of the entry, which say how the file is read.
     """
-    given = {"xacro_args": dict(xacro_args)} if xacro_args else {}
-    return {"name": name, "urdf": urdf, **given, "arms": [_arm_entry(arm) for arm in arms]}
+    return {"name": name, "urdf": urdf, **(reading or {}), "arms": [_arm_entry(arm) for arm in arms]}
 
 
-def scene_content(robot: dict[str, Any], arm: str) -> dict[str, Any]:
+def scene_content(robot: dict[str, Any], arm: FoundArm) -> dict[str, Any]:
     """Return the content of a scene with a robot, and a can for an arm that stands far away."""
-    name = robot["name"]
+    assert arm.hand is not None
+    name, (radius, height) = robot["name"], _can(arm.hand)
     return {
         "schema_version": 1,
         "name": name,
         "description": f"{name} and a can, to start from",
         "robots": [robot],
-        "object": {"name": "can", "profile": [[0.0, RADIUS], [HEIGHT, RADIUS]]},
-        "tasks": [{"name": "hold", "arms": [arm], "pose": {"position": [FAR, 0.0, 0.0]}}],
+        "object": {"name": "can", "profile": [[0.0, radius], [height, radius]]},
+        "tasks": [{"name": "hold", "arms": [arm.name], "pose": {"position": [FAR, 0.0, 0.0]}}],
         "map": {"heights": 12, "angles": 36, "redundancy": 8},
     }
 
 
 def starter_scene(
-    name: str, urdf: str, arms: Sequence[FoundArm], xacro_args: Mapping[str, str] | None = None
+    name: str, urdf: str, arms: Sequence[FoundArm], reading: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
     """Return the content of a scene with a robot, and a can that stands where its first arm reaches it best.
 
@@ -81,13 +83,13 @@ def starter_scene(
         name: the robot's name.
         urdf: the reference to its URDF.
         arms: its arms, that which is to reach the can first.
-        xacro_args: values of the arguments of a xacro file.
+        reading: further keys of the entry, which say how the file is read.
 
     Raises:
         SceneError: the arm reaches no can, or the robot hits itself whatever the arm does.
         SymgraspError: a scene with that robot cannot be loaded.
     """
-    content = scene_content(robot_content(name, urdf, arms, xacro_args), arms[0].name)
+    content = scene_content(robot_content(name, urdf, arms, reading), arms[0])
     scene = with_free_homes(Scene.from_content(content))
     check_homes(scene)
     home = scene.file.robots[0].home
@@ -97,7 +99,7 @@ def starter_scene(
     with open_world(scene) as world:
         maker, arm = MapMaker(world), scene.arm(arms[0].name)
         grid = Manifold(scene.profile, *COARSE)
-        for position in _places(arm):
+        for position in _places(arm, scene.profile):
             task = Task("hold", (arm.name,), translation(position))
             found = int(maker.map(task=task, manifold=grid).feasible.sum())
             if found > best:
@@ -108,6 +110,12 @@ def starter_scene(
         raise SceneError(name, f"arm {arms[0].name}", TRIALS, "a place where it reaches an upright can")
     content["tasks"][0]["pose"] = {"position": [round(float(v), 3) for v in place]}
     return content
+
+
+def _can(hand: Hand) -> tuple[float, float]:
+    """Return the radius and the height (m) of a can that a hand can hold."""
+    radius = RADIUS if hand.spans(RADIUS) else round(0.5 * hand.max_opening - hand.clearance, 3)
+    return radius, max(HEIGHT, round(2 * hand.pad_width, 2))
 
 
 def _arm_entry(arm: FoundArm) -> dict[str, Any]:
@@ -125,7 +133,7 @@ def _arm_entry(arm: FoundArm) -> dict[str, Any]:
     return {**entry, "hand": hand.name, "mount": mount}
 
 
-def _places(arm: Arm) -> list[Array]:
+def _places(arm: Arm, can: Profile) -> list[Array]:
     """Return positions (3,) of an upright can that the arm holds from the side in random configurations."""
     rng = np.random.default_rng(0)
     bounded = np.isfinite(arm.upper - arm.lower)
@@ -136,6 +144,6 @@ def _places(arm: Arm) -> list[Array]:
     T = arm.world_tool_pose(q)
     upright = np.abs(T[:, 2, 0]) > UPRIGHT
     order = np.argsort(-np.where(upright, margin, -1.0))[:TRIALS]
-    T_tool_axis = inverse(arm.hand.tool_pose(np.eye(4), 0.0, 0.0, 0.0, RADIUS))
+    T_tool_axis = inverse(arm.hand.tool_pose(np.eye(4), 0.0, 0.0, 0.0, float(can.radius(0.0))))
     axis = (T @ T_tool_axis)[:, :3, 3]
-    return [axis[k] - [0.0, 0.0, HEIGHT / 2] for k in order if upright[k]]
+    return [axis[k] - [0.0, 0.0, can.h_max / 2] for k in order if upright[k]]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from scipy.spatial import ConvexHull
 
 from symgrasp.errors import UrdfError, printable
 from symgrasp.hands.finger_fit import SAMPLES, TABLE_ERROR, best_fit, openings_of
@@ -55,7 +56,7 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
     return Hand(
         name=model.path.stem,
         links=(*palm, *fingers, *(link for link in idle if link not in fingers)),
-        touch_links=fingers,
+        touch_links=(*fingers, *_around(model, structure, fit.T_base_tool)),
         joints=_tables(fit.gripper.motion, values, openings),
         min_opening=_round(openings[0]),
         max_opening=_round(openings[-1]),
@@ -66,6 +67,19 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
         tool=_tool_frame(model, fit.T_base_tool, structure.base, tool),
         urdf=str(model.path.resolve()) if structure.standalone else None,
     )
+
+
+def _around(model: RobotModel, structure: HandStructure, T_base_tool: Array) -> list[str]:
+    """Return the links beside the palm with a shape where objects are held: a coarse one around the hand."""
+    links = model.forward(model.default_values())
+    held = (links[model.link_index(structure.base)] @ T_base_tool)[:3, 3]
+    found = []
+    for link in links_with_shapes(model, structure.beside):
+        T_link = links[model.link_index(link)]
+        at = T_link[:3, :3].T @ (held - T_link[:3, 3])
+        if any((ConvexHull(points).equations @ [*at, 1.0] < 0).all() for points in model.hulls(link)):
+            found.append(link)
+    return found
 
 
 def _jaw_hand(model: RobotModel, structure: HandStructure, tool: str | None) -> Hand:

@@ -33,12 +33,14 @@ class HandStructure(NamedTuple):
         fingers: for each moving joint on the palm, the links that it moves; one where a jaw closes on a part
             of the palm.
         standalone: whether the URDF holds the hand only, and no robot.
+        beside: the other links that move with the palm.
     """
 
     base: str
     palm: list[str]
     fingers: list[list[str]]
     standalone: bool
+    beside: list[str]
 
 
 def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
@@ -70,7 +72,8 @@ def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
     # On a robot the last link of the arm moves with the palm, but is not part of the hand.
     own = [link for link in together if model.chain(link)[: len(shared)] == shared]
     palm = together if mover is None else own
-    return HandStructure(base, palm, movers[mover], mover is None)
+    beside = [link for link in together if link not in palm]
+    return HandStructure(base, palm, movers[mover], mover is None, beside)
 
 
 def palm_candidates(model: RobotModel) -> list[str]:

@@ -12,7 +12,8 @@ import numpy as np
 
 from symgrasp.descriptions.description import read_description
 from symgrasp.errors import UrdfError, one_of
-from symgrasp.poses import Array, from_position_quat, rpy
+from symgrasp.meshes import read_up
+from symgrasp.poses import Array, from_position_quat, from_position_rpy, rpy
 from symgrasp.references import resolve, sought
 
 __all__ = ["Frame", "Mount", "assemble"]
@@ -75,19 +76,31 @@ class Mount:
     name: str
 
 
-def assemble(path: Path, mounts: Sequence[Mount] = (), robot: ET.Element | None = None) -> bytes:
+def assemble(
+    path: Path,
+    mounts: Sequence[Mount] = (),
+    robot: ET.Element | None = None,
+    *,
+    follow_up_axis: bool = False,
+) -> bytes:
     """Return the text of a URDF with the mounts added and every mesh reference made an absolute path.
 
     Args:
         path: the file of the robot.
         mounts: what to add, in order; a later one may be fixed to an earlier one.
         robot: what `read_description` made of the file, which is changed; it is read unless given.
+        follow_up_axis: whether COLLADA meshes of the robot are turned so that the axis which they state as up
+            is z; their origins are changed.
 
     Raises:
         UrdfError: a file is not a URDF, refers to a mesh that does not exist, lacks the link that
             something is to be mounted on, or two links or joints would have the same name.
+        MeshError: a COLLADA mesh that is to be turned cannot be read.
     """
     robot = _checked(path, read_description(path).urdf if robot is None else robot)
+    if follow_up_axis:
+        for link in robot.iter("link"):
+            _turn_up(link)
     for mount in mounts:
         _add(robot, path, mount)
     return ET.tostring(robot)
@@ -114,6 +127,21 @@ def _checked(path: Path, robot: ET.Element) -> ET.Element:
                 raise UrdfError(path, f"link {link.get('name')}", reference, expected)
             mesh.set("filename", str(file.resolve()))
     return robot
+
+
+def _turn_up(link: ET.Element) -> None:
+    """Change the origins of the meshes of a link so that what their files state as up is z."""
+    for part in [*link.iterfind("collision"), *link.iterfind("visual")]:
+        for mesh in part.iterfind("geometry/mesh"):
+            turn = read_up(Path(mesh.get("filename", "")), f"link {link.get('name')}")
+            origin = part.find("origin")
+            origin = ET.SubElement(part, "origin") if origin is None else origin
+            stated = [[float(n) for n in origin.get(key, "0 0 0").split()] for key in ("xyz", "rpy")]
+            pose = from_position_rpy(*stated) @ turn
+            origin.attrib.update(_origin(pose))
+            scale = np.broadcast_to([float(n) for n in mesh.get("scale", "1").split()], 3)
+            scale = np.abs(turn[:3, :3].T) @ scale  # of the axes of the file, before they are turned
+            mesh.set("scale", _text(scale))
 
 
 def _no_repeats(path: Path, field: str, names: Sequence[str]) -> None:
@@ -179,8 +207,16 @@ def _add(robot: ET.Element, path: Path, mount: Mount) -> None:
     ET.SubElement(joint, "parent", link=mount.frame.link)
     ET.SubElement(joint, "child", link=roots[0])
     pose = mount.frame.matrix()
-    text = {"xyz": pose[:3, 3], "rpy": rpy(pose)}
-    ET.SubElement(joint, "origin", {key: " ".join(map(repr, v.tolist())) for key, v in text.items()})
+    ET.SubElement(joint, "origin", _origin(pose))
+
+
+def _origin(pose: Array) -> dict[str, str]:
+    """Return the attributes of the origin that is a pose (4, 4)."""
+    return {"xyz": _text(pose[:3, 3]), "rpy": _text(rpy(pose))}
+
+
+def _text(numbers: Array) -> str:
+    return " ".join(map(repr, numbers.tolist()))
 
 
 def _references(robot: ET.Element) -> Iterator[tuple[ET.Element, str]]:

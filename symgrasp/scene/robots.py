@@ -76,7 +76,13 @@ class RobotBuilder:
                 mounts.append(Mount(hand.tool, None, tools[-1]))
         urdf = self._path(entry.urdf)
         srdf = self._path(entry.srdf) if entry.srdf else find_srdf(urdf)
-        model = self.model(urdf, tuple(mounts), srdf, xacro_texts(entry.xacro_args))
+        model = self.model(
+            urdf,
+            tuple(mounts),
+            srdf,
+            xacro_texts(entry.xacro_args),
+            follow_up_axis=bool(entry.follow_up_axis),
+        )
         chains = [self._chain(f, tool, model) for f, tool in zip(fields, tools, strict=True)]
         torso = self._torso(field, entry, model, tools)
         shared = frozenset(n for k, c in enumerate(chains) for n in c for o in chains[:k] if n in o)
@@ -117,11 +123,13 @@ class RobotBuilder:
         mounts: tuple[Mount, ...] = (),
         srdf: Path | None = None,
         xacro_args: Mapping[str, str] | None = None,
+        *,
+        follow_up_axis: bool = False,
     ) -> RobotModel:
         """Return the model of a URDF with mounts, shared by robots and obstacles that are alike."""
-        key = path, mounts, srdf, tuple(sorted((xacro_args or {}).items()))
+        key = path, mounts, srdf, tuple(sorted((xacro_args or {}).items())), follow_up_axis
         if key not in self._models:
-            self._models[key] = RobotModel(path, mounts, srdf, xacro_args)
+            self._models[key] = RobotModel(path, mounts, srdf, xacro_args, follow_up_axis=follow_up_axis)
         return self._models[key]
 
     def _path(self, reference: str) -> Path:

@@ -41,7 +41,7 @@ def always_in_hands(scene: Scene, robot: str) -> tuple[tuple[tuple[str, str], st
     """
     arms = [arm for arm in scene.arms.values() if arm.robot.name == robot]
     moved = frozenset(k for arm in arms for k in arm.indices.tolist())
-    hands = tuple({arm.hand.name: arm.hand for arm in arms}.values())
+    hands = tuple(dict.fromkeys(arm.hand for arm in arms))  # two that were measured may have one name
     model, home = scene.robots[robot].model, scene.robots[robot].home
     return _always(model, hands, moved, home.tobytes())
 
@@ -51,7 +51,7 @@ def _always(
     model: RobotModel, hands: tuple[Hand, ...], moved: frozenset[int], home: bytes
 ) -> tuple[tuple[tuple[str, str], str], ...]:
     sources = {
-        hand.name: frozenset(model.joint_names.index(n) for n in hand.joints if n in model.joint_names)
+        hand: frozenset(model.joint_names.index(n) for n in hand.joints if n in model.joint_names)
         for hand in hands
     }
     of_hands = frozenset().union(*sources.values())
@@ -63,7 +63,7 @@ def _always(
             if (between := _between(model, pair))
             and not between & moved
             and between & of_hands
-            and between & of_hands <= sources[hand.name]
+            and between & of_hands <= sources[hand]
         ]
         if pairs:
             values = _values(model, hand, np.frombuffer(home))

@@ -17,8 +17,9 @@ from symgrasp.scene.scene import Scene
 CATALOGUED = {robot.name: robot for robot in CATALOGUE}
 
 
-@pytest.mark.parametrize("name", ["iiwa", "ur5"])
+@pytest.mark.parametrize("name", ["iiwa", "ur5", "romeo", "icub", "tiago_dual"])
 def test_the_scene_has_feasible_cells(name, tmp_path, capsys):
+    """Of hands that open a little only, and of those with four fingers in a row, too."""
     out = tmp_path / "scene.yaml"
     assert main(["robot", CATALOGUED[name].urdf, "--scene", str(out)]) == 0
     printed = capsys.readouterr().out
@@ -26,7 +27,7 @@ def test_the_scene_has_feasible_cells(name, tmp_path, capsys):
     assert "in reach of" in printed
     scene = Scene.load(out)
     assert [robot.urdf for robot in scene.file.robots] == [CATALOGUED[name].urdf]
-    assert list(scene.arms) == [name]  # each has one arm
+    assert list(scene.arms) == [arm.name for arm in CATALOGUED[name].arms]
     assert create_map(scene).feasible.any()
 
 
@@ -48,6 +49,18 @@ def test_another_arm_can_be_the_one_that_reaches(tmp_path, capsys):
     assert Scene.load(out).task().arms == ("right",)
     assert main(["robot", CATALOGUED["pr2"].urdf, "--arm", "middle"]) == 2
     assert "--arm: 'middle': expected one of 'left', 'right'" in capsys.readouterr().err
+
+
+def test_meshes_that_are_turned_only_where_asked(tmp_path, capsys):
+    """Of an iCub that is not the catalogue's file, all meshes state y as up."""
+    path = resolve(CATALOGUED["icub"].urdf, Path())
+    assert path is not None
+    text = path.read_text().replace("package://example-robot-data", str(path.parents[3]))
+    (tmp_path / "mine.urdf").write_text(text)
+    assert main(["robot", str(tmp_path / "mine.urdf")]) == 0
+    assert "56 COLLADA meshes state another axis than z as up" in capsys.readouterr().out
+    assert main(["robot", str(tmp_path / "mine.urdf"), "--follow-up-axis"]) == 0
+    assert "COLLADA" not in capsys.readouterr().out
 
 
 def test_what_is_no_robot_with_an_arm(tmp_path, capsys):

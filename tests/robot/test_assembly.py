@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from symgrasp.descriptions.xml_file import DEEPEST, LARGEST_XML, MOST_ELEMENTS
-from symgrasp.errors import UrdfError
+from symgrasp.errors import MeshError, UrdfError
+from symgrasp.meshes import read_mesh
 from symgrasp.poses import from_position_rpy, quat_wxyz
 from symgrasp.references import resolve
 from symgrasp.robot import assembly
 from symgrasp.robot.assembly import MOST_LINKS, Frame, Mount, assemble
 from symgrasp.robot.model import RobotModel
 from tests.hostile import chain_urdf
+from tests.meshes.test_reading import collada
 
 WSG = resolve("package://static_scenes/hands/wsg50.urdf", Path()) or Path()
 IIWA = resolve("package://pybullet_data/kuka_iiwa/model.urdf", Path()) or Path()
@@ -34,6 +36,49 @@ def test_a_mounted_hand_is_where_it_was_put():
     for link, pose in zip(hand.link_names, hand.forward(opened), strict=True):
         np.testing.assert_allclose(links[both.link_index(link)], flange @ POSE @ pose, atol=1e-9)
         assert len(both.hulls(link)) == len(hand.hulls(link))
+
+
+@pytest.mark.parametrize("up", ["X_UP", "Y_UP", "Z_UP"])
+@pytest.mark.parametrize("follow", [False, True])
+def test_the_stated_vertical_of_meshes_is_followed_where_asked(tmp_path, up, follow):
+    """The scale of the URDF is along the axes of the mesh as it is seen."""
+    (tmp_path / "part.dae").write_text(collada(f'<unit meter="0.01"/><up_axis>{up}</up_axis>'))
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(
+        '<robot name="r"><link name="l"><collision><origin xyz="0.1 -0.2 0.3" rpy="0.3 -0.2 1"/>'
+        '<geometry><mesh filename="part.dae" scale="1 2 3"/></geometry></collision></link></robot>'
+    )
+    seen = read_mesh(tmp_path / "part.dae", upright=follow).vertices * [1, 2, 3]
+    pose = from_position_rpy([0.1, -0.2, 0.3], [0.3, -0.2, 1.0])
+    expected = seen @ pose[:3, :3].T + pose[:3, 3]
+    (found,) = RobotModel(urdf, follow_up_axis=follow).hulls("l")
+    for point in expected:
+        assert np.abs(found - point).max(axis=1).min() < 1e-9
+
+
+def test_a_mesh_without_a_vertical_is_not_turned(tmp_path):
+    (tmp_path / "part.dae").write_text(collada("<up_axis>W_UP</up_axis>"))
+    urdf = tmp_path / "robot.urdf"
+    shape = '<collision><geometry><mesh filename="part.dae"/></geometry></collision>'
+    urdf.write_text(f'<robot name="r"><link name="l">{shape}</link></robot>')
+    with pytest.raises(MeshError, match=r"link l.*W_UP.*expected a COLLADA file with an up_axis"):
+        RobotModel(urdf, follow_up_axis=True)
+
+
+@pytest.mark.parametrize("stated", ["1.57079632679", "-1.5707963268", "3.14159265359", "4.712388980385"])
+def test_right_angles_are_right_up_to_the_rounding_of_urdfs(tmp_path, stated):
+    """Axes that meet by their URDF then meet, and no others are moved."""
+    for text, exact in ((stated, True), (stated[:9], False)):
+        (tmp_path / "robot.urdf").write_text(
+            f'<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>'
+            f'<child link="b"/><origin xyz="1 2 3" rpy="{text} 0.3 0"/></joint></robot>'
+        )
+        (joint,) = RobotModel(tmp_path / "robot.urdf").joints
+        right = np.round(float(text) / (np.pi / 2)) * np.pi / 2
+        off = np.abs(joint.origin - from_position_rpy([1, 2, 3], [right, 0.3, 0.0])).max()
+        assert (off < 1e-15) == exact
+        as_stated = from_position_rpy([1, 2, 3], [float(text), 0.3, 0.0])
+        np.testing.assert_allclose(joint.origin, as_stated, atol=1e-9)
 
 
 @pytest.mark.parametrize(

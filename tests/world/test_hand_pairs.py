@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import yaml
 from symgrasp.errors import SceneError
 from symgrasp.files import SCENES_DIR
 from symgrasp.references import resolve
+from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import check_homes, checked_self_pairs, own_pairs, prepared
 
@@ -54,6 +56,15 @@ def test_a_box_around_the_fingers_bars_nothing_and_this_is_said(tmp_path):
     notes = [note for note in prepared(scene).notes if "every opening of hand franka" in note]
     assert len(notes) == 2
     assert all("safety_box" in note and "may touch" in note for note in notes)
+
+
+def test_boxes_around_two_hands_of_one_name(tmp_path):
+    """Hands that are measured are called what their robot is: both of it."""
+    scene = scene_with_box(tmp_path, "0.06 0.2 0.05")
+    first = scene.arm()
+    other = Arm("other", first.robot, first.tool, replace(first.hand, joints={}))
+    both = replace(scene, arms={"panda": first, "other": other})
+    assert not of_box(own_pairs(both, "panda"))
 
 
 def test_a_box_that_the_fingers_leave_is_checked(tmp_path):
