@@ -30,7 +30,7 @@ from symgrasp.planners.planning import (
 from symgrasp.planners.sequential import common_grasps
 from tests.conftest import load_small
 from tests.plan.test_plan import bimanual, handover, sequential
-from tests.planners.test_holding import Picky, apart, random_maps, score, together
+from tests.planners.small_maps import Picky, apart, random_maps, score, together
 
 
 def near(a, b) -> bool:
