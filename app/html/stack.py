@@ -57,8 +57,12 @@ def stack_html(state: State) -> str:
             rows.append(_strip(result, grasp, state.plan_results.slide * task.delta, task.delta, height))
         if len(group) > 1:
             turns = tuple(state.plan_results.slide * task.delta for _, task, _ in group)
-            rows.append(_row((f"all {len(group)} over each other", "", "", "", ""), ""))
-            rows.append(_overlay(_maps(state, [task for _, task, _ in group]), turns, grasp, height))
+            maps = _maps(state, [task for _, task, _ in group])
+            shared = shared_columns(maps, turns, ROLLS.index(grasp.roll))
+            cells = round(float(shared.mean(axis=1).sum()) * maps[0].manifold.angles)
+            text = f"all {len(group)} over each other: {cells} common {'cell' if cells == 1 else 'cells'}"
+            rows.append(_row((text, "", "", "", ""), "sg-wide"))
+            rows.append(_overlay(maps[0], shared, grasp, height))
     axis = f'<div class="sg-map sg-axis">{THETA_AXIS}</div>'
     return f'<div class="sg-stack" role="img" aria-label="maps of the tasks">{"".join(rows)}{axis}</div>'
 
@@ -150,14 +154,12 @@ def _maps(state: State, tasks: Sequence[PlanTask]) -> list[FeasibilityMap]:
     return [state.plan_results.maps[task.name, task.holds[0].arm].map for task in tasks]
 
 
-def _overlay(maps: Sequence[FeasibilityMap], turns: tuple[float, ...], grasp: Grasp, height: int) -> str:
-    """Draw where the grasp is feasible in all maps, each turned by its δ (rad)."""
-    shared = shared_columns(maps, turns, ROLLS.index(grasp.roll))
+def _overlay(m: FeasibilityMap, shared: np.ndarray, grasp: Grasp, height: int) -> str:
+    """Draw where a roll is feasible in all maps, see `shared_columns`; one of them gives the axes."""
     source = _uri(to_png(shared[::-1].astype(np.uint8), SHARED))
-    grid = maps[0].manifold
     picture = f'<img class="sg-whole" alt="common grasps" src="{source}">'
-    marks = _theta_line(grasp.theta) + circle(Mark(grasp.h, grasp.theta), grid)
-    return _framed(picture + marks, maps[0], height)
+    marks = _theta_line(grasp.theta) + circle(Mark(grasp.h, grasp.theta), m.manifold)
+    return _framed(picture + marks, m, height)
 
 
 def _framed(picture: str, m: FeasibilityMap, height: int) -> str:

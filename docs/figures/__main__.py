@@ -7,7 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 
-from docs.figures import climbing, holding, page, unwrapping
+from docs.figures import climbing, coordinates, holding, page, unwrapping
 from docs.figures.architecture import architecture
 from docs.figures.grids import grids
 from docs.figures.style import IMAGES
@@ -20,6 +20,7 @@ FIGURES: dict[str, Callable[[], None]] = {
         architecture,
         holding.log_two_humanoids,
         holding.log_four_robots,
+        coordinates.coordinates,
         unwrapping.soda_can,
         holding.wine_bottle,
         unwrapping.turn_shifts,

@@ -51,7 +51,7 @@ def handprints() -> None:
             hand = robot(arm.robot, values, arm.hand.links)
             bodies += [Body(body.corners, body.normals, 0.35 + 0.65 * color / 255) for body in hand]
         left = 0.75 + 4.7 * k
-        photo(figure, (left - 0.1, 2.95, 4.4, 3.2), bodies, Camera((0.39, 0, 0.42), -35, 12, 0.42))
+        photo(figure, (left - 0.1, 2.95, 4.4, 3.2), bodies, Camera((0.40, 0, 0.42), -90, 8, 0.42))
         figure.text((left + 2.1) / 10, 6.28 / 6.6, when, ha="center", fontsize=10)
         axes = board(figure, (left, 0.8, 4.2, 2.0))
         bottom = 100 * (grid.profile.h_min + CLOSE * grid.dh)

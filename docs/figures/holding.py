@@ -119,12 +119,12 @@ def pick_pour_place() -> None:
         bodies = [*robots(scene, task), *obstacles(scene), thing, floor(-0.04)]
         box = (3.35 * k, 0.5, 3.3, 3.7)
         photo(figure, box, bodies, Camera((0.36, 0.01, 0.33), -14, 20, 1.14))
-        turned = f", bottle turned by {np.rad2deg(task.delta):.0f}°" if k else ""
+        turned = f", bottle turned by {np.rad2deg(task.delta):.1f}°" if k else ""
         figure.text(
             (3.35 * k + 1.65) / 10, 0.09, f"{task.name}{turned}", ha="center", va="center", fontsize=10
         )
     (hold,) = plan.tasks[0].holds
-    grasp = f"the same grasp in all: h = {100 * hold.grasp.h:.1f} cm, θ = {np.rad2deg(hold.grasp.theta):.0f}°"
+    grasp = f"the same grasp in all: h = {100 * hold.grasp.h:.1f} cm, θ = {np.rad2deg(hold.grasp.theta):.1f}°"
     figure.text(0.5, 0.02, grasp, ha="center", va="bottom", color=INK, fontsize=9)
     save(figure, "pick_pour_place.png")
 

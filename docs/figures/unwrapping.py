@@ -95,7 +95,7 @@ def turn_shifts() -> None:
         flat.axvline(seam, color=INK, linewidth=1.2, linestyle=(0, (4, 2)))
         anew = create_map(scene.with_task(replace(scene.task(), T_world_object=pose)), manifold=grid)
         differing = np.count_nonzero(anew.reason != shifted.reason)
-        turned = f"turned by δ = {np.rad2deg(delta):.0f}°" if k else "as it stands"
+        turned = f"turned by δ = {np.rad2deg(delta):.1f}°" if k else "as it stands"
         note = f"computed anew: {differing} of {anew.reason.size} cells differ" if k else ""
         figure.text((left + 1.375) / 10, 6.0 / 6.2, turned, ha="center", fontsize=10)
         flat.set_title(note, fontsize=8)
@@ -123,14 +123,15 @@ def maps_slide() -> None:
             if k < 2 or axes is after:
                 axes.set(xlabel="", xticklabels=[])
         before.set_title(task.name, loc="left", pad=3)
-        after.set_title(f"turned by δ = {np.rad2deg(task.delta):.0f}°", loc="left", pad=3)
+        after.set_title(f"turned by δ = {np.rad2deg(task.delta):.1f}°", loc="left", pad=3)
     seen = np.concatenate([m.reason[roll] for m in maps])
     legend(figure, seen, (0.75, 1.7), columns=2)
     common = board(figure, (5.3, 0.55, 3.9, 1.25))
     count = np.sum([m.feasible[roll] for m in slid], axis=0)
     map_axes(common, slid[0].manifold, TASKS[count])
     mark(common, grasp.h, grasp.theta)
-    common.set_title("over each other: the greener, the more tasks", loc="left", pad=3)
+    common.set_title("over each other", loc="left", pad=3)  # short of the line that joins the marks
+    common.set_xlabel("θ (°); the greener, the more tasks")
     for upper, lower in pairwise([*figure.axes[1:6:2], common]):
         at = np.rad2deg(grasp.theta), 100 * grasp.h
         join = {"coordsA": "data", "coordsB": "data", "axesA": upper, "axesB": lower}

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from app.compute import plan_service
 from app.compute.cache import SharedCache
 from app.compute.map_service import MapService
-from app.compute.plan_service import PlanRequest, PlanService
+from app.compute.plan_service import SEARCH, PlanRequest, PlanService
 from app.files.plan_formats import PLAN_LIMIT
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
 from app.render.playback import plan_joint_values
@@ -334,3 +334,26 @@ def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans)
         plans.open(b" " * (PLAN_LIMIT + 1), "a.json", quiet)
     with pytest.raises(PlanError, match="JSON"):
         plans.open(b"{", "a.json", quiet)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "method"),
+    [
+        ("pick_pour_place", "sequential", "best"),
+        ("log_two_robots", "bimanual", "exact"),
+        ("log_two_robots", "bimanual", "hill_climb"),
+    ],
+)
+def test_the_progress_of_a_planner_is_at_its_end_when_all_is_listed(plans, name, kind, method):
+    scene, shares = load_small(name, heights=24), []
+    request = PlanRequest(scene, kind, method, "panda" if kind == "sequential" else "lift")
+    service = MapService()
+    maps, _ = service.maps(request.maps, {}, quiet)
+    service.close()
+    outcome = plans.plan(request, maps, shares.append)
+    assert outcome.plans
+    assert shares == sorted(shares)
+    parts = len(request.maps) + 1  # the maps come first
+    if method != "hill_climb":
+        listed = [share for share in shares if parts * (share - 1) + 1 > SEARCH + 1e-9]
+        assert len(listed) == len(outcome.plans)
