@@ -27,6 +27,7 @@ from symgrasp.reason import Reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from xarray import Dataset
 
     from symgrasp.scene.scene import Scene
 
@@ -339,6 +340,42 @@ class FeasibilityMap:
             "certified": None if self.certified is None else self.certified.tolist(),
             "refined": self.refined and self.refined.to_dict(),
         }
+
+    def to_xarray(self) -> Dataset:
+        """Return the map with named dimensions, as a `xarray.Dataset`; needs ``symgrasp[survey]``.
+
+        Dimensions are roll, h, theta (rad, m, rad: centres of the cells) and joint. Variables are what the
+        attributes of the map are called; ``margin`` has along (m) and around (rad) apart.
+
+        Raises:
+            SymgraspError: xarray is not installed.
+        """
+        try:
+            import xarray as xr
+        except ImportError as error:
+            raise SymgraspError("this needs xarray: pip install 'symgrasp[survey]'") from error
+        cells, m = ("roll", "h", "theta"), self.manifold
+        rolls = np.arange(len(self.reason)) if self.pitches else np.array(ROLLS)
+        data = {
+            "reason": (cells, self.reason, {"flag_values": [int(r) for r in Reason],
+                                            "flag_meanings": " ".join(r.name for r in Reason)}),
+            "feasible": (cells, self.feasible),
+            "proven": (cells, self.proven),
+            "clearance": (cells, self.clearance, {"units": "m"}),
+            "margin_along": (cells, self.margins[..., 0], {"units": "m"}),
+            "margin_around": (cells, self.margins[..., 1], {"units": "rad"}),
+            "q": ((*cells, "joint"), self.q, {"units": "rad or m", "long_name": "joints of the witness"}),
+            "opening": ("h", self.opening, {"units": "m", "long_name": "opening of the hand"}),
+            "radius": ("h", m.profile.radius(m.h), {"units": "m", "long_name": "radius of the object"}),
+        }  # fmt: skip
+        coordinates = {
+            "roll": ("roll", rolls, {} if self.pitches else {"units": "rad"}),
+            "h": ("h", m.h, {"units": "m", "long_name": "height along the object's axis"}),
+            "theta": ("theta", m.theta, {"units": "rad", "long_name": "angle around the object's axis"}),
+        }
+        about = {"scene": self.scene, "arm": self.arm, "task": self.task}
+        pose = {"T_world_object": self.T_world_object.ravel().tolist()}
+        return xr.Dataset(data, coordinates, {**about, **pose})
 
     def to_npz(self) -> bytes:
         """Return the map as the content of an npz file."""
