@@ -25,6 +25,9 @@ __all__ = ["Done", "cluster", "run_on", "run_survey"]
 AHEAD = 3
 """Batches for each thread of the cluster that are submitted before their turn, so that none waits."""
 
+HOST = "127.0.0.1"
+"""Where the processes of a local cluster listen: nobody else's machine can reach them."""
+
 FAILURES = 3
 """A batch that so many workers died of is given up."""
 
@@ -131,6 +134,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
         "distributed.scheduler.work-stealing": False,
         "distributed.worker.profile.enabled": False,
         "distributed.admin.tick.limit": "60s",
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
     }
     with config.set(settings):
         if scheduler is not None:
@@ -146,8 +151,9 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
             LocalCluster(
                 n_workers=workers or CORES,
                 threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,  # pyright: ignore[reportArgumentType]  # no server
+                host=HOST,
+                dashboard_address=f"{HOST}:0",
+                worker_dashboard_address=f"{HOST}:0",
                 silence_logs=logging.CRITICAL,
                 memory_limit=0,
                 security=Security.temporary(),

@@ -14,6 +14,7 @@ from symgrasp.scene.scene import Scene
 from symgrasp.world.bullet import BulletWorld
 from symgrasp.world.client import pybullet, xyzw
 from symgrasp.world.opening import open_world
+from symgrasp.world.shapes import MARGIN
 from symgrasp.world.tasks import RESTING_DEPTH
 
 __all__ = ["placed", "stands_free"]
@@ -26,6 +27,10 @@ STEPS = (1.0, 1.15, 1.3, 1.5, 1.75, 2.0, 0.85)
 
 STRETCHED = 0.9
 """Largest distance from the first joint to the object, as a share of the length of the arm."""
+
+STANDING_DEPTH = RESTING_DEPTH + MARGIN
+"""How deep (m) a robot's body may be inside another body and still count as standing on it, with what
+PyBullet keeps around the hulls of links."""
 
 STEEP = 0.5
 """Largest height of the first joint above or below it, as such a share, where the robot may stay standing."""
@@ -101,7 +106,7 @@ def _is_outside(world: BulletWorld, name: str, counted: frozenset[str], others: 
     checked = {index[link] for link in counted}
     # Fields of a point: 3 is the link of the robot, 8 is the distance, negative for penetration.
     return all(
-        point[3] not in checked or point[8] > -RESTING_DEPTH
+        point[3] not in checked or point[8] > -STANDING_DEPTH
         for other in others
         for point in pybullet.getClosestPoints(body, other, 0.0, physicsClientId=bodies.client) or ()
     )
