@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         check_out(path)
         if path and path.suffix not in endings:
             raise InputError("command line", f"--{option}", str(path), "an ending: " + one_of(endings))
-    scene, *task_and_arm = chosen(args)
+    scene, task, arm = chosen(args)
 
     from symgrasp.survey.success import PoseNoise, plan_for_success
 
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         say(f"written to {args.plan}")
         if not args.out:
             return 0
-    _map(args, noise, scene, *task_and_arm)
+    _map(args, noise, scene, task, arm)
     return 0
 
 

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -109,18 +110,22 @@ def progress_of_points(what: str) -> Iterator[Callable[[Done], None] | None]:
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     rate = TextColumn("{task.fields[rate]}")
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), rate)
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as shown:
+    with Progress(*columns, console=Console(stderr=True)) as shown:
         row = shown.add_task(what, total=None, rate="")
         start: list[tuple[float, int]] = []
 
         def show(done: Done) -> None:
             start[:] = start or [(perf_counter(), done.points)]
             (began, before), now = start[0], perf_counter()
-            rate = f"{(done.points - before) / (now - began):.1f} points/s" if done.points > before else ""
+            rate = ""
+            if done.points > before:  # over all of the run: batches arrive in bursts
+                each = (now - began) / (done.points - before)
+                left = timedelta(seconds=round(each * (done.of - done.points)))
+                rate = f"{1 / each:.1f} points/s, {left} left"
             shown.update(row, total=done.of, completed=done.points, rate=rate)
 
         yield show

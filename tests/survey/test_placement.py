@@ -21,7 +21,7 @@ from symgrasp.survey.placement_picture import draw_placement
 from symgrasp.world import open_world, stands_free
 from tests.conftest import load_small
 
-REGION = Region((-0.1, 0.1), (-0.1, 0.1), (0.0, 0.0), (0.0, 45.0), step=0.2)
+REGION = Region((-0.2, 0.0), (-0.1, 0.1), (0.0, 0.0), (0.0, 30.0), step=0.2)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def brute(scene: Scene, base: Base) -> float:
 def test_every_base_is_what_a_plan_of_its_own_says(client, tmp_path, monkeypatch):
     monkeypatch.setattr(placement, "ROUNDS", 1)
     monkeypatch.setattr(placement, "SEEDS", 1)
-    scene = load_small("pick_pour_place", 8, 16, 4)
+    scene = load_small("pick_pour_place", 10, 24, 8)
     found = place_base(client, scene, "panda", REGION, tmp_path)
     expected = {base: brute(scene, base) for base in found.margins}
     assert len(found.margins) > 8

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy.spatial.transform import Rotation
@@ -44,6 +44,7 @@ def test_without_noise_grasps_are_certain_or_impossible():
     assert np.array_equal(found.probability, found.nominal.feasible)
 
 
+@settings(max_examples=30)
 @given(
     st.lists(
         st.tuples(
