@@ -28,7 +28,7 @@ from numba.extending import register_jitable
 
 from symgrasp.caching import cache_folder, make_folder
 
-__all__ = ["COMPILING_MESSAGE", "ENTRY", "SOURCES", "njit", "notify_on_compile"]
+__all__ = ["COMPILING_MESSAGE", "ENTRY", "SOURCES", "interpreted", "is_compiled", "njit", "notify_on_compile"]
 
 SOURCES = (
     "collision/*.py",
@@ -124,6 +124,19 @@ def njit(*, inner: bool = False, **options: Any) -> Callable[[Callable[..., Any]
         return compiled
 
     return compile_later
+
+
+def is_compiled(function: Any) -> bool:
+    """Whether a function of `njit` has been compiled on this machine, by this process or an earlier one."""
+    if not hasattr(function, "overloads"):  # without numba's compiler
+        return True
+    cache = getattr(function._cache, "_cache_file", None)
+    return bool(function.overloads or (cache and cache._load_index()))
+
+
+def interpreted(function: Any) -> Callable[..., Any]:
+    """Return a function of `njit` as Python runs it, a thousand times slower, with nothing to compile."""
+    return getattr(function, "py_func", function)
 
 
 class _InnerLibrary(JITCodeLibrary):

@@ -43,7 +43,8 @@ POLL_INTERVAL = 0.05
 """Longest time (s) between two checks for a cancel while the process sends nothing."""
 
 CANCEL_TIMEOUT = 10.0
-"""Time (s) after a cancel until the process is killed: compiled code cannot be interrupted."""
+"""Time (s) after a cancel until the process is killed: compiled code cannot be interrupted. Compiling
+cannot be either, but is left to end, as the next call would begin it anew."""
 
 
 READING_TIMEOUT = 60.0
@@ -67,6 +68,7 @@ class ComputeProcess:
         keep: called with every computed map.
         compiling: called when the process begins to compile code.
         waiting: called while others have to compute first.
+        preliminary: called with a coarse map that is to be shown until the exact one is computed.
     """
 
     def __init__(
@@ -75,8 +77,10 @@ class ComputeProcess:
         keep: Callable[[MapResult], None] = lambda _: None,
         compiling: Callable[[], None] = lambda: None,
         waiting: Callable[[], None] = lambda: None,
+        preliminary: Callable[[MapResult], None] = lambda _: None,
     ) -> None:
         self._pool, self._keep, self._compiling, self._waiting = pool, keep, compiling, waiting
+        self._preliminary = preliminary
         self._place = Place(pool.turns)
         self._process: WorkerProcess | None = None
         self._planner: WorkerProcess | None = None
@@ -251,9 +255,15 @@ class ComputeProcess:
                 message = process.channel.receive()
                 if isinstance(message, ComputedMap):
                     self._receive_map(message)
-                elif not isinstance(message, (ProgressReport, Compiling)):
-                    process.cancelled_at = None
-            if process.cancelled_at is not None and time.monotonic() - since > CANCEL_TIMEOUT:
+                elif isinstance(message, Compiling):
+                    process.compiling = True
+                elif isinstance(message, ProgressReport):
+                    process.compiling = False
+                else:
+                    process.cancelled_at, process.compiling = None, False
+            if process.compiling:
+                self._compiling()
+            elif process.cancelled_at is not None and time.monotonic() - since > CANCEL_TIMEOUT:
                 self.close()
                 return
             progress(0.0)
@@ -276,6 +286,7 @@ class ComputeProcess:
                 progress(share)
                 continue
             message = channel.receive()
+            process.compiling = isinstance(message, Compiling)
             heard = math.inf if isinstance(message, Compiling) else time.monotonic()
             if isinstance(message, ProgressReport):
                 share = message.share
@@ -299,7 +310,11 @@ class ComputeProcess:
         progress(share)
 
     def _receive_map(self, computed: ComputedMap) -> None:
-        self._computed.append(computed)
         request = self._requests.get((computed.map.task, computed.map.arm))
+        if computed.map.preliminary:
+            if request:
+                self._preliminary(MapResult(request, computed.map, computed.contacts))
+            return
+        self._computed.append(computed)
         if request:
             self._keep(MapResult(request, computed.map, computed.contacts))

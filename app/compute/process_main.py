@@ -106,6 +106,9 @@ class _Server:
             return Failure(_portable(error))
 
     def _map(self, request: MapRequest, progress: Progress) -> None:
+        coarse = self._maps.coarse(request, progress)
+        if coarse:
+            self._channel.send(ComputedMap(coarse.map, coarse.contacts))
         self._maps.map(request, progress)  # it is sent as a ComputedMap
 
     def _progress(self, share: float) -> None:

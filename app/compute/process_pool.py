@@ -30,6 +30,7 @@ class WorkerProcess:
         channel: to the process.
         job_id: number of the last call.
         cancelled_at: when (s, monotonic) that call was cancelled, if it has not ended since.
+        compiling: whether the last that was heard of it is that it compiles.
     """
 
     def __init__(self, folders: tuple[Path, ...]) -> None:
@@ -37,6 +38,7 @@ class WorkerProcess:
         self.channel = Channel(here)
         self.job_id = 0
         self.cancelled_at: float | None = None
+        self.compiling = False
         self._process = PROCESSES.Process(
             target=serve, args=(there, folders), name="symgrasp compute", daemon=True
         )

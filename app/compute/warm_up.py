@@ -29,7 +29,7 @@ def compute_first_map(cache: SharedCache) -> None:
     times: list[float] = []
 
     def progress(share: float) -> None:
-        times.append(time.monotonic())  # the first call comes after compiling
+        times.append(time.monotonic())
         if times[-1] - times[0] > TIME_LIMIT and share < 1:
             raise Cancelled
 

@@ -30,6 +30,8 @@ def title_html(state: State) -> str:
     """Name the map that is shown; ``aria-busy`` says whether a computation is under way."""
     names = f"{escape(state.scene.name)} · {escape(state.task)} · {escape(state.arm)}"
     age = "" if state.is_fresh or not state.result else " — of an earlier pose"
+    if state.is_preliminary:
+        age = " — coarse and preliminary"
     busy = "false" if state.is_current and not state.busy else "true"
     return f'<div class="sg sg-title" aria-busy="{busy}">{names}{age}</div>'
 
@@ -93,6 +95,8 @@ def status_html(state: State) -> str:
         doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %"
         if state.busy.compiling:
             doing = "Compiling, once on this machine: half a minute …"
+            if state.is_preliminary:
+                doing = "Compiling, once on this machine; a coarse map is shown until the exact one comes …"
         elif state.busy.waiting:
             doing = f"{state.busy.label} … when other browsers have had their turn"
     elif state.is_stopped:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import errno
 import socket
-import sys
 import threading
 import warnings
 
-from symgrasp.compiling import COMPILING_MESSAGE, notify_on_compile
+from symgrasp.engine.search import is_search_compiled
 from symgrasp.errors import InputError
 
 from ..compute.cache import SharedCache
@@ -54,9 +53,12 @@ def serve(scene: str, host: str, port: int, max_sessions: int = 16) -> None:
 
 
 def _warm_cache(scene: str) -> SharedCache:
-    """Return the cache with the first map in it, so that the page opens with its map."""
-    with notify_on_compile(lambda: print(f"symgrasp: {COMPILING_MESSAGE} …", file=sys.stderr, flush=True)):
-        cache = SharedCache(scene)
+    """Return the cache with the first map in it, so that the page opens with its map.
+
+    Where code has to be compiled for it, the page is there sooner, and begins with a coarse map.
+    """
+    cache = SharedCache(scene)
+    if is_search_compiled():
         compute_first_map(cache)
     return cache
 

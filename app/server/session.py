@@ -82,7 +82,11 @@ class Session:
         self._closed = False
         self._playback = PlaybackClock()
         self.process = ComputeProcess(
-            pool, cache.keep, lambda: self.jobs.compiling(), lambda: self.jobs.waiting()
+            pool,
+            cache.keep,
+            lambda: self.jobs.compiling(),
+            lambda: self.jobs.waiting(),
+            lambda result: self.change(lambda s: job_changes.preliminary_arrived(s, result)),
         )
         self.jobs = JobQueue(f"jobs {client.client_id}", self.process.close)
         try:

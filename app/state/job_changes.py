@@ -13,6 +13,7 @@ __all__ = [
     "failed",
     "is_awaited",
     "map_arrived",
+    "preliminary_arrived",
     "progressed",
     "result_arrived",
     "retried",
@@ -83,6 +84,11 @@ def map_arrived(state: State, job_id: int, result: MapResult) -> State:
     if result.request != state.request and not follows:
         return after
     return replace(after, result=result, refused=None)
+
+
+def preliminary_arrived(state: State, result: MapResult) -> State:
+    """Show a coarse map for the object's pose until the exact one arrives."""
+    return state if state.is_current or result.request != state.request else replace(state, result=result)
 
 
 def result_arrived(state: State, job_id: int, result: Comparison | ExplainResult) -> State:

@@ -179,8 +179,13 @@ class State:
 
     @property
     def is_current(self) -> bool:
-        """Whether the newest map is the one for the object's pose."""
-        return self.result is not None and self.result.request == self.request
+        """Whether the newest map is the exact one for the object's pose."""
+        return self.result is not None and self.result.request == self.request and not self.is_preliminary
+
+    @property
+    def is_preliminary(self) -> bool:
+        """Whether the newest map is a coarse one, shown until the exact one is computed."""
+        return self.result is not None and self.result.map.preliminary
 
     @property
     def missing_request(self) -> Request | None:
@@ -218,8 +223,8 @@ class State:
     @property
     def is_fresh(self) -> bool:
         """Whether the newest map is for the object's pose, or a quick computation will replace it."""
-        if self.is_current:
-            return True
+        if self.is_current or self.is_preliminary:
+            return self.is_current
         follows = self.result is not None and self.result.request.differs_only_in_pose(self.request)
         return follows and self.busy is not None and not self.is_waiting
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.tree import Tree
-from symgrasp.compiling import ENTRY, njit
+from symgrasp.compiling import ENTRY, is_compiled, njit
 from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm, check_row
 from symgrasp.engine.kinematics import MovingPieces, Scratch, place_arm, place_hand
@@ -59,6 +59,7 @@ __all__ = [
     "Balance",
     "SearchInput",
     "SearchResult",
+    "is_search_compiled",
     "search",
 ]
 
@@ -125,6 +126,11 @@ def search(
     in_parallel(partial(search_part, wants_rows=True), range(1, inputs.parts))
     in_parallel(partial(search_part, wants_rows=False), range(inputs.parts))
     return result
+
+
+def is_search_compiled() -> bool:
+    """Whether `search` runs at once on this machine, with nothing to compile."""
+    return is_compiled(_search_part)
 
 
 @njit(**ENTRY)

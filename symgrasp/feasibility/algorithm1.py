@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
-from symgrasp.ik import GridSolvers, solver_for
+from symgrasp.ik import GridSolvers, Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.poses import inverse
 from symgrasp.progress import Progress
@@ -29,6 +29,7 @@ def create_map_reference(
     task: Task,
     manifold: Manifold,
     progress: Progress | None = None,
+    solver: Callable[[Arm], Solver] | None = None,
 ) -> FeasibilityMap:
     """Compute the feasibility map of an arm and a task, cell by cell and candidate by candidate.
 
@@ -38,12 +39,13 @@ def create_map_reference(
         task: the task; it need not be one of the scene's.
         manifold: the grid.
         progress: called with the finished share after every row; may raise `Cancelled`.
+        solver: returns the inverse kinematics of an arm, see `GridSolvers`; that of all samples if None.
 
     Raises:
         UrdfError: the arm has no closed-form inverse kinematics.
     """
     settings = world.scene.settings
-    solvers = GridSolvers(arm, manifold, lambda own: solver_for(own, settings.samples))
+    solvers = GridSolvers(arm, manifold, solver or (lambda own: solver_for(own, settings.samples)))
     radii = manifold.profile.radius(manifold.h)
     draft = MapDraft(arm, manifold, np.array([arm.hand.opening(float(r)) for r in radii]), solvers.at(0, 0))
     T_base_tool = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(manifold, task.T_world_object)

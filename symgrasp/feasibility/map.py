@@ -84,6 +84,8 @@ class FeasibilityMap:
             that was not asked for.
         refined: the cells that may be mixed, split down to the resolution that the scene asks for; None where
             it asks for none.
+        preliminary: whether cells have the reasons of coarser ones, of which few configurations were tried;
+            then there are no witnesses.
     """
 
     scene: str
@@ -108,6 +110,7 @@ class FeasibilityMap:
     pitches: tuple[float, ...] = ()
     certified: np.ndarray | None = None
     refined: Refined | None = None
+    preliminary: bool = False
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
@@ -132,9 +135,9 @@ class FeasibilityMap:
         return own, self.pitches[pitch] if self.pitches else 0.0
 
     def witness(self, cell: Cell | tuple[int, int, int]) -> Witness | None:
-        """Return the configuration that proves a cell feasible, or None where it is not."""
+        """Return the configuration that proves a cell feasible; None elsewhere, and on a preliminary map."""
         cell = Cell(*cell)
-        if not self.feasible[cell]:
+        if self.preliminary or not self.feasible[cell]:
             return None
         sample = int(self.sample[cell])
         return Witness(
@@ -159,6 +162,8 @@ class FeasibilityMap:
     def rests_on(self, cell: Cell | tuple[int, int, int]) -> str:
         """Say in words what it rests on that a cell is feasible or infeasible."""
         cell = Cell(*cell)
+        if self.preliminary:
+            return "a coarse map"
         if self.feasible[cell]:
             return "its witness"
         if self.proven[cell]:
@@ -274,6 +279,8 @@ class FeasibilityMap:
         """
         m = self.manifold
         title = f"{self.scene} · {self.task} · {self.arm}"
+        if self.preliminary:
+            title += " · coarse, preliminary"
         parts = self.refined if self.refined and color_by in (ColorBy.REASON, ColorBy.FEASIBLE) else self
         coloured = color_map(color_by, parts.reason, self.values(color_by), parts.certified)
         heights = (m.profile.h_min, m.profile.h_max)
@@ -316,6 +323,7 @@ class FeasibilityMap:
             "bodies": list(self.bodies),
             "reasons": [r.name for r in Reason],
             "resolution": self.resolution,
+            "preliminary": self.preliminary,
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -430,7 +438,8 @@ class FeasibilityMap:
                 data["refined"] = _loaded_parts(path, manifold, *parts)
             data.setdefault("proven", np.zeros(shape, dtype=bool))  # files of earlier versions do not say
             names = {key: meta[key] for key in ("scene", "arm", "task")} | {
-                "resolution": meta.get("resolution", 0.0)
+                "resolution": meta.get("resolution", 0.0),
+                "preliminary": meta.get("preliminary", False),
             }
             return FeasibilityMap(**names, manifold=manifold, bodies=tuple(meta["bodies"]), **data)
         except (KeyError, IndexError, TypeError, ProfileError) as error:

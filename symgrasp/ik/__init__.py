@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions
-from symgrasp.ik.compiled import CompiledIK
+from symgrasp.ik.compiled import CompiledIK, InterpretedIK
 from symgrasp.ik.families import chain_geometries
 from symgrasp.ik.locking import joint_to_lock
 from symgrasp.ik.pitched import GridSolvers, PitchedIK
@@ -17,6 +17,7 @@ __all__ = [
     "ArmIK",
     "CompiledIK",
     "GridSolvers",
+    "InterpretedIK",
     "PitchedIK",
     "Solutions",
     "Solver",

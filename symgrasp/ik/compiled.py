@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from symgrasp.compiling import interpreted
 from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions, Tolerance
 from symgrasp.ik.branches import branch_count, new_memory, solve_range
 from symgrasp.ik.chain import COSINE_TOLERANCE, Chain
@@ -14,7 +15,7 @@ from symgrasp.ik.pair_geometry import MEETING_PAIR
 from symgrasp.poses import Array
 from symgrasp.robot.robot import AZIMUTH, Arm
 
-__all__ = ["CompiledIK"]
+__all__ = ["CompiledIK", "InterpretedIK"]
 
 FAMILIES = ("closed form, spherical triple", "closed form, three parallel axes", "search, two axes that meet")
 """What the families of `Chain` are called."""
@@ -40,6 +41,8 @@ class CompiledIK(ArmIK):
         chain: the arm's geometry at every redundancy sample, for compiled code.
     """
 
+    _solve_range = staticmethod(solve_range)
+
     def __init__(
         self, arm: Arm, samples: int, tolerance: Tolerance | None = None, lock: Lock | None = None
     ) -> None:
@@ -52,9 +55,14 @@ class CompiledIK(ArmIK):
         return FAMILIES[int(self.chain.joint[8])] + (", rounded axes" if self.chain.joint[9] else "")
 
     @property
+    def searches(self) -> bool:
+        """Whether configurations are searched for, because there is no closed form."""
+        return bool(self.chain.joint[8] == MEETING_PAIR)
+
+    @property
     def complete(self) -> bool:
         """Whether every configuration at the samples is found: by a closed form of the true axes."""
-        return self.everywhere and bool(self.chain.joint[8] != MEETING_PAIR and not self.chain.joint[9])
+        return self.everywhere and not (self.searches or bool(self.chain.joint[9]))
 
     @property
     def everywhere(self) -> bool:
@@ -84,7 +92,7 @@ class CompiledIK(ArmIK):
         # The compiled code fills arrays made here: a Ctrl-C while numba wraps up results would crash.
         q = np.empty((last - first, branch_count(self.chain), self.arm.dof))
         exists, inside = np.empty(q.shape[:-1], dtype=bool), np.empty(q.shape[:-1], dtype=bool)
-        solve_range(self.chain, T, first, last, q, exists, inside, new_memory(self.arm.dof))
+        self._solve_range(self.chain, T, first, last, q, exists, inside, new_memory(self.arm.dof))
         sample, branch = np.nonzero(exists)
         return Solutions(q[exists], sample + first, branch, inside[exists])
 
@@ -117,6 +125,12 @@ class CompiledIK(ArmIK):
             forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
             fixed=np.arange(arm.dof) == locked,
         )
+
+
+class InterpretedIK(CompiledIK):
+    """The same inverse kinematics, with nothing to compile: a sample takes a fraction of a millisecond."""
+
+    _solve_range = staticmethod(interpreted(solve_range))
 
 
 def _limits(arm: Arm, leeway: float) -> Array:

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 
 from app.choices import object_choice
+from app.compute import map_service
 from app.compute.limits import MEMORY_LIMIT
 from app.compute.process_main import REPORT_INTERVAL, serve
 from app.compute.upload_service import UploadService
@@ -54,6 +55,18 @@ def serve_compiling(pipe: Connection, folders: tuple[Path, ...]) -> None:
 
     setattr(MapMaker, "map", compiles_first)  # noqa: B010
     serve(pipe, folders)
+
+
+def serve_uncompiled(pipe: Connection, folders: tuple[Path, ...]) -> None:
+    """Compute maps as where the code of the exact ones has to be compiled first."""
+    setattr(map_service, "is_search_compiled", lambda: False)  # noqa: B010
+    serve(pipe, folders)
+
+
+def serve_coarse(pipe: Connection, folders: tuple[Path, ...]) -> None:
+    """Get no further than compiling, as where the code of exact maps has to be compiled first."""
+    setattr(map_service, "is_search_compiled", lambda: False)  # noqa: B010
+    serve_compiling(pipe, folders)
 
 
 def serve_parsers(pipe: Connection, folders: tuple[Path, ...]) -> None:

@@ -65,6 +65,24 @@ def pid_of(process: ComputeProcess) -> int:
     return process.pid
 
 
+def test_a_coarse_map_comes_first_where_code_has_to_be_compiled(cache, monkeypatch):
+    monkeypatch.setattr(process_pool, "serve", failures.serve_uncompiled)
+    pool, shown, kept = ProcessPool(cache.folders), [], []
+    process = ComputeProcess(pool, kept.append, preliminary=shown.append)
+    try:
+        request = changes.moved(State.of(load_small("bottle_on_table"), ""), x=0.52).request
+        result = process.map(request, quiet)
+    finally:
+        process.close()
+        pool.close()
+    (coarse,) = shown
+    assert coarse.map.preliminary
+    assert coarse.request == request
+    assert [computed.map for computed in kept] == [result.map]
+    assert not result.map.preliminary
+    assert np.isfinite(result.map.q[result.map.feasible]).all()
+
+
 def test_what_comes_back_is_what_the_service_computes_of_the_same_scene(process, cache):
     scene = load_small("bottle_on_table")
     request = changes.moved(State.of(scene, ""), x=0.5).request

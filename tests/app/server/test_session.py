@@ -446,6 +446,18 @@ def test_the_page_says_that_it_waits_for_code_to_be_compiled(server, monkeypatch
         assert "Compiling" not in visitor.wait_for("Stopped: no map for this pose yet.")
 
 
+def test_the_page_shows_a_coarse_map_and_says_so_until_the_exact_one_is_compiled(server, monkeypatch):
+    monkeypatch.setattr(process_pool, "serve", failures.serve_coarse)
+    port = any_port()
+    with open_lobby(server.cache, "127.0.0.1", port), Wire(port) as visitor:
+        assert "preliminary" not in visitor.wait_for(ready)
+        visitor.set("x (cm)", 50.0)
+        visitor.wait_for("a coarse map is shown until the exact one comes")
+        visitor.wait_for("coarse and preliminary")
+        visitor.trigger("Put the object back")  # where its map is known
+        visitor.wait_for(lambda html: "Ready." in html and "preliminary" not in html)
+
+
 CHOICES = {
     "Rotation (°)": [-120.0, 0.0, 15.25, 90.0],
     "x (cm)": [40.0, 50.0, 55.0],

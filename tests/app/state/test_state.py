@@ -17,9 +17,10 @@ from hypothesis import strategies as st
 from app.choices.object_choice import OWN, from_library, from_mesh
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest, PlanService
-from app.html.readout import status_html
+from app.html.readout import grasp_html, status_html, title_html
 from app.panels.keyboard import next_arm
 from app.render.drawn_poses import drawn_joint_values
+from app.render.map_picture import map_picture
 from app.state import changes, job_changes, plan_changes
 from app.state.map_view_state import RollChoice
 from app.state.object_pose import ObjectPose
@@ -98,6 +99,39 @@ def test_lean_and_direction_are_those_of_the_axis(lean, towards, spin):
 def test_the_direction_of_a_small_lean_is_kept():
     pose = ObjectPose(0.0, 0.0, 0.0, lean=1e-9, towards=2.0).matrix()
     assert np.allclose(ObjectPose.of(pose).matrix(), pose, rtol=0, atol=1e-11)
+
+
+# -- coarse maps ----------------------------------------------------------------------------
+
+
+def test_a_coarse_map_is_shown_and_the_exact_one_still_awaited():
+    state, exact = State.of(load_small("bottle_on_table"), ""), opened()
+    request = state.request
+    coarse = MapResult(request, replace(exact.result.map, preliminary=True))
+    started = job_changes.started(state, 1, "the map", request)
+    shown = job_changes.preliminary_arrived(started, coarse)
+    assert shown.map.preliminary
+    assert not shown.is_current
+    assert not shown.is_fresh
+    assert shown.missing_request == request
+    assert shown.next_request is None  # it is being computed
+    assert "coarse and preliminary" in title_html(shown)
+    assert 'aria-busy="true"' in title_html(shown)
+    assert "until the exact one comes" in status_html(job_changes.compiling(shown, 1))
+    with pytest.raises(SymgraspError, match="computed map"):
+        map_picture(shown, "PNG")
+    picked = changes.choose(shown, 0.1, 0.0)
+    assert picked.missing_request == request
+    assert "waits for the map" in grasp_html(picked)
+    drawn, before = (drawn_joint_values(at) for at in (picked, state))
+    assert all(np.array_equal(drawn[robot], before[robot]) for robot in before)  # no ghost
+
+    replaced = job_changes.map_arrived(shown, 1, exact.result)
+    assert replaced.is_current
+    assert "preliminary" not in title_html(replaced)
+    assert job_changes.preliminary_arrived(replaced, coarse) is replaced
+    moved = changes.moved(started, x=0.52)
+    assert job_changes.preliminary_arrived(moved, coarse) is moved
 
 
 # -- turning: nothing is computed -----------------------------------------------------------
