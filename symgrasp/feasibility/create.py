@@ -18,7 +18,7 @@ from symgrasp.feasibility.exact import ExactEngine
 from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.pitch_maps import at_pitches
-from symgrasp.feasibility.refined import refined
+from symgrasp.feasibility.splitting import refined
 from symgrasp.feasibility.torso_maps import at_torso, merged
 from symgrasp.ik import Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold, wrap

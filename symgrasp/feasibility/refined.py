@@ -6,10 +6,10 @@ proven is not split any more; what is not at the resolution either is the error 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
-if TYPE_CHECKING:
-    from symgrasp.feasibility.map import FeasibilityMap
-
-__all__ = ["Area", "Refined", "merged_parts", "refined"]
+__all__ = ["Area", "Refined", "merged_parts", "parts_of"]
 
 
 @dataclass(frozen=True)
@@ -108,35 +105,9 @@ class Refined:
 
     def masked(self, keep: np.ndarray) -> Refined:
         """Return it with the parts of all cells outside ``keep`` (R, H, A) neither feasible nor proven."""
-        kept = _parts(keep, self.reason.shape)
+        kept = parts_of(keep, self.reason.shape)
         reason = np.where(kept | ~self.feasible, self.reason, Reason.UNREACHABLE).astype(np.uint8)
         return Refined(self.manifold, reason, self.certified & kept)
-
-
-def refined(
-    m: FeasibilityMap,
-    grids: Sequence[Manifold],
-    map_on: Callable[[Manifold, np.ndarray], FeasibilityMap],
-) -> Refined:
-    """Split the cells of a map that are not proven.
-
-    Args:
-        m: the map, with what is certified.
-        grids: the finer grids, each of which cuts the cells of the one before.
-        map_on: returns the map of some cells (R, H, A) of a grid, with what is certified.
-    """
-    assert m.certified is not None
-    manifold, reason, certified = m.manifold, m.reason, m.certified
-    for grid in grids:
-        shape = (len(reason), grid.heights, grid.angles)
-        manifold, reason, certified = grid, _parts(reason, shape), _parts(certified, shape)
-        wanted = ~certified
-        if wanted.any():
-            finer = map_on(grid, wanted)
-            assert finer.certified is not None
-            reason = np.where(wanted, finer.reason, reason)
-            certified = certified | (wanted & finer.certified)
-    return Refined(manifold, reason, certified)
 
 
 def merged_parts(parts: Sequence[Refined]) -> Refined:
@@ -147,6 +118,6 @@ def merged_parts(parts: Sequence[Refined]) -> Refined:
     return Refined(parts[0].manifold, reason, np.logical_or(whole, none))
 
 
-def _parts(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def parts_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Return values (R, H, A) of cells for the parts of a finer grid of a shape."""
     return cells.repeat(shape[1] // cells.shape[1], axis=1).repeat(shape[2] // cells.shape[2], axis=2)
