@@ -22,6 +22,8 @@ def task_times(plan: Plan, motion: Motion) -> list[tuple[float, float]]:
         if segment.task_to != segment.task_from:
             arrived = next((k for k in range(index + 1, len(names)) if names[k] == segment.task_to), index)
             times += [(0.5 * (start + end), end)] * (arrived - index)
+        elif segment.kind == "lower":
+            times[index] = (times[index][0], end)
         elif segment.kind == "open" and held and names[index : index + 2] == 2 * [segment.task_from]:
             times.append((end, end))
         held = segment.held_by

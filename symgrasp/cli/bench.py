@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from symgrasp.cli.shared import Commands, add_command, add_out, check_out, say, whole, write_out
 from symgrasp.errors import InputError
+
+if TYPE_CHECKING:
+    from symgrasp.bench import Figure
 
 __all__ = ["add_parser", "run"]
 
@@ -26,10 +30,13 @@ def add_parser(commands: Commands) -> None:
     command = add_command(commands, "bench", run, text)
     text = (
         "measure the robots that packages ship instead: their inverse kinematics, or also a map of each, "
-        "which an independent search then tries to refute; or what maps miss; or what surveys cost"
+        "which an independent search then tries to refute; what maps miss; what surveys cost; or how fast "
+        "motions are planned"
     )
-    kinds = ("ik", "robots", "guarantee", "survey")
+    kinds = ("ik", "robots", "guarantee", "survey", "motion")
     command.add_argument("what", metavar="|".join(kinds), nargs="?", choices=kinds, help=text)
+    text = "bench motion: with few runs of each"
+    command.add_argument("--quick", action="store_true", help=text)
     text = "random configurations that `bench ik` and `bench robots` look for (default: %(default)s)"
     command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
     text = "maps of `bench guarantee` with objects at random places (default: %(default)s)"
@@ -46,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         if args.compare:
             expected = "only times of maps and planners: no other kind of bench"
             raise InputError("command line", "--compare", args.what, expected)
-        measured = {"guarantee": _guarantee, "survey": _surveys}.get(args.what, _robots)
+        measured = {"guarantee": _guarantee, "survey": _surveys, "motion": _motion}.get(args.what, _robots)
         _write(args.out, measured(args))
         return 0
     from symgrasp import bench
@@ -73,13 +80,9 @@ def _surveys(args: argparse.Namespace) -> dict[str, Any]:
     from symgrasp.cli.survey import need_extra
 
     need_extra()
-    from symgrasp.bench import report, survey
+    from symgrasp.bench import survey
 
-    figures = []
-    for figure in survey.run():
-        say(figure.line())
-        figures.append(figure)
-    return report(figures)
+    return _told(survey.run())
 
 
 def _guarantee(args: argparse.Namespace) -> dict[str, Any]:
@@ -98,6 +101,24 @@ def _guarantee(args: argparse.Namespace) -> dict[str, Any]:
         f"median time × {ratios[len(ratios) // 2]:.2f}"
     )
     return with_machine("maps", rows)
+
+
+def _motion(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure how fast motions are planned."""
+    from symgrasp.bench import motion
+
+    return _told(motion.run(args.quick))
+
+
+def _told(measured: Iterable[Figure]) -> dict[str, Any]:
+    """Print figures as they are measured; return them as plain data."""
+    from symgrasp.bench import report
+
+    figures = []
+    for figure in measured:
+        say(figure.line())
+        figures.append(figure)
+    return report(figures)
 
 
 def _robots(args: argparse.Namespace) -> dict[str, Any]:

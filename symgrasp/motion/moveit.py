@@ -15,7 +15,7 @@ from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.scene.scene import Scene
 from symgrasp.world import own_pairs
 
-__all__ = ["to_planning_scene", "to_srdf"]
+__all__ = ["srdf_of", "to_planning_scene", "to_srdf"]
 
 
 def to_planning_scene(plan: Plan) -> str:
@@ -72,6 +72,11 @@ def to_srdf(plan: Plan) -> str:
     scene = Scene.from_content(plan.scene.content, "plan: scene.content")
     if len(scene.robots) > 1:
         raise PlanError("plan", "scene.content.robots", list(scene.robots), "one robot, for an SRDF")
+    return srdf_of(scene)
+
+
+def srdf_of(scene: Scene) -> str:
+    """Return an SRDF of the only robot of a scene; see `to_srdf`."""
     (robot,) = scene.robots.values()
     model = robot.model
     root = ET.Element("robot", name=model.name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.ik import Solver, redundancy_of, solver_for
-from symgrasp.motion.bodies.situation import MotionScene
+from symgrasp.motion.bodies.motion_scene import MotionScene
 from symgrasp.motion.drafting.draft import MotionDraft
 from symgrasp.motion.drafting.ways import Grip
 from symgrasp.motion.paths.search import NoMotionError

@@ -15,7 +15,7 @@ from symgrasp.scene.scene import Scene
 
 __all__ = ["Kind", "Motion", "MotionState", "Opening", "Segment"]
 
-Kind = Literal["reach", "approach", "close", "carry", "open", "retreat", "home"]
+Kind = Literal["reach", "approach", "close", "lift", "carry", "lower", "open", "retreat", "home"]
 
 Opening = tuple[float | None, float]
 """Opening (m) of a hand at the start and at the end of a segment; None where it starts as at home."""
@@ -36,7 +36,11 @@ class Segment:
         held_by: names of the arms in whose hands the object is fixed; not those that close or open them.
         task_from: the task at whose pose the object is at the start.
         task_to: the same at the end.
-        clearance: smallest distance (m) proven along it of bodies that may not touch.
+        clearance: smallest distance (m) proven along it of bodies that may not touch; while the object is
+            lifted or lowered, it may touch what it rests on.
+        room: how far (m) any point may be off the path, besides, before the object sinks into what it rests
+            on, or a robot falls.
+        tilt_room: by what angle (rad) the object may tilt further than it does along the path.
     """
 
     kind: Kind
@@ -48,6 +52,8 @@ class Segment:
     task_from: str = ""
     task_to: str = ""
     clearance: float = 0.0
+    room: float = np.inf
+    tilt_room: float = np.inf
 
     @property
     def duration(self) -> float:
@@ -113,6 +119,7 @@ class Motion:
             share: how much of the movement of the hands is done, 0 to 1.
         """
         segment, start = self.segments[index], self._start_values[index]
+        pose = self._start_poses[index]
         values = {name: robot.copy() for name, robot in start.items()}
         for name, path in segment.joints.items():
             arm = self.scene.arms[name]
@@ -121,11 +128,7 @@ class Motion:
             values[arm.robot.name][arm.indices] = path[before] + (row - before) * (path[after] - path[before])
         for name, opening in segment.gripper.items():
             self._set_hand(values, start, name, opening, share)
-        pose = self.poses[segment.task_from]
-        if segment.held_by:
-            holder = segment.held_by[0]
-            pose = self._tool(holder, values) @ inverse(self._tool(holder, start)) @ pose
-        return MotionState(values, pose, index)
+        return MotionState(values, self._moved(segment, start, values) @ pose, index)
 
     def _set_hand(
         self,
@@ -143,6 +146,13 @@ class Motion:
             k = arm.robot.model.joint_names.index(joint)
             was = start[arm.robot.name][k]
             values[arm.robot.name][k] = was + share * (value - was) if first is None else value
+
+    def _moved(self, segment: Segment, start: Mapping[str, Array], values: Mapping[str, Array]) -> Array:
+        """Return how (4, 4), in the world, a segment has moved the object since joint values ``start``."""
+        if not segment.held_by:
+            return np.eye(4)
+        holder = segment.held_by[0]
+        return self._tool(holder, values) @ inverse(self._tool(holder, start))
 
     def _tool(self, name: str, values: Mapping[str, Array]) -> Array:
         """Return ``T_world_tool`` (4, 4) of an arm."""
@@ -164,3 +174,15 @@ class Motion:
             for name, opening in segment.gripper.items():
                 self._set_hand(values, starts[-1], name, opening, 1.0)
         return tuple(starts)
+
+    @cached_property
+    def _start_poses(self) -> tuple[Array, ...]:
+        """Of each segment, the pose (4, 4) of the object where it starts."""
+        pose, found = self.poses[self.segments[0].task_from], []
+        values = self._start_values
+        for segment, start, end in zip(self.segments, values, (*values[1:], values[-1]), strict=True):
+            if not segment.held_by:  # where it was put down, exactly
+                pose = self.poses[segment.task_from]
+            found.append(pose)
+            pose = self._moved(segment, start, end) @ pose
+        return tuple(found)

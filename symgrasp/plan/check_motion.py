@@ -22,7 +22,7 @@ GRASP_TOLERANCE = 1e-5
 """By how much (m, rad) a hand may be off its grasp when it closes: solutions are refined to about 1e-8."""
 
 LIFT = 0.2
-"""Largest height (m) by which several hands lift the object in the end."""
+"""Largest distance (m) of the object from its pose in a task after it is lifted, and before it is lowered."""
 
 
 def check_motion(
@@ -70,7 +70,8 @@ class _Walk:
         self._in_hand: dict[str, Array] = {}  # arm that holds the object → T_tool_object
         self._T = plan.tasks[0].object_pose_turned.array()
         self._task = 0  # index of the task that the object is in, or was last
-        self._complete = False  # whether all arms of it held the object
+        self._raised = False  # whether the object is above its pose in the task
+        self._complete = False  # whether all arms of it held the object there
 
     def follow(self, segment: SegmentRecord, where: str) -> bool:
         """Check a segment and move to its end; return whether the next one can be checked."""
@@ -116,17 +117,18 @@ class _Walk:
             if not self._expect(known, f"{where}: {segment.task_to} does not follow {segment.task_from}"):
                 return False
             self._task, self._complete = following or 0, False
-        self._note_holders()
         goal = tasks[self._task].object_pose_turned.array()
-        if self._plan.kind == "bimanual" and segment.kind == "carry" and segment.task_to == segment.task_from:
-            goal[2, 3] += min(max(float(self._T[2, 3] - goal[2, 3]), 0.0), LIFT)
         distance, angle = (float(error) for error in pose_error(self._T, goal))
+        self._raised = distance > RIGID[0]
+        self._note_holders()
         away = f"{1e3 * distance:.3f} mm and {np.rad2deg(angle):.3f}°"
         text = f"{where}: the object ends {away} away from {segment.task_to}"
-        return self._expect(distance <= RIGID[0] and angle <= RIGID[1], text)
+        above = segment.kind in ("lift", "carry") and self._T[2, 3] > goal[2, 3]
+        return self._expect(distance <= (LIFT if above else RIGID[0]) and angle <= RIGID[1], text)
 
     def _note_holders(self) -> None:
-        self._complete |= set(self._in_hand) == {hold.arm for hold in self._plan.tasks[self._task].holds}
+        holders = {hold.arm for hold in self._plan.tasks[self._task].holds}
+        self._complete |= set(self._in_hand) == holders and not self._raised
 
     def _check_hands(self, segment: SegmentRecord, where: str) -> bool:
         """Check what hands take when they have closed, and that they open as far as grasps take."""
@@ -174,7 +176,7 @@ class _Walk:
         self._expect(done, f"{where}: not all of the plan is done")
         holders = {hold.arm for hold in task.holds}
         if self._plan.kind == "bimanual":
-            self._expect(last.kind == "carry", f"{where}: the object is not lifted")
+            self._expect(last.kind in ("lift", "carry"), f"{where}: the object is not lifted")
         elif self._world.object_rests(task.object_pose_turned.array()):
             holders = set()
         text = f"{where}: held by {sorted(self._in_hand)}, not {sorted(holders)}"

@@ -9,7 +9,8 @@ import numpy as np
 
 from symgrasp.plan.check_motion_rows import Expect
 from symgrasp.plan.motion_record import SegmentRecord
-from symgrasp.poses import Array, pose_error
+from symgrasp.poses import Array, inverse, pose_error
+from symgrasp.scene.balance import load_of_hand, support_margin
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, BulletWorld, Collision
 
@@ -25,8 +26,11 @@ each arm follows its own straight line in joint space."""
 FINEST = 5e-4
 """Shortest distance (m) between two states that are checked, where the stated clearance is shorter."""
 
-TILT_TOLERANCE = 0.5
-"""By how much (degrees) the object may tilt beyond its limit where the corners of a path are rounded."""
+TILT_TOLERANCE = 1e-3
+"""By how much (degrees) the object may tilt beyond its limit: numbers are rounded."""
+
+BALANCE_TOLERANCE = 1e-6
+"""How far (m) a centre of mass may be outside of the support: numbers are rounded."""
 
 TOUCHING, SUNK = 2e-3, 2e-3
 """How near (m) the object is to what it rests on, and by how much (m) it may sink into it when it is
@@ -121,6 +125,8 @@ def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Ex
         tilt = float(np.rad2deg(np.arccos(np.clip(poses[:, 2, 2], -1.0, 1.0)).max()))
         limit = _largest_tilt(states.scene, segment)
         expect(tilt <= limit + TILT_TOLERANCE, f"{where}: the object tilts by {tilt:.2f}°, not {limit:g}°")
+    if not _check_balance(states, fine, poses, where, expect):
+        return
     near = _NearBodies(states, world, fine, poses)
     for k, pose in enumerate(poses):
         for name, values in fine.items():
@@ -131,6 +137,31 @@ def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Ex
             expect(False, f"{text}, not {1e3 * segment.clearance:.3f} mm beyond the margin")
             return
     expect(True, where)
+
+
+def _check_balance(
+    states: SegmentStates, values: Mapping[str, Array], poses: Array, where: str, expect: Expect
+) -> bool:
+    """Check that robots that can fall stand, at joint values (m, N) with the object at poses (m, 4, 4)."""
+    scene, holders = states.scene, list(states.in_hand)
+    hands = {name: tool_pose(scene, name, values) for name in holders}
+    ok = True
+    for name, robot in scene.robots.items():
+        if robot.support is None:
+            continue
+        own = [arm for arm in holders if scene.arms[arm].robot is robot]
+        margins = []
+        for k, pose in enumerate(poses):
+            loads = [
+                load_of_hand(scene, scene.arms[arm], holders, pose, (inverse(pose) @ hands[arm][k])[2, 3])
+                for arm in own
+            ]
+            alone = len(own) == len(holders)  # then it carries the whole object, once
+            margins.append(support_margin(robot, values[name][k], loads[:1] if alone else loads))
+        k = int(np.argmin(margins))
+        text = f"{where}: state {k}: {name} falls, its centre of mass is {-1e3 * margins[k]:.3f} mm outside"
+        ok &= expect(margins[k] >= -BALANCE_TOLERANCE, text)
+    return ok
 
 
 def _largest_tilt(scene: Scene, segment: SegmentRecord) -> float:
@@ -170,7 +201,8 @@ class _NearBodies:
         self._group[BodyName(scene.file.object.name, "")] = group
         self._carried = group is not None
         self._resting: set[BodyName] = set()
-        for pose in objects[[0, -1]] if self._carried else ():
+        ends = {"lift": [0], "lower": [-1]}.get(kind, [0, -1])
+        for pose in objects[ends] if self._carried else ():
             world.set_object(pose)
             self._resting |= {c.b for c in world.object_contacts(TOUCHING)}
 

@@ -22,9 +22,9 @@ class _Part(BaseModel):
 class SegmentRecord(_Part):
     """A part of a motion in which the same arms move, at rest at both ends; straight between two rows."""
 
-    kind: Literal["reach", "approach", "close", "carry", "open", "retreat", "home"]
+    kind: Literal["reach", "approach", "close", "lift", "carry", "lower", "open", "retreat", "home"]
     task_from: str = Field(description="the task at whose pose the object is at the start")
-    task_to: str = Field(description="the same at the end; a carry to the same task lifts the object")
+    task_to: str = Field(description="the same at the end; a lift or a carry may end above that pose")
     held_by: tuple[str, ...] = Field(
         description="arms in whose hands the object is fixed, not those that let go"
     )
@@ -32,7 +32,8 @@ class SegmentRecord(_Part):
         description="arm → opening (m) at the start, null for as at home, and at the end"
     )
     clearance: Finite = Field(
-        description="smallest distance (m), beyond the margin, of bodies that move apart and may not touch"
+        description="smallest distance (m), beyond the margin, of bodies that move apart and may not touch; "
+        "in a lift or lower, the object may touch what it rests on"
     )
     times: tuple[Finite, ...] = Field(description="s from the segment's start", min_length=2)
     joints: dict[str, Rows] = Field(

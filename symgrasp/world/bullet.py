@@ -249,6 +249,17 @@ class BulletWorld:
         found += self._closed_meshes_around_object()
         return sorted(found, key=lambda c: -c.depth)
 
+    def object_normals(self, margin: float) -> dict[BodyName, Array]:
+        """Return obstacle → unit vector (3,) out of it to the object, of those within a margin (m) of it."""
+        found: dict[BodyName, Array] = {}
+        for piece in self.bodies.object:
+            for obstacle in self.bodies.obstacles:
+                points = pybullet.getClosestPoints(piece, obstacle, margin, physicsClientId=self._client)
+                for p in points or ():  # 4 is the link of the obstacle, 7 the normal on it
+                    name = self.bodies.body_name(obstacle, p[4])
+                    found[name] = found.get(name, np.zeros(3)) + np.array(p[7])
+        return {name: total / max(float(np.linalg.norm(total)), 1e-9) for name, total in found.items()}
+
     def object_in_robots(self, holders: Sequence[str]) -> list[Collision]:
         """Return the links that the object is inside of, of all robots but those named as holders."""
         return [

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from importlib import resources
 from pathlib import Path
+from xml.etree import ElementTree
 
 import jsonschema
 import pytest
@@ -70,6 +71,49 @@ def test_plan_sequential_and_bimanual(tmp_path, capsys):
         assert plan.kind == kind
         assert "holds at h =" in capsys.readouterr().out
         jsonschema.validate(json.loads(out.read_text()), plan_schema())
+
+
+def test_plan_with_motion(tmp_path, capsys):
+    """It is told part by part, it holds, a changed number is caught, and every export can be read."""
+    scene = tmp_path / "scene.yaml"
+    content = Scene.load("pick_pour_place").content
+    content["map"] = {"heights": 12, "angles": 24, "redundancy": 8}
+    scene.write_text(yaml.safe_dump(content))
+    out = tmp_path / "plan.json"
+    assert main(["plan", "sequential", str(scene), "--motion", "--out", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    parts = [line.split()[0] for line in lines if line.endswith("mm clear") and " s, " in line]
+    assert parts[:4] == ["open", "reach", "approach", "close"]
+    assert f"in {len(parts)} parts" in lines[-2]
+    assert main(["verify", str(out)]) == 0
+    plan = json.loads(out.read_text())
+    jsonschema.validate(plan, plan_schema())
+    plan["motion"]["segments"][1]["joints"]["panda"][3][2] += 0.01
+    tampered = tmp_path / "tampered.json"
+    tampered.write_text(json.dumps(plan))
+    assert main(["verify", str(tampered)]) == 1
+    assert "motion.segments[1] (reach)" in capsys.readouterr().out
+    for kind in export.FORMATS:
+        assert main(["export", kind, str(out), "--out", str(tmp_path / kind)]) == 0
+    assert json.loads((tmp_path / "motion").read_text())["panda"]["trajectory"]["points"]
+    assert ElementTree.parse(tmp_path / "srdf").getroot().tag == "robot"
+    assert (tmp_path / "motion-csv").read_text().startswith("time,")
+    assert "<html" in (tmp_path / "html").read_text()[:200]
+
+
+def test_ctrl_c_while_a_motion_is_planned_leaves_no_file(monkeypatch, tmp_path, capsys):
+    asked = []
+
+    def interrupted(motion, progress):
+        asked.append(motion)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("symgrasp.motion.choosing.timed", interrupted)
+    out = tmp_path / "plan.json"
+    assert main(["plan", "sequential", "soda_can", "--motion", "--out", str(out)]) == 130
+    assert asked
+    assert "cancelled" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):

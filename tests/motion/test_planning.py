@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from symgrasp.errors import Cancelled, NoPlanError, SceneError
+from symgrasp.motion.bodies.motion_scene import RESTING
 from symgrasp.motion.choosing import Failure, best_motion, failures_in_words
 from symgrasp.motion.planning import plan_motion
 from symgrasp.motion.segments import Motion
@@ -44,7 +45,8 @@ def check(plan: Plan, motion: Motion) -> None:
             np.testing.assert_array_equal(path[0], at[name])
             assert ((path >= arm.lower) & (path <= arm.upper)).all()
             at[name] = path[-1]
-        if segment.kind == "carry" and segment.task_from != segment.task_to:
+        lowered = k + 1 < len(motion.segments) and motion.segments[k + 1].kind == "lower"
+        if segment.kind in ("carry", "lower") and not lowered:
             count = len(next(iter(segment.joints.values())))
             end = motion.state(k, count - 1, 1.0).T_world_object
             distance, angle = pose_error(end, motion.poses[segment.task_to])
@@ -64,7 +66,8 @@ def kinds(motion: Motion) -> list[str]:
 def test_pick_pour_place():
     scene = load_small("pick_pour_place", 12, 24, 8)
     plan, motion = plan_motion(scene, plan_sequential(scene))
-    assert kinds(motion) == ["open", "reach", "approach", "close", "carry", "open", "retreat", "home"]
+    before, after = ["open", "reach", "approach", "close"], ["open", "retreat", "home"]
+    assert kinds(motion) == [*before, "lift", "carry", "lower", *after]
     carries = [(s.task_from, s.task_to) for s in motion.segments if s.kind == "carry"]
     assert carries == [("pick", "pour"), ("pour", "place")]
     check(plan, motion)
@@ -73,7 +76,7 @@ def test_pick_pour_place():
 def test_two_arms_lift_a_log():
     scene = load_small("log_two_robots", 20, 24, 6)
     plan, motion = plan_motion(scene, plan_bimanual(scene))
-    assert kinds(motion)[-1] == "carry"
+    assert kinds(motion)[-1] == "lift"
     last = motion.segments[-1]
     assert last.held_by == ("left", "right")
     check(plan, motion)
@@ -113,6 +116,21 @@ def test_a_full_glass_is_kept_upright():
     z = np.array([motion.state(k, row, row / (count - 1)).T_world_object[2, 2] for row in rows])
     assert np.rad2deg(np.arccos(z.clip(-1, 1))).max() <= 10.0
     check(plan, motion)
+    # Nor is it tilted further where the corners are rounded.
+    rounded = timed(motion)
+    moments = np.linspace(rounded.starts[k], rounded.starts[k + 1], 1000)
+    z = np.array([rounded.at(t).T_world_object[2, 2] for t in moments])
+    assert 5.0 < np.rad2deg(np.arccos(z.clip(-1, 1))).max() <= 10.0
+
+
+def test_what_the_object_rests_on_is_no_clearance():
+    """In the lift and the lower it may touch the table, and nothing else counts as if it did."""
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    _, motion = plan_motion(scene, plan_sequential(scene))
+    (lift,) = (segment for segment in motion.segments if segment.kind == "lift")
+    assert lift.room < RESTING
+    carries = [segment for segment in motion.segments if segment.kind in ("lift", "carry", "lower")]
+    assert min(segment.clearance for segment in carries) > RESTING
 
 
 def test_a_limit_of_the_tilt_that_a_task_exceeds_is_refused():

@@ -10,7 +10,29 @@ from symgrasp.collision.boxes import boxes_of
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.poses import Array
 
-__all__ = ["Linkage", "Workspace", "new_workspace"]
+__all__ = ["Balance", "Linkage", "Workspace", "new_workspace"]
+
+
+class Balance(NamedTuple):
+    """What keeps robots that can fall on their feet: R robots with E edges of the areas that these span.
+
+    Attributes:
+        weight: (J, 4) mass (kg), and mass times position (kg m) in the frame of the joint, of what each joint
+            carries and no later one does.
+        robot: (J,) which of the robots a joint belongs to, -1 for one that cannot fall.
+        sway: (J,) how far (m, or m/m) the centre of mass moves at most for each unit of a joint.
+        mass: (R,) mass (kg) of a robot with all that it carries.
+        edge: (E, 3) unit normal outwards (2,) of each edge and its offset (m), less the share of what stands:
+            inside, what moves has ``normal · Σ m p / mass <= offset``.
+        edge_robot: (E,) the robot that stands on it.
+    """
+
+    weight: Array
+    robot: np.ndarray
+    sway: Array
+    mass: Array
+    edge: Array
+    edge_robot: np.ndarray
 
 
 class Linkage(NamedTuple):
@@ -36,9 +58,11 @@ class Linkage(NamedTuple):
         other: (Q,) index of the other piece among the moving ones, -1 if it stands.
         common: (Q,) the last joint that carries both, -1 if none does.
         distance: (Q,) distance (m) to keep.
+        rests: (Q,) whether one of them rests on the other when it is lifted: their distance is no clearance.
         tilted: the joint that carries the axis whose tilt is limited, -1 for none.
         upright: (3,) that axis in the frame of the joint.
         tilt: its largest angle (rad) from the vertical.
+        balance: see `Balance`.
     """
 
     origin: Array
@@ -56,9 +80,11 @@ class Linkage(NamedTuple):
     other: np.ndarray
     common: np.ndarray
     distance: Array
+    rests: np.ndarray
     tilted: int
     upright: Array
     tilt: float
+    balance: Balance
 
 
 class Workspace(NamedTuple):
@@ -69,9 +95,12 @@ class Workspace(NamedTuple):
         box: (P, 6) axis-aligned boxes around them.
         frames: (J, 12) present joint frames in the world.
         simplex: (4, 3) for `distance_bounds`.
-        q: (4, J) joint values.
+        q: (5, J) joint values.
         speed: (M, 2) speed and acceleration (m per unit of the path's parameter) of the points of each piece.
-        hit: (2,) the pair of pieces, among all, at which the last path was not found free; -1 for the tilt.
+        load: (J, 5) mass (kg) and mass times position (kg m) in the world of all that a joint carries, and
+            how far (rad) all joints before it turn together.
+        hit: (2,) the pair of pieces, among all, at which the last path was not found free; `TILTED` or
+            `FALLEN` twice where it was none.
     """
 
     pose: Array
@@ -80,6 +109,7 @@ class Workspace(NamedTuple):
     simplex: Array
     q: Array
     speed: Array
+    load: Array
     hit: np.ndarray
 
 
@@ -91,7 +121,8 @@ def new_workspace(linkage: Linkage, pieces: PackedPieces, pose: Array) -> Worksp
         box=boxes_of(pieces.size, pose),
         frames=np.empty((joints, 12)),
         simplex=np.empty((4, 3)),
-        q=np.empty((4, joints)),
+        q=np.empty((5, joints)),
         speed=np.empty((len(linkage.piece), 2)),
+        load=np.empty((joints, 5)),
         hit=np.full(2, -1, dtype=np.int64),
     )

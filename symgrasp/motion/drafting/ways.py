@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symgrasp.ik import Solver
+from symgrasp.motion.bodies.motion_scene import Rest
 from symgrasp.motion.paths.lines import configurations
 from symgrasp.object.profile import Profile
 from symgrasp.plan.plan import Hold
@@ -25,7 +26,7 @@ APART = 0.01
 """Distance (m) of the finger tips from the object where the straight approach begins."""
 
 LIFT = 0.02
-"""Height (m) by which the object is lifted straight off what it rests on, and from which it is put down."""
+"""Distance (m) by which the object is moved straight off what it rests on, and from which it is put down."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +83,9 @@ def retreating(grip: Grip, T_world_object: Array, length: float, profile: Profil
     return straight(tool, tool @ translation([0, 0, -length]))
 
 
-def lifted(T_world_object: Array, height: float) -> Array:
-    """Return a pose (4, 4) of the object at a height (m) above another one."""
-    return translation([0, 0, height]) @ T_world_object
+def lifted(T_world_object: Array, rest: Rest, distance: float = LIFT) -> Array:
+    """Return the pose (4, 4) of the object at a distance (m) from where it rests; there if on nothing."""
+    return translation(distance * rest.normal) @ T_world_object if rest.pieces else T_world_object
 
 
 def straight(start: Array, end: Array) -> list[Array]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,19 +19,34 @@ from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.search import NoMotionError, blockers, prove
 from symgrasp.poses import Array, inverse, pose_error
 
-__all__ = ["CLEAR", "LineTree", "configurations", "follow"]
+__all__ = ["CLEAR", "Leg", "LineTree", "configurations", "follow"]
 
 LARGEST_TURN = 0.25
 """Largest change of a joint (rad or m) between two samples of a path."""
 
 DEVIATION = 1e-3
-"""Largest deviation (m, and rad × 0.1 m) of the tool from the path in the middle of two samples."""
+"""Largest deviation (m) from the path in the middle of two samples, of the points that `follow` looks at."""
+
+NEAR_TOOL = 0.1
+"""Distance (m) of these points from the tool, unless told otherwise."""
 
 KEPT = 6
 """Edges into each configuration that are tried, those with the smallest turns first."""
 
 CLEAR = 0.02
 """Clearance (m) above which paths are equally good."""
+
+
+class Leg(NamedTuple):
+    """A part of a path in which the same things may be touched.
+
+    Attributes:
+        situation: what moves and stands; only the arm that follows the path moves.
+        poses: ``T_world_tool`` (4, 4) at each sample; the first one is the last one of the leg before.
+    """
+
+    situation: Situation
+    poses: Sequence[Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,48 +84,51 @@ def configurations(solver: Solver, T_world_tool: Array) -> Array:
 
 
 def follow(
-    situation: Situation,
+    legs: Sequence[Leg],
     solver: Solver,
-    poses: Sequence[Array],
     start: Array | None = None,
     end: Array | None = None,
+    deviation: float = DEVIATION,
+    distance: float = NEAR_TOOL,
 ) -> LineTree:
-    """Follow a path with the only arm that moves.
+    """Follow a path with an arm.
 
     Args:
-        situation: what moves and stands.
+        legs: the parts of the path, one after the other.
         solver: the inverse kinematics of the arm.
-        poses: ``T_world_tool`` (4, 4) at each sample.
         start: (m, n) configurations at the first sample to start from; all that are free if None.
         end: (m, n) configurations at the last sample to arrive at; all of them if None.
+        deviation: how far (m) points may be off the path between two samples.
+        distance: how far (m) they are from the tool.
 
     Raises:
         NoMotionError: the path cannot be followed to its end; says where and why it ends.
     """
-    layer = configurations(solver, poses[0]) if start is None else start
-    reached, hits = prove(situation, layer, layer, CLEAR)
-    if not (reached >= 0).any():
-        raise NoMotionError(f"its start is not free: {blockers(situation, hits)}")
-    layer, reached = layer[reached >= 0], reached[reached >= 0]
+    steps = [(leg.situation, a, b) for leg in legs for a, b in pairwise(leg.poses)]
+    situation, first = legs[0].situation, legs[0].poses[0]
+    layer = configurations(solver, first) if start is None else start
+    proof = prove(situation, layer, layer, CLEAR)
+    if not proof.free.any():
+        raise NoMotionError(f"its start is not free: {blockers(situation, proof.hits)}")
+    layer, reached = layer[proof.free], proof.clearance[proof.free]
     layers, befores = [layer], []
-    for k, pose in enumerate(poses[1:], start=1):
-        last = k == len(poses) - 1
+    for k, (situation, before, pose) in enumerate(steps, start=1):
+        last = k == len(steps)
         following = end if last and end is not None else configurations(solver, pose)
         new = _following_turns(layer, following, situation.linkage.limits)
         a, b = _edges(layer, new)
-        middle = _middle(poses[k - 1], pose)
-        straight = _deviation(solver, 0.5 * (layer[a] + new[a, b]), middle) <= DEVIATION
+        middle = _middle(before, pose)
+        straight = _deviation(solver, 0.5 * (layer[a] + new[a, b]), middle, distance) <= deviation
         a, b = a[straight], b[straight]
-        found, hits = prove(situation, layer[a], new[a, b], CLEAR)
-        edge = np.minimum(found, reached[a])
-        ok = found >= 0
+        proof = prove(situation, layer[a], new[a, b], CLEAR)
+        edge, ok = np.minimum(proof.clearance, reached[a]), proof.free
         if not ok.any():
-            why = blockers(situation, hits) if len(a) else "no joint values go on from there"
-            raise NoMotionError(f"it ends at {100 * k / (len(poses) - 1):.0f} % of its length: {why}")
+            why = blockers(situation, proof.hits) if len(a) else "no joint values go on from there"
+            raise NoMotionError(f"it ends at {100 * k / len(steps):.0f} % of its length: {why}")
         a, b, edge = a[ok], b[ok], edge[ok]
         order = np.lexsort((np.abs(layer[a] - new[a, b]).max(axis=1), -edge))
-        _, first = np.unique(b[order], return_index=True)
-        chosen = order[first]
+        _, best = np.unique(b[order], return_index=True)
+        chosen = order[best]
         befores.append(a[chosen])
         layer, reached = new[a[chosen], b[chosen]], edge[chosen]
         layers.append(layer)
@@ -142,9 +162,9 @@ def _middle(a: Array, b: Array) -> Array:
     return middle
 
 
-def _deviation(solver: Solver, q: Array, T_world_tool: Array) -> Array:
-    """Return how far (m, and rad × 0.1 m) the tool is from a pose (4, 4) at configurations (m, n)."""
+def _deviation(solver: Solver, q: Array, T_world_tool: Array, distance: float) -> Array:
+    """Return how far (m) points at a distance (m) from the tool are off, if it should be at a pose (4, 4)."""
     if not len(q):
         return np.zeros(0)
     position, angle = pose_error(solver.arm.world_tool_pose(q), T_world_tool)
-    return np.maximum(position, 0.1 * angle)
+    return position + distance * angle

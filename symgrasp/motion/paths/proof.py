@@ -8,7 +8,8 @@ whole: the proof goes on at its end. Nothing is sampled.
 For joint values ``q + t·d``, a point of a piece has the speed ``Σ dⱼ ∂p/∂qⱼ`` at ``t = 0``, and since
 ``∂²p/∂qᵢ∂qⱼ`` is no longer than ``∂p/∂qⱼ`` if i comes before j in the chain, its acceleration is at most
 ``Σᵢⱼ |dᵢ dⱼ| L`` with the lever L of the later one of both. Of a pair only the joints count that carry one of
-its pieces and not the other: the others change no distance.
+its pieces and not the other: the others change no distance. The centre of mass of a robot moves in the same
+way as the points of which it is the mean, and must stay within the area that the robot stands on.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.checks import FREE_BAND
 from symgrasp.engine.kinematics import compose, rotate
 
-__all__ = ["BLOCKED", "CLOSEST", "clearances", "line_clearance", "place", "tilt_excess"]
+__all__ = ["BLOCKED", "CLOSEST", "FALLEN", "TILTED", "clearances", "line_clearance", "place", "tilt_excess"]
 
 CLOSEST = 1e-4
 """Where pieces are closer than allowed and this (m), a line is not proven free: steps become too short."""
@@ -39,10 +40,13 @@ CLOSEST_ANGLE = 1e-4
 BLOCKED = -1.0
 """Stands for the clearance of a line that is not proven free."""
 
+TILTED, FALLEN = -1, -2
+"""Stand for a pair of pieces where the object is tilted too far, or a robot would fall."""
+
 
 @njit(**ENTRY)
 def clearances(linkage, pieces, tree, work, start, end, most, found, hits):
-    """Write the clearance (m) that each of E lines is proven to have, or `BLOCKED`.
+    """Write the clearance and the room (m) that each of E lines is proven to have, or `BLOCKED` twice.
 
     Args:
         linkage: see `Linkage`.
@@ -52,25 +56,28 @@ def clearances(linkage, pieces, tree, work, start, end, most, found, hits):
         start: (E, J) joint values.
         end: (E, J) joint values.
         most: clearance (m) above which it need not be known.
-        found: (E,) receives the clearances.
+        found: (E, 2) receives the clearances; and how far any point may be off the line before the object
+            sinks into what it rests on, or a robot falls.
         hits: (E, 2) receives the pair of pieces that each blocked line meets first.
     """
     for e in range(len(start)):
-        found[e] = line_clearance(linkage, pieces, tree, work, start[e], end[e], most)
+        found[e, 0], found[e, 1] = line_clearance(linkage, pieces, tree, work, start[e], end[e], most)
         hits[e, 0], hits[e, 1] = work.hit[0], work.hit[1]
 
 
 @njit(**FAST)
 def line_clearance(linkage, pieces, tree, work, start, end, most):
-    """Return the clearance (m), at most ``most``, that a line (J,) to (J,) is proven to have, or `BLOCKED`.
+    """Return clearance and room (m), at most ``most``, that a line (J,) to (J,) is proven to have.
 
-    Where it is blocked, ``work.hit`` names the pair of pieces.
+    Both are `BLOCKED` where it is not proven free; see `clearances`.
+
+    Then ``work.hit`` names the pair of pieces.
     """
     q, d = work.q[0], work.q[1]
     count = len(q)
     for j in range(count):
         d[j] = end[j] - start[j]
-    t, least = 0.0, most
+    t, least, room = 0.0, most, most
     while True:
         for j in range(count):
             q[j] = start[j] + t * d[j] if t < 1.0 else end[j]
@@ -79,16 +86,18 @@ def line_clearance(linkage, pieces, tree, work, start, end, most):
         if linkage.tilted >= 0:
             step = _tilt_step(linkage, work, d, step)
             if step < 0.0:
-                return BLOCKED
+                return BLOCKED, BLOCKED
         for k in range(len(linkage.piece)):
             v, a = _rates(linkage, work, d, k, -1)
             work.speed[k, 0], work.speed[k, 1] = v, a
             step = min(step, _time(FAR, v, a))
-        step, least = _free_step(linkage, pieces, tree, work, d, step, least)
+        step, least, room = _free_step(linkage, pieces, tree, work, d, step, least, room)
+        if step >= 0.0 and len(linkage.balance.edge):
+            step, room = _standing_step(linkage, work, d, step, room)
         if step < 0.0:
-            return BLOCKED
+            return BLOCKED, BLOCKED
         if t >= 1.0:
-            return max(least, 0.0)
+            return max(least, 0.0), max(room, 0.0)
         t += step
         if t > 1.0 - 1e-9:
             t = 1.0
@@ -122,15 +131,16 @@ def place(linkage, size, work, q):
 
 
 @njit(**FAST)
-def _free_step(linkage, pieces, tree, work, d, step, least):
-    """Return a step of the line that is free, and the clearance (m) that it has at least.
+def _free_step(linkage, pieces, tree, work, d, step, least, room):
+    """Return a step of the line that is free, and the clearance and room (m) that it has at least.
 
     Args:
         step: the longest step to take.
         least: the clearance (m) so far.
+        room: the room (m) so far.
 
     Returns:
-        The step, -1 where a pair is too close, and the clearance.
+        The step, -1 where a pair is too close, the clearance and the room.
     """
     box = work.box
     for k in range(len(linkage.piece)):
@@ -148,7 +158,7 @@ def _free_step(linkage, pieces, tree, work, d, step, least):
             if tree.piece[node] >= 0:
                 step, moved, least = _pair_step(pieces, work, p, tree.piece[node], keep, v, a, step, least)
                 if step < 0.0:
-                    return step, least
+                    return step, least, room
             node += 1
     for i in range(len(linkage.pair)):
         k, p, other = linkage.pair[i, 0], linkage.pair[i, 1], linkage.other[i]
@@ -158,16 +168,20 @@ def _free_step(linkage, pieces, tree, work, d, step, least):
         if other >= 0:
             v, a = v + work.speed[other, 0], a + work.speed[other, 1]
         moved = v * step + 0.5 * a * step * step
-        if boxes_apart(box, own, p, box, keep + max(moved / SHARE, moved + least, CLOSEST)):
+        known = room if linkage.rests[i] else least
+        if boxes_apart(box, own, p, box, keep + max(moved / SHARE, moved + known, CLOSEST)):
             continue
         if other >= 0 and linkage.common[i] >= 0:
             v, a = _rates(linkage, work, d, k, linkage.common[i])
             w, b = _rates(linkage, work, d, other, linkage.common[i])
             v, a = v + w, a + b
-        step, moved, least = _pair_step(pieces, work, own, p, keep, v, a, step, least)
+        if linkage.rests[i]:
+            step, moved, room = _pair_step(pieces, work, own, p, keep, v, a, step, room)
+        else:
+            step, moved, least = _pair_step(pieces, work, own, p, keep, v, a, step, least)
         if step < 0.0:
-            return step, least
-    return step, least
+            return step, least, room
+    return step, least, room
 
 
 @njit(**FAST)
@@ -245,7 +259,7 @@ def _tilt_step(linkage, work, d, step):
     """Return a step in which the object is not tilted too far, -1 where it is so already."""
     left = -tilt_excess(linkage, work.frames)
     if left < CLOSEST_ANGLE:
-        work.hit[0] = work.hit[1] = -1
+        work.hit[0] = work.hit[1] = TILTED
         return -1.0
     rate = 0.0
     j = linkage.tilted
@@ -254,3 +268,49 @@ def _tilt_step(linkage, work, d, step):
             rate += abs(d[j])
         j = linkage.parent[j]
     return min(step, SHARE * left / rate) if rate > 0.0 else step
+
+
+@njit(**FAST)
+def _standing_step(linkage, work, d, step, room):
+    """Return a step in which no robot falls, -1 where one would at once, and the room (m) that is left."""
+    b, load = linkage.balance, work.load
+    for j in range(len(d)):
+        f, w = work.frames[j], b.weight[j]
+        load[j, 0] = w[0]
+        for i in range(3):
+            load[j, 1 + i] = f[3 * i] * w[1] + f[3 * i + 1] * w[2] + f[3 * i + 2] * w[3] + f[9 + i] * w[0]
+        parent = linkage.parent[j]
+        load[j, 4] = 0.0
+        if parent >= 0:
+            load[j, 4] = load[parent, 4] + (0.0 if linkage.slides[parent] else abs(d[parent]))
+    for j in range(len(d) - 1, -1, -1):  # children come later
+        if linkage.parent[j] >= 0:
+            for i in range(4):
+                load[linkage.parent[j], i] += load[j, i]
+    for e in range(len(b.edge)):
+        r = b.edge_robot[e]
+        x, y, left = b.edge[e, 0], b.edge[e, 1], b.edge[e, 2]
+        v = a = 0.0
+        for j in range(len(d)):
+            if b.robot[j] != r:
+                continue
+            if linkage.parent[j] < 0:
+                left -= (x * load[j, 1] + y * load[j, 2]) / b.mass[r]
+            f, axis, rate, m = work.frames[j], linkage.axis[j], d[j], load[j, 0]
+            a0 = f[0] * axis[0] + f[1] * axis[1] + f[2] * axis[2]
+            a1 = f[3] * axis[0] + f[4] * axis[1] + f[5] * axis[2]
+            a2 = f[6] * axis[0] + f[7] * axis[1] + f[8] * axis[2]
+            if linkage.slides[j]:
+                v += rate * m * (x * a0 + y * a1) / b.mass[r]
+                a += 2.0 * abs(rate) * load[j, 4] * b.sway[j]
+            else:
+                s0, s1, s2 = load[j, 1] - m * f[9], load[j, 2] - m * f[10], load[j, 3] - m * f[11]
+                v += rate * (x * (a1 * s2 - a2 * s1) + y * (a2 * s0 - a0 * s2)) / b.mass[r]
+                a += abs(rate) * (abs(rate) + 2.0 * load[j, 4]) * b.sway[j]
+        if left < CLOSEST:
+            work.hit[0] = work.hit[1] = FALLEN
+            return -1.0, room
+        v = max(v, 0.0)
+        step = min(step, _time(SHARE * left, v, a))
+        room = min(room, left - v * step - 0.5 * a * step * step)
+    return step, room

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import NamedTuple
 
 import numpy as np
 
 from symgrasp.errors import NoPlanError
 from symgrasp.motion.bodies.situation import Situation
-from symgrasp.motion.paths.proof import clearances
+from symgrasp.motion.paths.proof import FALLEN, TILTED, clearances
 from symgrasp.motion.paths.trees import Trees, grow, new_trees, shorten
 from symgrasp.poses import Array
 from symgrasp.progress import Progress
 
-__all__ = ["STATED", "NoMotionError", "blockers", "connect", "prove"]
+__all__ = ["STATED", "NoMotionError", "Proof", "blockers", "connect", "prove"]
 
 STATED = 0.05
 """Clearances of motions are proven up to this distance (m)."""
@@ -33,23 +34,40 @@ class NoMotionError(NoPlanError):
     """A part of a motion was not found; the text says which, and what is in its way."""
 
 
-def prove(situation: Situation, start: Array, end: Array, most: float = 0.0) -> tuple[Array, np.ndarray]:
-    """Return the clearances (E,) (m) that lines are proven to have, up to ``most``, and negative for others.
+class Proof(NamedTuple):
+    """What is proven of E lines.
+
+    Attributes:
+        clearance: (E,) distance (m) that bodies keep at least; negative for lines without a proof.
+        room: (E,) how far (m) any point may be off the line, besides, before the object sinks into what it
+            rests on, or a robot falls.
+        hits: (E, 2) the pair of pieces that each line without a proof meets, see `blockers`.
+    """
+
+    clearance: Array
+    room: Array
+    hits: np.ndarray
+
+    @property
+    def free(self) -> np.ndarray:
+        """Whether each line (E,) is proven free."""
+        return self.clearance >= 0
+
+
+def prove(situation: Situation, start: Array, end: Array, most: float = 0.0) -> Proof:
+    """Prove that lines are free.
 
     Args:
         situation: what moves and stands.
         start: (E, J) joint values.
         end: (E, J) joint values.
         most: clearance (m) above which it need not be known.
-
-    Returns:
-        The clearances, and the pair (E, 2) of pieces that each line without a proof meets, see `blockers`.
     """
     s = situation
-    found, hits = np.empty(len(start)), np.full((len(start), 2), -1, dtype=np.int64)
+    found, hits = np.empty((len(start), 2)), np.full((len(start), 2), -1, dtype=np.int64)
     start, end = np.ascontiguousarray(start, dtype=float), np.ascontiguousarray(end, dtype=float)
     clearances(s.linkage, s.pieces, s.tree, s.work, start, end, float(most), found, hits)
-    return found, hits
+    return Proof(found[:, 0], found[:, 1], hits)
 
 
 def blockers(situation: Situation, hits: np.ndarray) -> str:
@@ -57,13 +75,13 @@ def blockers(situation: Situation, hits: np.ndarray) -> str:
 
     Args:
         situation: what moves and stands.
-        hits: (., 2) pairs of pieces, -1 for the limit of the tilt.
+        hits: (., 2) pairs of pieces, or `TILTED` or `FALLEN` twice.
     """
     if not len(hits):
         return "no configuration reaches it"
     ((a, b), _) = Counter(map(tuple, np.asarray(hits).tolist())).most_common(1)[0]
     if a < 0:
-        return "the object would be tilted too far"
+        return {TILTED: "the object would be tilted too far", FALLEN: "the robot would fall"}[a]
     return f"{situation.names[a]} meets {situation.names[b]}"
 
 
@@ -87,13 +105,13 @@ def connect(
     """
     s = situation
     for roots, what in ((starts, "start"), (goals, "end")):
-        found, hits = prove(s, roots, roots)
-        if not (found >= 0).any():
-            raise NoMotionError(f"its {what} is in collision: {blockers(s, hits)}")
-    met, taken = np.zeros(len(s.names) + 1, dtype=np.int64), 0
+        proof = prove(s, roots, roots)
+        if not proof.free.any():
+            raise NoMotionError(f"its {what} is in collision: {blockers(s, proof.hits)}")
+    met, taken = np.zeros(len(s.names), dtype=np.int64), 0
     for room, samples in ROOM:
         wide = s.with_room(room)
-        first, second = (roots[prove(wide, roots, roots)[0] >= 0] for roots in (starts, goals))
+        first, second = (roots[prove(wide, roots, roots).free] for roots in (starts, goals))
         if not len(first) or not len(second):
             continue
         trees = new_trees(first, second, len(s.names), seed)
@@ -103,8 +121,8 @@ def connect(
                 progress(done / samples)
             if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, done, BATCH):
                 return _shortened(wide, _joined(trees), trees.random)
-        met, taken = trees.met, samples
-    most = met[:-1].argsort()[::-1][:2]
+        met, taken = trees.met[: len(s.names)], samples
+    most = met.argsort()[::-1][:2]
     names = " and ".join(dict.fromkeys(str(s.names[k]) for k in most if met[k]))
     text = f"no way was found in {taken:,} samples"
     raise NoMotionError(f"{text}; mostly in the way: {names}" if names else text)

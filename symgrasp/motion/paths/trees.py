@@ -28,6 +28,9 @@ LARGEST_TREE = 20_000
 PROJECTIONS = 20
 """Most steps of Newton's method in a projection."""
 
+IDLE = 30
+"""Lines in a row that shorten a path no more, after which no others are tried."""
+
 INSIDE = 0.05
 """How far (rad) inside of the largest tilt a projection aims."""
 
@@ -41,7 +44,8 @@ class Trees(NamedTuple):
         filled: (2,) number of nodes.
         meet: (2,) the nodes of both at which they meet.
         random: (1,) state of the random numbers.
-        met: (P + 1,) how often each piece was met by lines that were not free; the last one is the tilt.
+        met: (P + 2,) how often each piece was met by lines that were not free; the last two are `FALLEN` and
+            `TILTED`.
     """
 
     node: Array
@@ -62,7 +66,7 @@ def new_trees(starts: Array, goals: Array, pieces: int, seed: int) -> Trees:
         filled=np.array([len(starts), len(goals)], dtype=np.int64),
         meet=np.full(2, -1, dtype=np.int64),
         random=np.array([seed * 2654435761 + 88172645463325252], dtype=np.uint64),
-        met=np.zeros(pieces + 1, dtype=np.int64),
+        met=np.zeros(pieces + 2, dtype=np.int64),
     )
 
 
@@ -153,8 +157,8 @@ def _extend(linkage, pieces, tree, work, trees, side, target, low, high):
         if left >= least:  # the projection led back
             return -1, False
     # Most lines that are not free end inside of something, and a look there costs little.
-    if line_clearance(linkage, pieces, tree, work, node[new], node[new], 0.0) < 0.0 or (
-        line_clearance(linkage, pieces, tree, work, node[nearest], node[new], 0.0) < 0.0
+    if line_clearance(linkage, pieces, tree, work, node[new], node[new], 0.0)[0] < 0.0 or (
+        line_clearance(linkage, pieces, tree, work, node[nearest], node[new], 0.0)[0] < 0.0
     ):
         trees.met[work.hit[0]] += 1
         trees.met[work.hit[1]] += 1
@@ -219,10 +223,12 @@ def shorten(linkage, pieces, tree, work, path, count, random, tries):
         random: (1,) state of the random numbers.
         tries: how many lines to try.
     """
-    a, b = work.q[2], work.q[3]
+    a, b, middle = work.q[2], work.q[3], work.q[4]
+    idle = 0
     for _ in range(tries):
-        if count < 3:
+        if count < 3 or idle == IDLE:
             break
+        idle += 1
         total = 0.0
         for i in range(count - 1):
             total += _length(path[i], path[i + 1])
@@ -233,12 +239,18 @@ def shorten(linkage, pieces, tree, work, path, count, random, tries):
         k = _at(path, count, t, b)
         if k <= i or _length(a, b) > 0.999 * (t - s):
             continue
-        if line_clearance(linkage, pieces, tree, work, a, b, 0.0) < 0.0:
+        for j in range(len(middle)):
+            middle[j] = 0.5 * (a[j] + b[j])
+        # Lines that are not free mostly are not in their middle, and a look there costs little.
+        if line_clearance(linkage, pieces, tree, work, middle, middle, 0.0)[0] < 0.0 or (
+            line_clearance(linkage, pieces, tree, work, a, b, 0.0)[0] < 0.0
+        ):
             continue
+        idle = 0
         count = _replace(path, count, i, k, a, b)
     i = 1
     while i < count - 1:  # points that are not needed
-        if line_clearance(linkage, pieces, tree, work, path[i - 1], path[i + 1], 0.0) < 0.0:
+        if line_clearance(linkage, pieces, tree, work, path[i - 1], path[i + 1], 0.0)[0] < 0.0:
             i += 1
         else:
             for m in range(i, count - 1):

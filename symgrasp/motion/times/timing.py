@@ -1,8 +1,8 @@
 """When a motion is where: as fast as limits of speed and acceleration allow, by TOPP-RA.
 
 Every segment starts and ends at rest. In between the corners of its path are rounded, by at most half of the
-clearance that was proven along it, and its clearance is lowered by as much as that and the lines between rows
-may take.
+clearance that was proven along it, and of the room that the object and the balance of the robots leave it;
+its clearance is lowered by as much as that and the lines between rows may take.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ GRIP_TIME = 0.5
 """Least time (s) that a hand takes to open or close, as it also has to build up or lose its grip."""
 
 ROUNDED_SHARE, CHORD_SHARE = 0.5, 0.2
-"""Shares of the clearance of a segment that rounding may take, and straight lines between rows besides."""
+"""Shares of how far a path may be off that rounding may take, and straight lines between rows besides."""
 
 
 def timed(motion: Motion, progress: Progress | None = None) -> Motion:
@@ -64,22 +64,18 @@ def _timed(motion: Motion, index: int, segment: Segment) -> Segment:
     scene = motion.scene
     columns = _columns(scene, segment)
     rows = np.column_stack([segment.joints[arm][:, j] for arm, j, *_ in columns])
+    off = min(segment.clearance, segment.room)
     weight = _weights(motion, index, columns)
+    if segment.tilt_room < np.inf:  # an angle counts as the distance that is the same share of what is left
+        weight = np.maximum(weight, _turning(scene, segment, columns) * off / segment.tilt_room)
     speed = np.array([limit for _, _, limit, _ in columns])
     acceleration = np.array([limit for *_, limit in columns])
-    tolerance = ROUNDED_SHARE * max(segment.clearance, 0.0)
+    t, joined, deviation = _times(rows, weight, speed, acceleration, off)
+    if deviation > off:  # too little is left for lines between rows: a stop at every corner
+        t, joined, deviation = _times(rows, weight, speed, acceleration, 0.0)
     least = _hand_time(scene, segment)
-    deviation = 0.0
-    times, values = [np.zeros(1)], [rows[:1]]
-    for piece in pieces(rows, weight, tolerance):
-        path = RoundedPath(piece, weight, tolerance)
-        t, s = _parametrized(path, speed, acceleration, CHORD_SHARE * max(segment.clearance, 0.0))
-        deviation = max(deviation, path.deviation + path.chord_deviation(s))
-        times.append(times[-1][-1] + t[1:])
-        values.append(path(s[1:]))
-    if len(times) == 1:  # only hands move
-        times, values = [np.array([0.0, max(least, STEP)])], [rows[[0, -1]]]
-    joined, t = np.concatenate(values), np.concatenate(times)
+    if len(t) == 1:  # only hands move
+        t, joined = np.array([0.0, max(least, STEP)]), rows[[0, -1]]
     t *= max(1.0, least / t[-1])
     at = {(arm, j): k for k, (arm, j, *_) in enumerate(columns)}
     joints = {}
@@ -87,6 +83,24 @@ def _timed(motion: Motion, index: int, segment: Segment) -> Segment:
         arm = scene.arms[name]
         joints[name] = joined[:, [at[_owner(scene, at, arm, j)] for j in range(given.shape[1])]]
     return replace(segment, joints=joints, times=t, clearance=segment.clearance - deviation)
+
+
+def _times(
+    rows: Array, weight: Array, speed: Array, acceleration: Array, off: float
+) -> tuple[Array, Array, float]:
+    """Return times (m,), the rows (m, n) then, and how far (m) any point is off a polyline (., n) at most.
+
+    That is at most ``off`` (m), unless even many rows between two stops are too few.
+    """
+    deviation = 0.0
+    times, values = [np.zeros(1)], [rows[:1]]
+    for piece in pieces(rows, weight, ROUNDED_SHARE * off):
+        path = RoundedPath(piece, weight, ROUNDED_SHARE * off)
+        t, s = _parametrized(path, speed, acceleration, CHORD_SHARE * off)
+        deviation = max(deviation, path.deviation + path.chord_deviation(s))
+        times.append(times[-1][-1] + t[1:])
+        values.append(path(s[1:]))
+    return np.concatenate(times), np.concatenate(values), deviation
 
 
 Column = tuple[str, int, float, float]
@@ -133,6 +147,15 @@ def _weights(motion: Motion, index: int, columns: list[Column]) -> Array:
     robots = {scene.arms[name].robot.name for name, *_ in columns}
     reach = {name: joint_reach(scene.robots[name].model, held.get(name)) for name in robots}
     return np.array([reach[scene.arms[arm].robot.name][scene.arms[arm].indices[j]] for arm, j, *_ in columns])
+
+
+def _turning(scene: Scene, segment: Segment, columns: list[Column]) -> Array:
+    """Return how far (rad) the object turns at most for each unit of the joints that move in a segment."""
+    holder = scene.arms[segment.held_by[0]]
+    chain = holder.robot.model.chain(holder.tool)
+    turning = {joint.name for joint in chain if joint.kind != "prismatic"}
+    joints = [(scene.arms[name], scene.arms[name].joint_names[j]) for name, j, *_ in columns]
+    return np.array([arm.robot is holder.robot and joint in turning for arm, joint in joints], dtype=float)
 
 
 def _hand_time(scene: Scene, segment: Segment) -> float:

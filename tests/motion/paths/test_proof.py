@@ -12,7 +12,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from symgrasp.errors import SymgraspError
-from symgrasp.motion.bodies.situation import MotionScene, Situation
+from symgrasp.motion.bodies.motion_scene import MotionScene
+from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.proof import CLOSEST
 from symgrasp.motion.paths.search import NoMotionError, connect, prove
 from symgrasp.robot.robot import Arm
@@ -47,7 +48,7 @@ def random_lines(situation: Situation, arm, rng: np.random.Generator, count: int
     near = arm.robot.home[arm.indices] + rng.normal(0, 0.6, (count, len(arm.indices)))
     start = near.clip(low, high)
     end = (start + rng.normal(0, 0.25, start.shape)).clip(low, high)
-    return start, end, *prove(situation, start, end, 0.05)
+    return start, end, prove(situation, start, end, 0.05).clearance
 
 
 @given(seed=st.integers(0, 10_000), torso=st.booleans())
@@ -62,7 +63,7 @@ def test_no_false_free(seed, torso):
         bodies = MotionScene(scene, world)
         arm = scene.arm()
         situation = bodies.situation(bodies.home(), [arm])
-        start, end, clearance, _ = random_lines(situation, arm, rng, 200)
+        start, end, clearance = random_lines(situation, arm, rng, 200)
         free = np.flatnonzero(clearance >= 0)
         for k in free[np.argsort(clearance[free])][:3]:  # the closest ones
             for q in points_between(start[k], end[k]):
@@ -78,7 +79,7 @@ def lines_of_the_panda(
     with open_world(scene) as world:
         bodies, arm = MotionScene(scene, world), scene.arm()
         situation = bodies.situation(bodies.home(), [arm])
-        start, end, clearance, _ = random_lines(situation, arm, np.random.default_rng(seed), count)
+        start, end, clearance = random_lines(situation, arm, np.random.default_rng(seed), count)
         yield world, arm, start, end, clearance
 
 
@@ -137,7 +138,7 @@ def test_free_motion_is_found_and_tilts_no_further_than_it_may(seed):
         situation = bodies.situation(state.with_object(T), [arm], held_by=[arm], tilt=largest)
         q = rng.uniform(arm.lower, arm.upper, (4000, 7))
         q = q[[_tilt(arm, state, T, x) < largest - 1e-2 for x in q]]
-        free = q[prove(situation, q, q)[0] >= 0]
+        free = q[prove(situation, q, q).free]
         assume(len(free) >= 6)
         path = connect(situation, free[:1], free[1:], seed)
         assert (path[0] == free[0]).all()

@@ -1,0 +1,189 @@
+"""The segments of a motion so far, and where everything is after them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+
+from symgrasp.motion.bodies.motion_scene import MotionScene
+from symgrasp.motion.bodies.situation import Situation
+from symgrasp.motion.bodies.state import State
+from symgrasp.motion.drafting.ways import Grip
+from symgrasp.motion.paths.search import STATED, NoMotionError, Proof, blockers, prove
+from symgrasp.motion.segments import Kind, Opening, Segment
+from symgrasp.poses import Array
+from symgrasp.robot.robot import Arm
+
+__all__ = ["Course", "Part", "part_of", "prove_path"]
+
+
+class Part(NamedTuple):
+    """A segment to be.
+
+    Attributes:
+        kind: what it is for.
+        situation: what moves and stands.
+        path: (n, J) joint values.
+    """
+
+    kind: Kind
+    situation: Situation
+    path: Array
+
+
+class Course:
+    """The segments so far.
+
+    Args:
+        bodies: the pieces of the scene.
+        state: where everything is at the start.
+
+    Attributes:
+        bodies: the same.
+        state: where everything is now.
+        held: the arms that have taken the object, or will before anything else happens, with their grasps.
+        undecided: those of them of which is not known yet in which configuration.
+        segments: so far.
+    """
+
+    def __init__(self, bodies: MotionScene, state: State) -> None:
+        self.bodies, self.state = bodies, state
+        self.held: dict[str, Grip] = {}
+        self.undecided: set[str] = set()
+        self.segments: list[Segment] = []
+        self._opening: dict[str, float] = {}
+
+    def holders(self) -> list[Arm]:
+        """Return the arms that hold the object where they are."""
+        return [grip.arm for name, grip in self.held.items() if name not in self.undecided]
+
+    def add(self, kind: Kind, situation: Situation, path: Array, task: str) -> None:
+        """Add a segment in a task in which the arms of a situation follow a path (n, J), and move there."""
+        self._append(kind, situation.by_arm(path), (task, task), prove_path(situation, path))
+
+    def carry(
+        self, parts: Sequence[Part], tasks: tuple[str, str], end: Array, tilt: float, room: float
+    ) -> None:
+        """Add the segments in which the object is carried.
+
+        Args:
+            parts: the segments; parts with a single row are left out.
+            tasks: from which task to which; the carry itself leads from one to the other.
+            end: pose (4, 4) of the object in the end.
+            tilt: by what angle (rad) it may tilt further on the way than it does along the path.
+            room: how far (m) any point of the arms may be off the path.
+        """
+        at, to = tasks
+        for kind, situation, path in parts:
+            if len(path) < 2:
+                continue
+            proof = prove_path(situation, path)
+            self._append(
+                kind,
+                situation.by_arm(path),
+                (at, to) if kind == "carry" else (at, at),
+                proof._replace(room=np.minimum(proof.room, room)),
+                tilt=tilt if kind == "carry" else np.inf,
+            )
+            at = to if kind == "carry" else at
+        self.state = self.state.with_object(end)
+
+    def move_hand(self, kind: Kind, grip: Grip, end: float, task: str) -> None:
+        """Open or close a hand to an opening (m), from that at which it is."""
+        arm = grip.arm
+        start = self._opening.get(arm.name)
+        if start == end:
+            return
+        q = self.state.joints(arm)
+        openings = [] if start is None else _openings(arm, start, end)
+        states = [self.state, *(self.state.with_arm(arm, q, opening) for opening in openings[1:])]
+        if start is None:
+            states.append(self.state.with_arm(arm, q, end))
+        touching = [arm, *self.holders()]
+        situation = self.bodies.situation(self.state, [], hands=[arm], touching=touching)
+        rows = np.array([situation.row(state) for state in states])
+        verb = "closing" if kind == "close" else "opening"
+        with part_of(f"{verb} the hand of {arm.name} in {task}"):
+            proof = prove_path(situation, rows)
+        self._append(kind, {arm.name: np.array([q, q])}, (task, task), proof, {arm.name: (start, end)})
+        self.state, self._opening[arm.name] = states[-1], end
+
+    def _append(
+        self,
+        kind: Kind,
+        paths: Mapping[str, Array],
+        tasks: tuple[str, str],
+        proof: Proof,
+        gripper: Mapping[str, Opening] | None = None,
+        tilt: float = np.inf,
+    ) -> None:
+        held_by = tuple(arm.name for arm in self.holders())
+        paths = {**paths, **self._moved_along(paths)}
+        self.segments.append(
+            Segment(
+                kind=kind,
+                arms=tuple(paths),
+                joints=paths,
+                gripper=gripper or {},
+                held_by=held_by,
+                task_from=tasks[0],
+                task_to=tasks[1],
+                clearance=float(proof.clearance.min()),
+                room=float(proof.room.min()),
+                tilt_room=tilt,
+            )
+        )
+        for name, path in paths.items():
+            self.state = self.state.with_arm(self.bodies.scene.arm(name), path[-1])
+
+    def _moved_along(self, paths: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the paths of arms that do not move themselves, but with a torso that moves.
+
+        Raises:
+            NoMotionError: one of them holds the object.
+        """
+        found: dict[str, Array] = {}
+        for name, path in paths.items():
+            robot = self.bodies.scene.arm(name).robot
+            shared = len(robot.torso.joint_names) if robot.torso is not None else 0
+            if not shared or (path[:, :shared] == path[0, :shared]).all():
+                continue
+            for arm in self.bodies.scene.arms.values():
+                if arm.robot is robot and arm.name not in paths:
+                    if arm in self.holders():
+                        raise NoMotionError(f"{arm.name} holds the object, and would be moved by {name}")
+                    found[arm.name] = np.tile(self.state.joints(arm), (len(path), 1))
+                    found[arm.name][:, :shared] = path[:, :shared]
+        return found
+
+
+def prove_path(situation: Situation, path: Array) -> Proof:
+    """Return what is proven of the lines of a path (n, J).
+
+    Raises:
+        NoMotionError: one of them is not free; says what is in its way.
+    """
+    proof = prove(situation, path[:-1], path[1:], STATED)
+    if not proof.free.all():
+        raise NoMotionError(blockers(situation, proof.hits[~proof.free]))
+    return proof
+
+
+@contextmanager
+def part_of(what: str) -> Iterator[None]:
+    """Say which part of the motion it is that was not found."""
+    try:
+        yield
+    except NoMotionError as error:
+        raise NoMotionError(f"{what}: {error}") from None
+
+
+def _openings(arm: Arm, start: float, end: float) -> list[float]:
+    """Return openings (m) from one to another, with those between at which the joints of the hand bend."""
+    knots = {x for table in arm.hand.joints.values() if not isinstance(table, (int, float)) for x, _ in table}
+    low, high = min(start, end), max(start, end)
+    between = sorted(x for x in knots if low < x < high)
+    return [start, *(between if start < end else between[::-1]), end]
