@@ -1,9 +1,11 @@
-"""Broad phase: which pieces come near those that an arm moves, by their bounding boxes. Compiled."""
+"""Which pieces come near those that an arm moves: all others are certified free. Compiled."""
 
 from __future__ import annotations
 
 from symgrasp.collision.boxes import boxes_apart, oriented_boxes_apart
+from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.simplex import FAST
+from symgrasp.collision.walk import next_near
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.kinematics import place_arm, place_hand
 from symgrasp.ik.vectors import STRICT
@@ -13,7 +15,7 @@ __all__ = ["mark_near"]
 
 @njit(**ENTRY)
 def mark_near(moving, pieces, tree, scratch, T_world_base, T, row, q, reach, near, near_pairs):
-    """Mark the pieces and pairs whose boxes are within ``reach`` (m), among those that must not collide.
+    """Mark the pieces and pairs not certified further apart than ``reach`` (m), of those that must not collide.
 
     Args:
         moving: see `MovingPieces`.
@@ -30,7 +32,7 @@ def mark_near(moving, pieces, tree, scratch, T_world_base, T, row, q, reach, nea
             then ``base_pairs``, then ``arm_pairs``.
     """
     _place(moving, pieces, scratch, T_world_base, T, row, q)
-    _mark(moving, pieces.size, tree, scratch, reach, near, near_pairs)
+    _mark(moving, pieces, tree, scratch, reach, near, near_pairs)
 
 
 @njit(**STRICT)
@@ -41,30 +43,37 @@ def _place(moving, pieces, scratch, T_world_base, T, row, q):
 
 
 @njit(**FAST)
-def _mark(moving, size, tree, scratch, reach, near, near_pairs):
+def _mark(moving, pieces, tree, scratch, reach, near, near_pairs):
     """Mark what is near the moving pieces where they are; see `mark_near`."""
-    box = scratch.box
     for k in range(len(moving.frame)):
-        node = 0
-        while node < len(tree.skip):
-            if boxes_apart(box, k, node, tree.box, reach):
-                node = tree.skip[node]
-                continue
-            piece = tree.piece[node]
-            if piece >= 0 and not near[piece]:
-                near[piece] = not oriented_boxes_apart(size, scratch.pose, k, piece, reach)
-            node += 1
+        scratch.stack[0], waiting = 0, min(1, len(tree.skip))
+        while True:
+            i, waiting, _ = next_near(pieces, tree, scratch, k, reach, reach, waiting)
+            if i < 0:
+                break
+            near[i] = near[i] or _is_near(pieces, scratch, k, i, reach)
         if not moving.touch[k]:
             for i in moving.objects:
-                near[i] |= not boxes_apart(box, k, i, box, reach)
-    first = _mark_pairs(box, moving.hand_pairs, reach, near_pairs, 0)
-    first = _mark_pairs(box, moving.base_pairs, reach, near_pairs, first)
-    _mark_pairs(box, moving.arm_pairs, reach, near_pairs, first)
+                near[i] = near[i] or _is_near(pieces, scratch, k, i, reach)
+    first = _mark_pairs(pieces, scratch, moving.hand_pairs, reach, near_pairs, 0)
+    first = _mark_pairs(pieces, scratch, moving.base_pairs, reach, near_pairs, first)
+    _mark_pairs(pieces, scratch, moving.arm_pairs, reach, near_pairs, first)
 
 
 @njit(**FAST)
-def _mark_pairs(box, pairs, reach, near, first):
+def _mark_pairs(pieces, scratch, pairs, reach, near, first):
     """Mark the near ones of some pairs, from index ``first`` of the marks on; return the next index."""
     for i in range(len(pairs)):
-        near[first + i] = not boxes_apart(box, pairs[i, 0], pairs[i, 1], box, reach)
+        near[first + i] = _is_near(pieces, scratch, pairs[i, 0], pairs[i, 1], reach)
     return first + len(pairs)
+
+
+@njit(**FAST)
+def _is_near(pieces, scratch, a, b, reach):
+    """Whether two pieces are not certified further apart than ``reach`` (m)."""
+    if boxes_apart(scratch.box, a, b, scratch.box, reach):
+        return False
+    if oriented_boxes_apart(pieces.size, scratch.pose, a, b, reach):
+        return False
+    lower, _ = distance_bounds(pieces, scratch.pose, a, b, reach, reach, reach, scratch.simplex)
+    return lower < reach

@@ -116,7 +116,7 @@ class CandidateChecker:
             sample: their redundancy sample, which the retreat keeps.
             opening: opening (m) of the hand.
         """
-        if imbalance := self._imbalance(q, opening, [self._load(T_base_tool)]):
+        if imbalance := self._imbalance(q, opening, T_base_tool):
             return CheckResult(Reason.OUT_OF_BALANCE, None, 0.0, q, imbalance)
         collision = self._collision(T_base_tool, q, opening)
         if collision:
@@ -142,16 +142,26 @@ class CandidateChecker:
         height = float((inverse(T) @ self.arm.robot.T_world_base @ T_base_tool)[2, 3])
         return load_of_hand(self.world.scene, self.arm, self.holders, T, height)
 
-    def _imbalance(self, q: Array, opening: float, loads: Sequence[Load] = ()) -> float:
-        """Return how far (m) the robot's centre of mass is outside of its support; 0 where it stands."""
+    def _imbalance(self, q: Array, opening: float, T_base_tool: Array | None = None) -> float:
+        """Return how far (m) the robot's centre of mass is outside of its support; 0 where it stands.
+
+        Args:
+            q: (n,) joint values.
+            opening: opening (m) of the hand.
+            T_base_tool: the tool pose (4, 4) at which it bears the object, if it does.
+        """
         robot = self.arm.robot
         if robot.support is None:
             return 0.0
+        loads = [] if T_base_tool is None else [self._load(T_base_tool)]
         return max(0.0, -support_margin(robot, self.arm.robot_values(q, opening), loads))
 
     def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
+        near = self._near(q, T_base_tool) if self._near else None
+        if near is not None and not near:
+            return None
         self.world.set_arm(self.arm, q, opening)
-        return self.world.first_collision(self.arm, self._near(q, T_base_tool) if self._near else None)
+        return self.world.first_collision(self.arm, near)
 
     def _follow(self, T_base_tool: Array, q: Array, sample: int) -> Array | None:
         """Return the configuration at the same φ that continues q to the next pose, if any does."""

@@ -143,10 +143,10 @@ class ExactEngine:
             raise ValueError("the exact engine was built for a grid with other heights")
         self._place_object(task.T_world_object)
         self._holders = task.arms
-        loads = [
-            load_of_hand(self.world.scene, self.arm, task.arms, task.T_world_object, float(h)) for h in grid.h
-        ]
-        self._balance = loaded(self._geometry.balance, loads)
+        if len(self._balance.edges):  # else it stands, whatever it bears
+            scene, T = self.world.scene, task.T_world_object
+            loads = [load_of_hand(scene, self.arm, task.arms, T, float(h)) for h in grid.h]
+            self._balance = loaded(self._geometry.balance, loads)
         known = self._solvers.manifold.angles == grid.angles and self._solvers.arm.pitch == pitch
         if not known:
             self._solvers = self._new_solvers(grid, pitch)
@@ -216,7 +216,7 @@ class ExactEngine:
         fixed, bodies = self._fixed_bodies(), self._bodies(draft)
         wanted = np.array([misfit is None for misfit in self._misfit])
         rows = np.flatnonzero(wanted if only is None else wanted & only.any(axis=(0, 2)))
-        first, count = 0, 1
+        first, count = 0, 1 if progress else len(rows)
         while first < len(rows):
             start = perf_counter()
             some = rows[first : first + count]
