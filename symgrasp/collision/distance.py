@@ -57,27 +57,27 @@ def distance_bounds(pieces, pose, a, b, enough, sure, little, work):
 
 
 @njit(**FAST)
-def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, v):
-    """Return the bounds of `distance_bounds`, and a direction along which the pieces are apart.
+def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, begin):
+    """Return the bounds of `distance_bounds`, and where to begin when the pieces have hardly moved since.
 
     Args:
         pieces, pose, a, b, enough, sure, little, work: see `distance_bounds`.
-        v: the direction (3,) from b to a to begin with: where the pieces have hardly moved since, the one
-            that was returned then is almost always enough.
+        begin: a direction (3,) from b to a, and vertices of both to climb from, -1 where none are known: what
+            was returned when the pieces had almost the same poses, which is almost always enough, or
+            `between_centres`.
 
     Returns:
-        The bounds, and the last direction.
+        The bounds, and the last direction with its vertices.
     """
     vertices, edge_start, edges, seeds, index, size = pieces
     thick = size[a, 0] + size[b, 0]
     enough += thick
     sure += thick
     little += thick
-    v0, v1, v2 = v
+    v0, v1, v2, at_a, at_b = begin
     square = v0 * v0 + v1 * v1 + v2 * v2
     if square < 1e-24:
         v0, v1, v2, square = 1.0, 0.0, 0.0, 1.0
-    at_a, at_b = -1, -1
     lower, upper = -math.inf, math.inf
     count = 0
     for _ in range(STEPS):
@@ -98,13 +98,14 @@ def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, v):
             break
         for k in range(count):
             if work[k, 0] == w0 and work[k, 1] == w1 and work[k, 2] == w2:
-                return lower - thick, upper - thick, (v0, v1, v2)  # w is in the simplex already: converged
+                # w is in the simplex already: converged
+                return lower - thick, upper - thick, (v0, v1, v2, at_a, at_b)
         work[count, 0], work[count, 1], work[count, 2] = w0, w1, w2
         count += 1
         if count == 4:
             deep = depth_inside(work)
             if deep > SURROUNDS:
-                return -math.inf, -deep - thick, (v0, v1, v2)
+                return -math.inf, -deep - thick, (v0, v1, v2, at_a, at_b)
         count, v0, v1, v2 = reduce_to_nearest(work, count)
         square = v0 * v0 + v1 * v1 + v2 * v2
         upper = min(upper, math.sqrt(square))
@@ -112,14 +113,14 @@ def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, v):
             break
         if square < 1e-24:
             break
-    return lower - thick, upper - thick, (v0, v1, v2)
+    return lower - thick, upper - thick, (v0, v1, v2, at_a, at_b)
 
 
 @njit(**FAST)
 def between_centres(size, pose, a, b):
-    """Return the centre of the box of piece a relative to that of piece b."""
+    """Return the centre of the box of piece a relative to that of piece b, to begin with, and no vertices."""
     ca, cb = _centre(size, pose, a), _centre(size, pose, b)
-    return ca[0] - cb[0], ca[1] - cb[1], ca[2] - cb[2]
+    return ca[0] - cb[0], ca[1] - cb[1], ca[2] - cb[2], -1, -1
 
 
 @njit(**FAST)

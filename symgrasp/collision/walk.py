@@ -51,9 +51,9 @@ def next_near(pieces, tree, scratch, k, sure, reach, waiting):
         hull = tree.hull[node]
         if hull >= 0:
             enough = sure if tree.solid[node] else reach
-            v = between_centres(pieces.size, scratch.pose, k, hull)
+            begin = between_centres(pieces.size, scratch.pose, k, hull)
             lower, _, _ = distance_bounds_from(
-                pieces, scratch.pose, k, hull, reach, enough, enough, scratch.simplex, v
+                pieces, scratch.pose, k, hull, reach, enough, enough, scratch.simplex, begin
             )
             if lower >= reach:
                 continue

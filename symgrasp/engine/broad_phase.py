@@ -15,7 +15,7 @@ __all__ = ["mark_near"]
 
 @njit(**ENTRY)
 def mark_near(moving, pieces, tree, scratch, T_world_base, T, row, q, reach, near, near_pairs):
-    """Mark the pieces and pairs not certified further apart than ``reach`` (m), of those that must not collide.
+    """Mark pieces and pairs that must not collide and are not certified to be ``reach`` (m) apart.
 
     Args:
         moving: see `MovingPieces`.

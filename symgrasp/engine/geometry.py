@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.collision.flat_faces import convex_faces, fills_hull
 from symgrasp.collision.hulls import with_hulls
 from symgrasp.collision.pieces import PackedPieces, Piece, joined, pack, pose_rows
 from symgrasp.collision.tree import Tree, build, grafted
 from symgrasp.engine.balance import balance_of
 from symgrasp.engine.kinematics import MovingPieces
 from symgrasp.engine.search_types import Balance
+from symgrasp.meshes.flat_faces import convex_faces, fills_hull
 from symgrasp.object.profile import COLLISION_FACETS
 from symgrasp.poses import Array, inverse
 from symgrasp.robot.joint import Joint

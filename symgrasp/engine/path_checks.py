@@ -139,16 +139,16 @@ def _pair(moving, pieces, scratch, path, row, a, b, margin):
         return 0.0
     slack = size[a, 1] + size[b, 1]
     bar = margin - HIT_BAND - slack
-    v = between_centres(size, pose, a, b)
-    lower, upper, v = distance_bounds_from(pieces, pose, a, b, reach, sure, bar, scratch.simplex, v)
+    begin = between_centres(size, pose, a, b)
+    lower, upper, begin = distance_bounds_from(pieces, pose, a, b, reach, sure, bar, scratch.simplex, begin)
     gap = 0.0 if lower >= sure else UNDECIDED
     if upper >= bar and lower < reach:
         for s in range(len(path.frames)):
             if s != middle:
                 _place(moving, scratch, path, row, a, s)
                 _place(moving, scratch, path, row, b, s)
-                lower, upper, v = distance_bounds_from(
-                    pieces, pose, a, b, sure, sure, bar, scratch.simplex, v
+                lower, upper, begin = distance_bounds_from(
+                    pieces, pose, a, b, sure, sure, bar, scratch.simplex, begin
                 )
                 if upper < bar:
                     break

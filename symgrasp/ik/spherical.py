@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from symgrasp.compiling import njit
-from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, PHI, SLACK, TRIPLE, WRIST, WRIST_SEEN
+from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, P0, PHI, R0, SLACK, TRIPLE, WRIST, WRIST_SEEN
 from symgrasp.ik.joints import (
     ROOT_TOLERANCE,
     miss,
@@ -32,11 +32,14 @@ from symgrasp.ik.joints import (
 )
 from symgrasp.ik.vectors import (
     STRICT,
+    column,
     cross,
     dot,
     minus,
     perpendicular,
+    plus,
     rotate,
+    row,
     subproblem1,
     times,
     transposed_times,
@@ -46,6 +49,9 @@ from symgrasp.ik.vectors import (
 
 __all__ = ["reach_cosine", "spherical_branches"]
 
+CERTAIN = 1e-7
+"""A cosine, or the square of a sine, that is beyond a limit by this is so however it was computed."""
+
 
 @njit(**STRICT)
 def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, missing):
@@ -53,6 +59,10 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, miss
 
     Missing (B,) is `Memory.missing`.
     """
+    if inside_only:
+        sure, reaches = _sure_reach(g, joint, limits, T)
+        if sure:
+            return reaches
     R, t, c = _reach(g, joint, T)
     a = vec(g, CENTRE_SEEN)
     # Where possible sines and cosines are computed without their angles: most branches are dropped at a joint
@@ -84,6 +94,43 @@ def _reach(g, joint, T):
     R, p = tool_motion(g, joint[7], T)
     t = minus(transposed_times(R, minus(vec(g, CENTRE), p)), vec(g, WRIST))
     return R, t, (-0.5 * dot(t, t) - g[MIDDLE + 2]) / g[MIDDLE + 1]
+
+
+@njit(**STRICT)
+def _sure_reach(g, joint, limits, T):
+    """Decide from the distance |t| alone, without R_G, whether joint 4 is out of reach or outside its limits.
+
+    With T = G T0, T = (R, p) and T0 = (R0, p0) it is ``|Rᵀ (S − p) + R0ᵀ (p0 − W)|``, or of an arm that is
+    read backwards ``|R R0ᵀ (S − p0) + p − W|``.
+
+    Returns:
+        Whether it is certain, whatever the rounding, that no branch is inside the limits; and if so,
+        whether one is in reach.
+    """
+    R0T = (_third(g, R0), _third(g, R0 + 1), _third(g, R0 + 2))
+    p0, S, W, p = vec(g, P0), vec(g, CENTRE), vec(g, WRIST), column(T, 0, 3)
+    if joint[7]:
+        x, y = times(R0T, minus(S, p0)), minus(p, W)
+        t = plus((dot(row(T, 0), x), dot(row(T, 1), x), dot(row(T, 2), x)), y)
+    else:
+        x, y = minus(S, p), times(R0T, minus(p0, W))
+        t = plus((dot(column(T, 0, 0), x), dot(column(T, 0, 1), x), dot(column(T, 0, 2), x)), y)
+    c = (-0.5 * dot(t, t) - g[MIDDLE + 2]) / g[MIDDLE + 1]
+    rest = 1.0 - c * c
+    if rest < -(CERTAIN + g[SLACK]):
+        return True, False
+    if rest < CERTAIN + g[SLACK]:
+        return False, False
+    s, sm, cm = math.sqrt(rest), g[MIDDLE + 3], g[MIDDLE + 4]
+    one = (cm * c - sm * s) * limits[3, joint[3]] - (sm * c + cm * s) * limits[4, joint[3]]
+    other = (cm * c + sm * s) * limits[3, joint[3]] + (s * cm - c * sm) * limits[4, joint[3]]
+    return max(one, other) < limits[5, joint[3]] - CERTAIN, True
+
+
+@njit(**STRICT)
+def _third(g, i):
+    """Return every third of nine entries of a vector, from i on: a column of a matrix."""
+    return (g[i], g[i + 3], g[i + 6])
 
 
 @njit(**STRICT)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,11 +13,11 @@ from symgrasp.poses import Array
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["convex_faces", "fills_hull"]
+__all__ = ["convex_faces", "few_triangles", "fills_hull"]
 
 FLATNESS = 1e-7
-"""Vertices within this distance (m) of a plane lie in it. It is far below the bands of
-`symgrasp.engine.checks`, so merged triangles are certified as they would be one by one."""
+"""Vertices within this distance (m) of a plane lie in it. It is far below what
+distances are certain up to, so merged triangles are checked as they would be one by one."""
 
 AREA_TOLERANCE = 1e-9
 """Relative difference of the areas of triangles and of their hull below which they fill it."""
@@ -26,7 +28,7 @@ HULL_TOLERANCE = 1e-6
 
 
 def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
-    """Return convex polygons (n, 3), in no order of corners, that together are the surface of a mesh.
+    """Return convex polygons (n, 3), with their corners in order, that together are the surface of a mesh.
 
     Triangles that share edges and lie in a plane are one polygon where they fill their convex hull.
     """
@@ -34,6 +36,18 @@ def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
 
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices()
+    vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+    return list(_convex_faces(vertices.tobytes(), faces.tobytes()))
+
+
+@lru_cache(maxsize=64)
+def _convex_faces(vertices: bytes, triangles: bytes) -> tuple[Array, ...]:
+    """Return the faces of a mesh with vertices (n, 3) and triangles (m, 3): the worlds and engines of a scene
+    all need them."""
+    import trimesh
+
+    corners, indices = np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(triangles, dtype=np.int64)
+    mesh = trimesh.Trimesh(corners, indices.reshape(-1, 3), process=False)
     single = np.ones(len(mesh.faces), dtype=bool)
     faces = []
     for group in mesh.facets:
@@ -41,7 +55,16 @@ def convex_faces(mesh: trimesh.Trimesh) -> list[Array]:
         if polygon is not None:
             faces.append(polygon)
             single[group] = False
-    return [*faces, *np.asarray(mesh.triangles)[single]]
+    return (*faces, *np.asarray(mesh.triangles)[single])
+
+
+def few_triangles(mesh: trimesh.Trimesh) -> tuple[Array, np.ndarray]:
+    """Return vertices (n, 3) and triangles (m, 3) of the surface of a mesh, with few on its flat parts."""
+    faces = convex_faces(mesh)
+    vertices, index = np.unique(np.concatenate(faces), axis=0, return_inverse=True)
+    first = np.cumsum([0, *map(len, faces)])
+    fans = [[(k, k + i, k + i + 1) for i in range(1, end - k - 1)] for k, end in pairwise(first.tolist())]
+    return vertices, index.ravel()[np.concatenate(fans)]
 
 
 def fills_hull(mesh: trimesh.Trimesh) -> bool:

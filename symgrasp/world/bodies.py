@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from symgrasp.errors import MeshError, SymgraspError
+from symgrasp.meshes.flat_faces import few_triangles
 from symgrasp.poses import Array
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
@@ -132,6 +133,8 @@ class SceneBodies:
     def _mesh_shape(self, name: BodyName, shape: CollisionShape, pose: Array) -> int:
         """Create the collision shape of a mesh from its surface, not its convex hull: hollows stay hollow.
 
+        PyBullet takes longer the more triangles there are, so flat parts have as few as they need.
+
         Distances to a surface do not tell that something lies inside it. For an arm this does not
         matter, because its links form a chain from its base outwards, and one of them crosses the surface.
         For the object it does, so closed meshes are kept in `closed_meshes`.
@@ -145,10 +148,11 @@ class SceneBodies:
             raise MeshError(shape.path, field, value, expected)
         if mesh.is_watertight:
             self.closed_meshes.append((name, mesh.copy().apply_transform(pose)))
+        vertices, triangles = few_triangles(mesh)
         return pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
-            vertices=mesh.vertices.tolist(),
-            indices=mesh.faces.ravel().tolist(),
+            vertices=vertices.tolist(),
+            indices=triangles.ravel().tolist(),
             flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
             physicsClientId=self.client,
         )

@@ -9,7 +9,7 @@ import pytest
 from trimesh.creation import annulus, icosphere
 
 from symgrasp.collision.distance import distance_bounds
-from symgrasp.collision.flat_faces import convex_faces, fills_hull
+from symgrasp.meshes.flat_faces import convex_faces, fills_hull
 from symgrasp.collision.hulls import with_hulls
 from symgrasp.collision.pieces import Piece, joined, pack, pose_rows
 from symgrasp.collision.tree import build, grafted

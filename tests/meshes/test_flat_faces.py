@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from symgrasp.collision.flat_faces import FLATNESS, convex_faces
+from symgrasp.meshes.flat_faces import FLATNESS, convex_faces, few_triangles
 
 
 def area(face: np.ndarray) -> float:
@@ -36,6 +36,18 @@ def test_a_face_with_a_hole_is_not_filled():
     faces = convex_faces(ring)
     assert sum(map(area, faces)) == pytest.approx(ring.area)
     assert len(faces) < len(ring.faces)  # the sides are quadrilaterals
+
+
+def test_few_triangles_are_the_same_surface():
+    fine = subdivided(trimesh.creation.box((1.0, 0.6, 0.02)), 4)
+    few = trimesh.Trimesh(*few_triangles(fine), process=False)
+    assert len(few.faces) == 12
+    assert few.is_watertight
+    assert few.area == pytest.approx(fine.area)
+    assert abs(trimesh.proximity.signed_distance(few, fine.vertices)).max() < 1e-9
+    ring = trimesh.creation.annulus(0.05, 0.1, 0.2, sections=16)
+    few = trimesh.Trimesh(*few_triangles(ring), process=False)
+    assert few.area == pytest.approx(ring.area)
 
 
 def test_what_is_not_flat_stays_as_it_is():
