@@ -9,13 +9,13 @@ import pytest
 from trimesh.creation import annulus, icosphere
 
 from symgrasp.collision.distance import distance_bounds
-from symgrasp.meshes.flat_faces import convex_faces, fills_hull
 from symgrasp.collision.hulls import with_hulls
 from symgrasp.collision.pieces import Piece, joined, pack, pose_rows
 from symgrasp.collision.tree import build, grafted
 from symgrasp.collision.walk import next_near
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.kinematics import new_scratch
+from symgrasp.meshes.flat_faces import convex_faces, fills_hull
 from symgrasp.poses import from_rotation, rotation_about
 
 SURE = 1e-3
