@@ -63,7 +63,15 @@ class InputError(SymgraspError, ValueError):
         self.field = field
         self.value = value
         self.expected = expected
-        super().__init__(_line(self.source, field, _shown(value), f"expected {expected}"))
+        super().__init__(_line(self.source, *self._parts()))
+
+    @property
+    def without_source(self) -> str:
+        """The text for where the source has been named already."""
+        return _line(*self._parts())
+
+    def _parts(self) -> tuple[str, str, str]:
+        return self.field, _shown(self.value), f"expected {self.expected}"
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arguments, because the default would pickle only the text."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from symgrasp.errors import SymgraspError
+from symgrasp.errors import InputError, SymgraspError
 from symgrasp.hands.measure import measure_hand
 from symgrasp.hands.structure import find_hand_structure, jaw_candidates, palm_candidates
 from symgrasp.references import resolve
@@ -148,8 +148,13 @@ def _measured(model: RobotModel, link: str) -> tuple[Hand | None, str]:
     """Return the hand at a link, or why there is none."""
     try:
         return measure_hand(model, link), ""
-    except SymgraspError as error:
-        return None, str(error).removeprefix(f"{model.path}: ")
+    except InputError as error:
+        return None, _trouble(model, error)
+
+
+def _trouble(model: RobotModel, error: InputError) -> str:
+    """Return what is wrong, with its source where that is not the robot, which has been named."""
+    return error.without_source if error.source == str(model.path) else str(error)
 
 
 def _arm(model: RobotModel, link: str, mounted: bool = False) -> FoundArm:
@@ -164,8 +169,8 @@ def _arm(model: RobotModel, link: str, mounted: bool = False) -> FoundArm:
     joints: list[str] = []
     try:
         joints = guess_arm_joints(model, link, others)
-    except SymgraspError as error:
-        trouble = trouble or str(error).removeprefix(f"{model.path}: ")
+    except InputError as error:
+        trouble = trouble or _trouble(model, error)
     resting = tuple(name for name in turning if name not in joints)
     return FoundArm(link, link, tuple(joints), resting if joints else (), hand, mounted, trouble=trouble)
 

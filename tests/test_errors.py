@@ -12,6 +12,9 @@ def test_what_was_expected_is_whole_however_long_the_rest(folder):
     assert str(error).endswith(f": expected {expected}")
     assert "arm left" in str(error)
     assert len(str(error)) <= LONGEST
+    assert error.without_source.startswith("arm left: ['joint_0'")
+    assert error.without_source.endswith(f": expected {expected}")
+    assert error.without_source == InputError("", "arm left", error.value, expected).without_source
 
 
 def test_a_long_text_of_what_was_expected_leaves_the_rest():

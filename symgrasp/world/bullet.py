@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Self
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from symgrasp.errors import SceneError, SymgraspError
 from symgrasp.meshes import depth_inside
-from symgrasp.poses import Array, axis_frame
+from symgrasp.poses import Array, axis_frame, translation
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
@@ -28,6 +29,9 @@ LOWERED = 0.003
 
 SUPPORTED_DEPTH = 0.0015
 """The object is supported when lowering it by `LOWERED` makes it sink deeper by more than this (m)."""
+
+NORMAL_STEP = 1e-3
+"""Distance (m) by which the object is moved to and fro to find in which direction it leaves an obstacle."""
 
 MARGIN_REASONS = (Reason.SCENE_COLLISION, Reason.ROBOT_COLLISION)
 """Kinds of collision for which the scene's margin is a distance to keep."""
@@ -250,15 +254,32 @@ class BulletWorld:
         return sorted(found, key=lambda c: -c.depth)
 
     def object_normals(self, margin: float) -> dict[BodyName, Array]:
-        """Return obstacle → unit vector (3,) out of it to the object, of those within a margin (m) of it."""
-        found: dict[BodyName, Array] = {}
+        """Return obstacle → unit vector (3,) out of it to the object, of those within a margin (m) of it.
+
+        It is the gradient of their distance, by differences: the normal that PyBullet itself states is
+        meaningless where two bodies touch.
+        """
+        pose, reach = self._object_pose, margin + NORMAL_STEP
+        near = self._object_distances(margin)
+        gradient = {name: np.zeros(3) for name in near}
+        for k, sign in itertools.product(range(3), (1, -1)):
+            self.set_object(translation(sign * NORMAL_STEP * np.eye(3)[k]) @ pose)
+            distances = self._object_distances(reach)
+            for name, total in gradient.items():
+                total[k] += sign * distances.get(name, reach)
+        self.set_object(pose)
+        return {name: total / max(float(np.linalg.norm(total)), 1e-9) for name, total in gradient.items()}
+
+    def _object_distances(self, margin: float) -> dict[BodyName, float]:
+        """Return obstacle → its signed distance (m) from the object, of those within a margin (m) of it."""
+        found: dict[BodyName, float] = {}
         for piece in self.bodies.object:
             for obstacle in self.bodies.obstacles:
                 points = pybullet.getClosestPoints(piece, obstacle, margin, physicsClientId=self._client)
-                for p in points or ():  # 4 is the link of the obstacle, 7 the normal on it
+                for p in points or ():  # 4 is the link of the obstacle, 8 the distance
                     name = self.bodies.body_name(obstacle, p[4])
-                    found[name] = found.get(name, np.zeros(3)) + np.array(p[7])
-        return {name: total / max(float(np.linalg.norm(total)), 1e-9) for name, total in found.items()}
+                    found[name] = min(found.get(name, margin), p[8])
+        return found
 
     def object_in_robots(self, holders: Sequence[str]) -> list[Collision]:
         """Return the links that the object is inside of, of all robots but those named as holders."""

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from symgrasp.errors import UrdfError
 from symgrasp.hands.held import held_radius, outline
 from symgrasp.hands.measure import measure_hand
+from symgrasp.hands.structure import find_hand_structure
 from symgrasp.references import resolve
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.joint import joint_motion
@@ -96,7 +97,10 @@ class Cylinders:
         pybullet.performCollisionDetection(physicsClientId=self.client)
         found = pybullet.getClosestPoints(self.body, cylinder, 0.1, physicsClientId=self.client)
         pybullet.removeBody(cylinder, physicsClientId=self.client)
-        fingers = {self.links[link] for link in hand.touch_links if link in self.links}
+        # A shape around the whole hand may be touched as well, and always is.
+        beside = find_hand_structure(robot, hand.tool.link).beside
+        fingers = {self.links[link] for link in hand.touch_links if link in self.links and link not in beside}
+        assert fingers
         return min((point[8] for point in found if point[3] in fingers), default=0.1)
 
 

@@ -46,6 +46,7 @@ def test_defaults(content, tmp_path):
     scene = Scene.load(write_scene(tmp_path, content))
     assert scene.settings.model_dump() == {
         "heights": 48, "angles": 96, "redundancy": 32, "approach": 0.0, "margin": 0.0,
+        "resolution": None,
     }  # fmt: skip
     assert scene.task().arms == ("panda",)
     assert scene.manifold.angles == 96

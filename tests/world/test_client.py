@@ -143,7 +143,7 @@ def test_many_links_are_where_they_should_be(tmp_path, client):
 
 
 def test_more_joints_than_pybullet_sets(tmp_path, client):
-    with pytest.raises(UrdfError, match=r"chain\.urdf: joints: '129 that move .* at most 128"):
+    with pytest.raises(UrdfError, match=r"chain\.urdf: joints: 129 that move .* at most 128"):
         load_urdf(client, chain(tmp_path, ["revolute"] * 129), np.eye(4))
 
 
