@@ -36,6 +36,7 @@ SOURCES = (
     "engine/*.py",
     "feasibility/margins.py",
     "ik/*.py",
+    "ik/pair/*.py",
     "motion/bodies/linkage.py",
     "motion/paths/proof.py",
     "motion/paths/trees.py",

@@ -96,7 +96,7 @@ def status_html(state: State) -> str:
         if state.busy.compiling:
             doing = "Compiling, once on this machine: half a minute …"
             if state.is_preliminary:
-                doing = "Compiling, once on this machine; a coarse map is shown until the exact one comes …"
+                doing = "Compiling once; this map is coarse …"
         elif state.busy.waiting:
             doing = f"{state.busy.label} … when other browsers have had their turn"
     elif state.is_stopped:

@@ -19,7 +19,7 @@ from symgrasp.feasibility.algorithm1 import furthest
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker
-from symgrasp.feasibility.exact import ExactEngine
+from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.files import SCENES_DIR
 from symgrasp.ik import solver_for

@@ -14,7 +14,7 @@ from symgrasp.bench.ik import bare_arm, random_configurations, recall, sampled_s
 from symgrasp.bench.numerical import reach
 from symgrasp.errors import InputError, SymgraspError
 from symgrasp.feasibility.create import MapMaker
-from symgrasp.feasibility.exact import ExactEngine
+from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.starter import starter_scene
 from symgrasp.found_arms import find_arms

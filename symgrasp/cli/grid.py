@@ -17,7 +17,6 @@ from symgrasp.cli.shared import (
     say,
     write_out,
 )
-from symgrasp.errors import InputError, one_of
 
 if TYPE_CHECKING:
     from symgrasp.bench.grids import GridResult
@@ -43,9 +42,7 @@ def add_parser(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare the grids, print what was found and write it if asked to; return the exit status."""
-    check_out(args.out)
-    if args.out and args.out.suffix not in ENDINGS:
-        raise InputError("command line", "--out", str(args.out), "an ending: " + one_of(ENDINGS))
+    check_out(args.out, ENDINGS)
     scene = checked_scene(args.scene)
 
     from symgrasp.bench.grids import HEADER, REFERENCE, coarsest, measure_grids

@@ -19,7 +19,6 @@ from symgrasp.cli.shared import (
     whole,
     write_out,
 )
-from symgrasp.errors import InputError, one_of
 
 if TYPE_CHECKING:
     from symgrasp.feasibility.map import FeasibilityMap
@@ -44,9 +43,7 @@ def add_parser(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compute the map, print its counts and write it if asked to; return the exit status."""
-    check_out(args.out)
-    if args.out and args.out.suffix not in ENDINGS:
-        raise InputError("command line", "--out", str(args.out), "an ending: " + one_of(ENDINGS))
+    check_out(args.out, ENDINGS)
 
     scene, task, arm = chosen(args)
     if args.redundancy is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 
 from symgrasp.cli.shared import Commands, add_command, add_out, check_out, say, write_out
-from symgrasp.errors import InputError
 
 __all__ = ["add_parser", "run"]
 
@@ -27,9 +26,7 @@ def add_parser(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the report, and draw what is asked for; return the exit status."""
     for option, out in (("--out", args.out), ("--fit", args.fit)):
-        check_out(out)
-        if out and out.suffix != ".png":
-            raise InputError("command line", option, str(out), "a file that ends in .png")
+        check_out(out, (".png",), option)
 
     from symgrasp.feasibility.fit import plot_openings
     from symgrasp.feasibility.object_report import describe_object

@@ -19,6 +19,7 @@ from symgrasp.cli.shared import (
     say,
     whole,
     write_out,
+    write_picture,
 )
 from symgrasp.cli.survey import add_scheduler, need_extra, progress_of_points
 from symgrasp.errors import InputError, one_of
@@ -61,10 +62,7 @@ def run(args: argparse.Namespace) -> int:
     """Find bases, list the best and write what is asked for; return the exit status."""
     need_extra()
     for option, endings in (("out", (".yaml", ".yml")), ("plan", (".json",)), ("picture", PICTURES)):
-        path = getattr(args, option)
-        check_out(path)
-        if path and path.suffix not in endings:
-            raise InputError("command line", f"--{option}", str(path), "an ending: " + one_of(endings))
+        check_out(getattr(args, option), endings, f"--{option}")
     scene = checked_scene(args.scene)
     robot = args.robot or next(iter(scene.robots))
     if robot not in scene.robots:
@@ -73,7 +71,6 @@ def run(args: argparse.Namespace) -> int:
 
     import yaml
 
-    from symgrasp.feasibility.pictures import to_png, to_svg
     from symgrasp.survey.placement import place_base
     from symgrasp.survey.placement_picture import draw_placement
     from symgrasp.survey.running import cluster
@@ -99,8 +96,7 @@ def run(args: argparse.Namespace) -> int:
         best.plan.save(args.plan)
         say(f"written to {args.plan}")
     if args.picture:
-        figure = draw_placement(scene, robot, found)
-        write_out(args.picture, to_svg(figure) if args.picture.suffix == ".svg" else to_png(figure))
+        write_picture(args.picture, draw_placement(scene, robot, found))
     return 0
 
 

@@ -9,14 +9,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from symgrasp.errors import InputError, printable, shortened
+from symgrasp.errors import InputError, one_of, printable, shortened
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from symgrasp.robot.robot import Arm
     from symgrasp.scene.parts import Task
     from symgrasp.scene.scene import Scene
@@ -37,6 +39,7 @@ __all__ = [
     "warn",
     "whole",
     "write_out",
+    "write_picture",
 ]
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -124,20 +127,28 @@ def whole(lowest: int) -> Callable[[str], int]:
     return read
 
 
-def check_out(out: Path | None) -> None:
+def check_out(out: Path | None, endings: Sequence[str] = (), option: str = "--out") -> None:
     """Check, before anything is computed, that a file can be written if one is asked for.
 
+    Args:
+        out: the file.
+        endings: of its name, of which it must have one; any if there are none.
+        option: that names it.
+
     Raises:
-        InputError: its folder does not exist or cannot be written, or it is a folder itself.
+        InputError: its name has another ending, its folder does not exist or cannot be written, or it is a
+            folder itself.
     """
     if out is None:
         return
     if not out.parent.is_dir():
-        raise InputError("command line", "--out", str(out), f"a file in an existing folder, not {out.parent}")
+        raise InputError("command line", option, str(out), f"a file in an existing folder, not {out.parent}")
     if out.is_dir():
-        raise InputError("command line", "--out", str(out), "a file, not a folder")
+        raise InputError("command line", option, str(out), "a file, not a folder")
     if not os.access(out if out.exists() and not out.is_file() else out.parent, os.W_OK):
-        raise InputError("command line", "--out", str(out), "a file that can be written")
+        raise InputError("command line", option, str(out), "a file that can be written")
+    if endings and out.suffix not in endings:
+        raise InputError("command line", option, str(out), "an ending: " + one_of(endings))
 
 
 def say(text: str) -> None:
@@ -157,6 +168,13 @@ def write_out(out: Path, content: bytes) -> None:
     with write_atomically(out) as file:
         file.write(content)
     say(f"written to {out}")
+
+
+def write_picture(out: Path, figure: Figure) -> None:
+    """Draw a figure into a file that ends in .png or .svg, and say so."""
+    from symgrasp.feasibility.pictures import to_png, to_svg
+
+    write_out(out, to_svg(figure) if out.suffix == ".svg" else to_png(figure))
 
 
 def checked_scene(name: str) -> Scene:

@@ -17,9 +17,8 @@ from symgrasp.cli.shared import (
     progress_of,
     say,
     whole,
-    write_out,
+    write_picture,
 )
-from symgrasp.errors import InputError, one_of
 
 if TYPE_CHECKING:
     from symgrasp.robot.robot import Arm
@@ -57,10 +56,7 @@ def add_parser(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute what is asked for and say the most probable grasps; return the exit status."""
     for option, endings in (("out", ENDINGS), ("plan", (".json",))):
-        path = getattr(args, option)
-        check_out(path)
-        if path and path.suffix not in endings:
-            raise InputError("command line", f"--{option}", str(path), "an ending: " + one_of(endings))
+        check_out(getattr(args, option), endings, f"--{option}")
     scene, task, arm = chosen(args)
 
     from symgrasp.survey.success import PoseNoise, plan_for_success
@@ -83,7 +79,6 @@ def run(args: argparse.Namespace) -> int:
 def _map(args: argparse.Namespace, noise: PoseNoise, scene: Scene, task: Task, arm: Arm) -> None:
     """Compute, describe and draw the probability of every cell."""
     from symgrasp.feasibility.create import MapMaker
-    from symgrasp.feasibility.pictures import to_png, to_svg
     from symgrasp.survey.success import success_map
     from symgrasp.survey.success_picture import draw_success
     from symgrasp.world import open_world
@@ -96,8 +91,7 @@ def _map(args: argparse.Namespace, noise: PoseNoise, scene: Scene, task: Task, a
         say(f"  feasible with at least {100 * least:.0f} %: {int((share >= least).sum()):6} cells")
     say(f"  feasible where the object is expected: {int(found.nominal.feasible.sum()):6} cells")
     if args.out:
-        figure = draw_success(found)
-        write_out(args.out, to_svg(figure) if args.out.suffix == ".svg" else to_png(figure))
+        write_picture(args.out, draw_success(found))
 
 
 def _size(text: str) -> float:

@@ -11,8 +11,17 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from symgrasp.cli.shared import Commands, add_command, add_out, add_packages, check_out, say, whole, write_out
-from symgrasp.errors import InputError, SymgraspError, one_of
+from symgrasp.cli.shared import (
+    Commands,
+    add_command,
+    add_out,
+    add_packages,
+    check_out,
+    say,
+    whole,
+    write_picture,
+)
+from symgrasp.errors import InputError, SymgraspError
 
 if TYPE_CHECKING:
     from symgrasp.survey.running import Done
@@ -133,10 +142,8 @@ def progress_of_points(what: str) -> Iterator[Callable[[Done], None] | None]:
 
 def _show(args: argparse.Namespace) -> int:
     need_extra()
-    check_out(args.out)
-    if args.out and args.out.suffix not in ENDINGS:
-        raise InputError("command line", "--out", str(args.out), "an ending: " + one_of(ENDINGS))
-    from symgrasp.feasibility.pictures import to_png, to_svg
+    check_out(args.out, ENDINGS)
+    from symgrasp.feasibility.pictures import to_png
     from symgrasp.page import show_picture
     from symgrasp.survey.pictures import draw_survey
     from symgrasp.survey.results import in_words, values_of, workspace
@@ -151,7 +158,7 @@ def _show(args: argparse.Namespace) -> int:
         shown = workspace(survey, results, args.grasp / 100, args.roll)
     figure = draw_survey(survey, shown)
     if args.out:
-        write_out(args.out, to_svg(figure) if args.out.suffix == ".svg" else to_png(figure))
+        write_picture(args.out, figure)
     else:
         show_picture(to_png(figure), survey.file.name)
     return 0

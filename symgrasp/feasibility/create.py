@@ -13,8 +13,8 @@ import numpy as np
 from symgrasp.errors import InputError
 from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.cell import Cell
-from symgrasp.feasibility.certified import LEVELS
-from symgrasp.feasibility.exact import ExactEngine
+from symgrasp.feasibility.exact.certified import LEVELS
+from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.pitch_maps import at_pitches

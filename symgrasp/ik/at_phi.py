@@ -30,7 +30,7 @@ from symgrasp.ik.chain import (
     WRIST_SEEN,
 )
 from symgrasp.ik.compiled import CompiledIK
-from symgrasp.ik.pair_geometry import PAIR_PHI
+from symgrasp.ik.pair.geometry import PAIR_PHI
 from symgrasp.ik.vectors import STRICT, cross, dot, minus, plus, rotate, vec
 from symgrasp.poses import Array
 

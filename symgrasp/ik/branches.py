@@ -16,9 +16,9 @@ from symgrasp.ik.arcs import ARCS, HALVINGS
 from symgrasp.ik.chain import COSINE_TOLERANCE, THREE_PARALLEL, Chain
 from symgrasp.ik.joints import misses, settle
 from symgrasp.ik.newton import polish_in
-from symgrasp.ik.pair import PAIR_BRANCHES, STARTS, VIEWS, pair_branches
-from symgrasp.ik.pair_geometry import MEETING_PAIR
-from symgrasp.ik.pair_polynomial import POLYNOMIAL_NUMBERS
+from symgrasp.ik.pair.geometry import MEETING_PAIR
+from symgrasp.ik.pair.polynomial import POLYNOMIAL_NUMBERS
+from symgrasp.ik.pair.solver import PAIR_BRANCHES, STARTS, VIEWS, pair_branches
 from symgrasp.ik.parallel import parallel_branches
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT

@@ -6,7 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from symgrasp.ik.pair_geometry import PairGeometry
+from symgrasp.ik.pair.geometry import PairGeometry
 from symgrasp.poses import Array
 
 __all__ = [
@@ -38,7 +38,7 @@ class Chain(NamedTuple):
     """The geometry of an arm at K redundancy values, packed into arrays for compiled code.
 
     The arm has n joints, of which six are free, numbered 1 to 6 as in `symgrasp.ik.spherical`,
-    `symgrasp.ik.parallel` or `symgrasp.ik.pair`.
+    `symgrasp.ik.parallel` or `symgrasp.ik.pair.solver`.
 
     Attributes:
         geometry: (K, m) a geometry of one of the families in each row.

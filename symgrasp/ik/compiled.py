@@ -11,7 +11,7 @@ from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions, Tolerance
 from symgrasp.ik.branches import branch_count, new_memory, solve_range
 from symgrasp.ik.chain import COSINE_TOLERANCE, Chain
 from symgrasp.ik.families import EXACT, chain_geometries
-from symgrasp.ik.pair_geometry import MEETING_PAIR
+from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.poses import Array
 from symgrasp.robot.robot import AZIMUTH, Arm
 

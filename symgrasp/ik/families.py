@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.ik.chain import ChainGeometry, ParallelGeometry, SphericalGeometry
-from symgrasp.ik.pair_geometry import PairGeometry, pair_geometry
+from symgrasp.ik.pair.geometry import PairGeometry, pair_geometry
 from symgrasp.poses import Array, rotation_about
 from symgrasp.robot.robot import Arm
 

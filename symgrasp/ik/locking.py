@@ -6,7 +6,7 @@ import numpy as np
 
 from symgrasp.errors import UrdfError
 from symgrasp.ik.families import COARSE, EXACT, chain_geometries, has_exact_pair
-from symgrasp.ik.pair_geometry import MEETING_PAIR
+from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.robot.robot import PITCH, Arm
 
 __all__ = ["joint_to_lock"]

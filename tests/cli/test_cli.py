@@ -116,6 +116,29 @@ def test_ctrl_c_while_a_motion_is_planned_leaves_no_file(monkeypatch, tmp_path, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        (["map", "soda_can"], "--out"),
+        (["grid", "soda_can"], "--out"),
+        (["object", "wine_bottle"], "--fit"),
+        (["place", "soda_can"], "--picture"),
+        (["success", "soda_can"], "--plan"),
+        (["survey", "show", "no.zarr"], "--out"),
+    ],
+    ids=lambda words: " ".join(words) if isinstance(words, list) else words,
+)
+def test_a_file_that_cannot_be_written_is_refused_by_its_option_before_anything_is_computed(
+    command, option, tmp_path, capsys
+):
+    for name, said in (("a.xyz", "expected an ending: one of"), ("no/a.png", "a file in an existing folder")):
+        assert main([*command, option, str(tmp_path / name)]) == 2
+        error = capsys.readouterr().err
+        assert f"command line: {option}: " in error
+        assert said in error
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):
     assert (
         main(["object", "wine_bottle", "--out", str(tmp_path / "a.png"), "--fit", str(tmp_path / "b.png")])

@@ -12,7 +12,7 @@ import yaml
 from trimesh.creation import annulus, box, icosphere
 
 from symgrasp.feasibility.create import MapMaker
-from symgrasp.feasibility.exact import ExactEngine
+from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.poses import translation
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene

@@ -9,9 +9,9 @@ import pytest
 from IPython.core.formatters import DisplayFormatter
 
 from symgrasp.errors import Cancelled, MapError
-from symgrasp.feasibility import exact
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker, create_map, explain
+from symgrasp.feasibility.exact import engine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import CompiledIK
 from symgrasp.object.manifold import ROLLS
@@ -230,7 +230,7 @@ def test_the_other_robot_is_an_obstacle():
 
 @pytest.mark.parametrize("method", ["exact", "reference"])
 def test_progress_and_cancel(method, monkeypatch):
-    monkeypatch.setattr(exact, "TELL", 0.0)
+    monkeypatch.setattr(engine, "TELL", 0.0)
     shares = []
     scene = load_small("soda_can")
     create_map(scene, method=method, progress=shares.append)
@@ -248,7 +248,7 @@ def test_progress_and_cancel(method, monkeypatch):
 @pytest.mark.parametrize("method", ["exact", "reference"])
 def test_a_cancelled_map_leaves_no_trace(method, monkeypatch):
     """In the world of a map that was stopped half-way, the next map is what it is in a new world."""
-    monkeypatch.setattr(exact, "TELL", 0.0)
+    monkeypatch.setattr(engine, "TELL", 0.0)
     scene = load_small("log_two_robots")
 
     def stop(share):

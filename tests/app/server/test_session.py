@@ -452,7 +452,7 @@ def test_the_page_shows_a_coarse_map_and_says_so_until_the_exact_one_is_compiled
     with open_lobby(server.cache, "127.0.0.1", port), Wire(port) as visitor:
         assert "preliminary" not in visitor.wait_for(ready)
         visitor.set("x (cm)", 50.0)
-        visitor.wait_for("a coarse map is shown until the exact one comes")
+        visitor.wait_for("this map is coarse")
         visitor.wait_for("coarse and preliminary")
         visitor.trigger("Put the object back")  # where its map is known
         visitor.wait_for(lambda html: "Ready." in html and "preliminary" not in html)

@@ -117,7 +117,7 @@ def test_a_coarse_map_is_shown_and_the_exact_one_still_awaited():
     assert shown.next_request is None  # it is being computed
     assert "coarse and preliminary" in title_html(shown)
     assert 'aria-busy="true"' in title_html(shown)
-    assert "until the exact one comes" in status_html(job_changes.compiling(shown, 1))
+    assert "this map is coarse" in status_html(job_changes.compiling(shown, 1))
     with pytest.raises(SymgraspError, match="computed map"):
         map_picture(shown, "PNG")
     picked = changes.choose(shown, 0.1, 0.0)

@@ -17,24 +17,23 @@ from symgrasp.collision.inner_pieces import inner_pieces
 from symgrasp.collision.pieces import pose_rows
 from symgrasp.engine import search
 from symgrasp.engine.balance import loaded
-from symgrasp.engine.broad_phase import mark_near
-from symgrasp.engine.checks import FREE_BAND, HIT_BAND
+from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.cover import FINEST, cover
 from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
 from symgrasp.engine.threads import core_count
-from symgrasp.feasibility.batches import Batch, batches, compiled_parts
-from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
-from symgrasp.feasibility.certified import LEVELS, CellProver
+from symgrasp.feasibility.exact.batches import Batch, batches, compiled_parts
+from symgrasp.feasibility.exact.certified import LEVELS, CellProver
+from symgrasp.feasibility.exact.open_candidates import OpenCandidates
+from symgrasp.feasibility.exact.recording import FixedBodies, PieceBodies, record_search
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
-from symgrasp.feasibility.search_recording import FixedBodies, PieceBodies, record_search
 from symgrasp.feasibility.torso_maps import merged
-from symgrasp.ik import GridSolvers, Solver, solver_for
+from symgrasp.ik import GridSolvers, solver_for
 from symgrasp.ik.at_phi import locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
@@ -44,7 +43,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import load_of_hand
 from symgrasp.scene.parts import Task
-from symgrasp.world import BodyName, BulletWorld, Collision, NearBodies
+from symgrasp.world import BodyName, BulletWorld, Collision
 
 __all__ = ["ExactEngine"]
 
@@ -100,7 +99,8 @@ class ExactEngine:
         if not arm.pitched:  # whose hand has other poses in every row
             self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, self._most)
         self._inner = inner_pieces(geometry.pieces) if self._settings.redundancy == "auto" else ()
-        self._balance, self._holders = self._geometry.balance, (arm.name,)
+        self._balance = self._geometry.balance
+        self._open = OpenCandidates(world, arm, geometry, self._scratch, self._opening)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
     @staticmethod
@@ -142,7 +142,7 @@ class ExactEngine:
         if not np.array_equal(grid.h, self.manifold.h):
             raise ValueError("the exact engine was built for a grid with other heights")
         self._place_object(task.T_world_object)
-        self._holders = task.arms
+        self._open.holders = task.arms
         if len(self._balance.edges):  # else it stands, whatever it bears
             scene, T = self.world.scene, task.T_world_object
             loads = [load_of_hand(scene, self.arm, task.arms, T, float(h)) for h in grid.h]
@@ -314,7 +314,7 @@ class ExactEngine:
         for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.undecided_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             T = inputs.T_base_tool[i]
-            self._decide(draft, cell, T, batch.ik, self._undecided(found, int(i), T, batch))
+            self._open.decide(draft, cell, T, batch.ik, self._undecided(found, int(i), T, batch))
             yield
         if covered:
             yield from self._decide_covered(draft, *covered, inputs, batch, cells)
@@ -383,7 +383,7 @@ class ExactEngine:
             s = ik.solve(T)
             these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
             listed = [(s.q[j], int(s.sample[j]), int(s.branch[j])) for j in these]
-            self._decide(draft, cell, T, ik, listed, phi)
+            self._open.decide(draft, cell, T, ik, listed, phi)
             yield
 
     def _undecided(
@@ -397,64 +397,3 @@ class ExactEngine:
             return [(found.undecided_q[i, j], int(sample[j]), int(branch[j])) for j in range(count)]
         s = batch.ik.solve(T_base_tool)
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
-
-    def _decide(
-        self,
-        draft: MapDraft,
-        cell: tuple[int, ...],
-        T_base_tool: Array,
-        ik: Solver,
-        listed: list[tuple[Array, int, int]],
-        phi: Array | None = None,
-    ) -> None:
-        """Let PyBullet check the candidates of an open cell, against the bodies near enough to collide.
-
-        Args:
-            draft: the map.
-            cell: the cell.
-            T_base_tool: its tool pose (4, 4).
-            ik: the solver of the candidates.
-            listed: joint values, sample of that solver, and branch of each.
-            phi: the samples of that solver (rad), where it is not the map's.
-        """
-        near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
-        checker = CandidateChecker(self.world, ik.arm, ik, self._settings.approach, near, self._holders)
-        before: Collision | None = None
-        for q, sample, branch in listed:
-            reason, collision, *_ = checker.check(T_base_tool, q, sample, float(self._opening[cell[1]]))
-            if reason == Reason.FEASIBLE:
-                if phi is not None:
-                    sample = int(draft.add_phi(phi[sample : sample + 1])[0])
-                draft.record_feasible(cell, q, sample, branch)
-                return
-            if reason > draft.reason[cell]:
-                draft.record_failure(cell, reason, collision)
-            if collision and self._with_tool(collision):
-                if before and _same(before, collision):
-                    return  # all others collide like that too, because the tool pose alone decides it
-                before = collision
-
-    def _near(self, q: Array, T_base_tool: Array, row: int) -> NearBodies:
-        """Return the bodies near the arm at joint values (n,); all others are certified free."""
-        geometry, scratch = self._geometry, self._scratch
-        near = np.zeros(len(geometry.names), dtype=bool)
-        pairs = np.zeros(len(geometry.pairs), dtype=bool)
-        reach = self.world.margin + FREE_BAND
-        mark_near(
-            geometry.moving_in(row), geometry.pieces, geometry.tree, scratch, self._T_world_base,
-            T_base_tool, row, q, reach, near, pairs,
-        )  # fmt: skip
-        bodies = {geometry.names[k].body for k in np.flatnonzero(near)}
-        return bodies | {geometry.pairs[k] for k in np.flatnonzero(pairs)}
-
-    def _with_tool(self, collision: Collision) -> bool:
-        """Whether the tool pose alone decides a collision: no link but those fixed to the tool moves."""
-        name = self.arm.robot.name
-        own = [body.link for body in (collision.a, collision.b) if body.body == name]
-        return self._geometry.tool_links.issuperset(
-            link for link in own if link in self._geometry.moving_links
-        )
-
-
-def _same(a: Collision, b: Collision) -> bool:
-    return (a.a, a.b) == (b.a, b.b) and min(a.depth, b.depth) > 1e-6 and abs(a.depth - b.depth) < 1e-7

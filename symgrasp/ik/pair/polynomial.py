@@ -1,4 +1,4 @@
-"""The polynomial N of arms of which the axes of the last two joints meet; see `symgrasp.ik.pair`."""
+"""The polynomial N of arms of which the axes of the last two joints meet; see `symgrasp.ik.pair.solver`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import AXES
-from symgrasp.ik.pair_geometry import (
+from symgrasp.ik.pair.geometry import (
     CHAIN_DIRECTION,
     CHAIN_POINT,
     COSINE,

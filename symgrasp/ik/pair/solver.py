@@ -53,8 +53,8 @@ from symgrasp.ik.arcs import (
 from symgrasp.ik.chain import AXES
 from symgrasp.ik.joints import misses, nearest_turn, settle, tool_motion, within, write_branch
 from symgrasp.ik.newton import polish_in
-from symgrasp.ik.pair_geometry import OUTER_LAST, PAIR_PHI
-from symgrasp.ik.pair_polynomial import equations_of, may_reach, product, residual_at, solve_inner
+from symgrasp.ik.pair.geometry import OUTER_LAST, PAIR_PHI
+from symgrasp.ik.pair.polynomial import equations_of, may_reach, product, residual_at, solve_inner
 from symgrasp.ik.roots import size2
 from symgrasp.ik.vectors import STRICT, perpendicular, rotate, subproblem1, times, vec
 

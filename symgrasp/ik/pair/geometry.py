@@ -1,4 +1,4 @@
-"""The geometry of arms of which the axes of the last two joints meet, packed for `symgrasp.ik.pair`."""
+"""The geometry of arms of which the axes of the last two joints meet, packed for the solver."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from symgrasp.engine.cell_types import CellInput
 from symgrasp.engine.geometry import ArmGeometry
 from symgrasp.engine.kinematics import Scratch
 from symgrasp.engine.search_types import Balance
-from symgrasp.feasibility.cell_rows import arm_reach, new_rows
+from symgrasp.feasibility.exact.cell_rows import arm_reach, new_rows
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import Solver
 from symgrasp.object.manifold import Manifold

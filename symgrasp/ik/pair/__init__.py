@@ -1,0 +1,1 @@
+"""Arms of which the axes of the last two joints meet: geometry, polynomial and solver."""
