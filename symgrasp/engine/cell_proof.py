@@ -264,7 +264,7 @@ def _stands(moving, inputs, balance, work, box):
         way += hand[0] * (moves + inputs.rows.sway[r])
     for k in range(len(balance.edges)):
         edge = balance.edges[k]
-        if edge[0] * x + edge[1] * y + way + ROUNDING * mass > edge[2] * mass:
+        if not edge[0] * x + edge[1] * y + way + ROUNDING * mass <= edge[2] * mass:  # nor where it is NaN
             return False
     return True
 

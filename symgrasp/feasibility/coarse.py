@@ -61,7 +61,7 @@ def coarse_map(
         sample=none.astype(np.int32),
         branch=none.astype(np.int16),
         clearance=nowhere,
-        opening=found.opening[row],
+        opening=np.array([arm.hand.opening(float(r)) for r in grid.profile.radius(grid.h)]),
         bodies=(),
         pair=np.full((*reason.shape, 2), -1, dtype=np.int16),
         depth=nowhere,

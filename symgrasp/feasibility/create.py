@@ -49,7 +49,7 @@ class MapMaker:
 
     def __init__(self, world: BulletWorld) -> None:
         self.world, self.scene = world, world.scene
-        self._engines: dict[tuple[str, int | None, int], ExactEngine | None] = {}
+        self._engines: dict[tuple[str, int | None, int, int], ExactEngine | None] = {}
         self._solvers: dict[str, Solver] = {}
 
     def map(
@@ -103,13 +103,16 @@ class MapMaker:
         manifold: Manifold | None = None,
         progress: Progress | None = None,
     ) -> FeasibilityMap:
-        """Compute the map of a pitched arm with its hand held at some pitches (rad); see `map`."""
+        """Compute the map of a pitched arm with its hand held at some pitches (rad); see `map`.
+
+        It is for planners, so nothing is certified.
+        """
         the_arm, the_task = self._chosen(arm, task)
         grid = manifold or self.scene.manifold
         maps = []
         for k, pitch in enumerate(pitches):
             tell = part_of(progress, k, len(pitches))
-            maps.append(self._map(the_arm, None, the_task, grid, tell, pitch))
+            maps.append(self._map(the_arm, None, the_task, grid, tell, pitch, certify=False))
         return at_pitches(maps, pitches)
 
     def _map(
@@ -130,10 +133,11 @@ class MapMaker:
         settings = self.scene.settings
         if certify is None:
             certify = settings.resolution is not None
-        finer = settings.finer(grid) if certify and not arm.pitched else []
+        splits = certify and not arm.pitched and settings.resolution is not None
+        finer = settings.finer(grid) if splits else []
         tell = part_of(progress, 0, 1 + len(finer))
         found = engine.map(task, grid, tell, pitch, certify)
-        if settings.resolution is None or not certify or arm.pitched:
+        if not splits:
             return found
 
         def map_on(parts: Manifold, wanted: np.ndarray) -> FeasibilityMap:
@@ -189,14 +193,18 @@ class MapMaker:
     def _engine(
         self, arm: Arm, torso: int | None, grid: Manifold, levels: int = LEVELS
     ) -> ExactEngine | None:
-        """Return an arm's engine for a grid's heights, or None where the engine does not know the arm."""
-        known = self._engines.get((arm.name, torso, grid.heights))
+        """Return an arm's engine for a grid's heights, or None where the engine does not know the arm.
+
+        Its certificates cut cells so often in two, see `CellProver`.
+        """
+        key = arm.name, torso, grid.heights, levels
+        known = self._engines.get(key)
         if known and not np.array_equal(known.manifold.h, grid.h):
             known = None
         if known is None:
             with suppress(NotImplementedError):
                 known = ExactEngine(self.world, arm, grid, levels)
-        self._engines[arm.name, torso, grid.heights] = known
+        self._engines[key] = known
         return known
 
 

@@ -372,7 +372,14 @@ class FeasibilityMap:
             "h": ("h", m.h, {"units": "m", "long_name": "height along the object's axis"}),
             "theta": ("theta", m.theta, {"units": "rad", "long_name": "angle around the object's axis"}),
         }
-        about = {"scene": self.scene, "arm": self.arm, "task": self.task}
+        if self.certified is not None:
+            data["certified"] = (cells, self.certified)
+        about = {
+            "scene": self.scene,
+            "arm": self.arm,
+            "task": self.task,
+            "preliminary": int(self.preliminary),
+        }
         pose = {"T_world_object": self.T_world_object.ravel().tolist()}
         return xr.Dataset(data, coordinates, {**about, **pose})
 

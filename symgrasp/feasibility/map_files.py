@@ -65,6 +65,7 @@ def read_map(path: str | Path) -> dict[str, Any]:
                 raise MapError(path, name, data[name].shape, f"an array of shape {shape}")
         reasons = VERSION_2_REASONS if meta["version"] == 2 else meta["reasons"]
         data["reason"] = _renumbered(data["reason"], reasons)
+        data |= {name: data[name].astype(bool) for name in ("proven", "certified") if name in data}
         if "refined_reason" in data:
             parts = _renumbered(data.pop("refined_reason"), reasons), data.pop("refined_certified")
             data["refined"] = _loaded_parts(path, manifold, *parts)
@@ -84,15 +85,12 @@ def _loaded_parts(path: str | Path, manifold: Manifold, reason: np.ndarray, cert
     Raises:
         MapError: they do not cut the cells into whole parts.
     """
-    rolls, heights, angles = reason.shape
-    if (
-        certified.shape != reason.shape
-        or rolls != 2
-        or heights % manifold.heights
-        or angles % manifold.angles
-    ):
+    rolls, heights, angles = reason.shape if reason.ndim == 3 else (0, 0, 0)
+    whole = heights and angles and not heights % manifold.heights and not angles % manifold.angles
+    if certified.shape != reason.shape or rolls != len(ROLLS) or not whole:
         raise MapError(path, "refined_reason", reason.shape, "whole parts of the cells")
-    return Refined(Manifold(manifold.profile, heights, angles, manifold.theta_start), reason, certified)
+    parts = Manifold(manifold.profile, heights, angles, manifold.theta_start)
+    return Refined(parts, reason, certified.astype(bool))
 
 
 def _renumbered(reason: np.ndarray, names: Sequence[str]) -> np.ndarray:

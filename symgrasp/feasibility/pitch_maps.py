@@ -25,9 +25,12 @@ def at_pitches(maps: Sequence[FeasibilityMap], pitches: Sequence[float]) -> Feas
     pair = np.concatenate([own[m.pair] for own, m in zip(index, maps, strict=True)])
     # A sample is the pitch by its index; its sign, which depends on the roll, is in q.
     sample = np.where(arrays.pop("sample") < 0, -1, np.repeat(range(len(maps)), len(ROLLS))[:, None, None])
+    certified = [m.certified for m in maps if m.certified is not None]
     return replace(
         maps[0],
         **arrays,
+        certified=np.concatenate(certified) if len(certified) == len(maps) else None,
+        refined=None,
         sample=sample,
         phi=np.array(pitches),
         pair=pair,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -56,8 +57,9 @@ def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:
         return np.take_along_axis(stacked, index, axis=0)[0]
 
     names = ("reason", "q", "sample", "branch", "clearance", "depth")
-    arrays = {name: pick([getattr(m, name) for m in maps]) for name in names}
+    arrays: dict[str, Any] = {name: pick([getattr(m, name) for m in maps]) for name in names}
     proven = np.logical_and.reduce([m.proven for m in maps])
+    arrays["certified"] = None  # unless all maps say what is
     certified = [m.certified for m in maps if m.certified is not None]
     if len(certified) == len(maps):
         whole = [c & m.feasible for c, m in zip(certified, maps, strict=True)]

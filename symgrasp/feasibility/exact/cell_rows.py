@@ -48,7 +48,8 @@ def new_rows(
     standoff = np.array([hand.standoff(float(r)) for r in profile.radius(h)])
     ends = np.array([[hand.standoff(float(r)) for r in row] for row in span])
     turns = {name: _changes(table, opening, between) for name, table in hand.joints.items()}
-    play = np.array([_play(arm, turns, link, r) for link, r in zip(links, _radii(pieces), strict=False)])
+    radii = _radii(pieces)[: len(links)]
+    play = [_play(arm, turns, link, r, len(h)) for link, r in zip(links, radii, strict=True)]
     rows = Rows(
         h=h,
         dh=half,
@@ -57,7 +58,7 @@ def new_rows(
         shift=np.ascontiguousarray(shift, dtype=float),
         dshift=_changes(hand.shift, opening, between),
         hand=hand_poses(arm, list(links), opening),
-        play=np.ascontiguousarray(play.reshape(len(links), len(h)).T),
+        play=np.ascontiguousarray(np.reshape(play, (len(links), len(h))).T),
         sway=_sway(arm, turns, len(h)),
         fits=np.array([fits_all(hand, profile, a, b) for a, b in zip(h - half, h + half, strict=True)]),
         misfits=np.array([fits_none(hand, profile, a, b) for a, b in zip(h - half, h + half, strict=True)]),
@@ -85,7 +86,7 @@ def _radii(pieces: PackedPieces) -> Array:
     )
 
 
-def _play(arm: Arm, turns: dict[str, Array], link: str, away: float) -> Array:
+def _play(arm: Arm, turns: dict[str, Array], link: str, away: float, rows: int) -> Array:
     """Return how far (rows,) (m) a point of a link moves at most as joints of the hand change.
 
     Args:
@@ -93,9 +94,10 @@ def _play(arm: Arm, turns: dict[str, Array], link: str, away: float) -> Array:
         turns: name of the joint → by how much it changes (rows,).
         link: the link.
         away: how far (m) the point is from the link's origin.
+        rows: their number.
     """
     model = arm.robot.model
-    total = np.zeros(len(next(iter(turns.values()), np.zeros(0))))
+    total = np.zeros(rows)
     for joint in reversed(model.chain(link)):
         slides = joint.kind == "prismatic"
         name = model.joint_names[joint.source] if joint.source >= 0 else ""
@@ -117,7 +119,7 @@ def _sway(arm: Arm, turns: dict[str, Array], rows: int) -> Array:
     links = [
         (k, link) for k, link in enumerate(model.link_names) if last in {j.name for j in model.chain(link)}
     ]
-    return np.max([_play(arm, turns, link, float(away[k])) for k, link in links], axis=0, initial=0.0)
+    return np.max([_play(arm, turns, link, float(away[k]), rows) for k, link in links], axis=0, initial=0.0)
 
 
 def arm_reach(origin: Array, axis: Array) -> tuple[Array, Array, float]:

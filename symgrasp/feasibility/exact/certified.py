@@ -110,7 +110,10 @@ class CellProver:
         wanted = ~m.feasible if settings.approach else np.ones_like(found)
         if only is not None:
             wanted &= only
-        cells = np.argwhere(wanted)
+        # Of one layout, however many there are: for another one all would be compiled once more.
+        cells = np.ascontiguousarray(np.argwhere(wanted))
+        if not len(cells):
+            return found
         found[wanted] = prove_cells(
             geometry.moving, geometry.pieces, geometry.tree, scratches, inputs, self._loaded(task), cells,
             m.q[wanted],
@@ -119,6 +122,8 @@ class CellProver:
 
     def _loaded(self, task: Task) -> Balance:
         """Return what decides whether the robot stands in each row of boxes."""
+        if not len(self._balance.edges):  # it stands, whatever it bears
+            return self._balance
         heights: Array = self._rows.h
         load = [
             load_of_hand(self._scene, self._arm, task.arms, task.T_world_object, float(h)) for h in heights

@@ -5,18 +5,21 @@
 # pyright: reportOptionalOperand=false, reportCallIssue=false, reportOperatorIssue=false
 
 import math
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.errors import SceneError
+from symgrasp.errors import MapError, SceneError
 from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.exact.cell_rows import arm_reach, new_rows
 from symgrasp.feasibility.fit import fit, fits_all, fits_none
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.margins import way_to_unproven
+from symgrasp.feasibility.torso_maps import merged
 from symgrasp.object.manifold import Manifold, wrap
 from symgrasp.object.profile import Profile
 from symgrasp.poses import from_position_rpy
@@ -24,6 +27,7 @@ from symgrasp.robot.hand import HANDS
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
+from tests.feasibility.test_pitched import so101
 
 SAMPLES = 25
 """Points of a cell along and around at which the engine is asked."""
@@ -146,6 +150,59 @@ def test_is_kept_in_files_shifts_and_merged_maps(tmp_path):
     plain = create_map(scene)
     assert plain.certified is None
     assert plain.holds(cell) == ""
+
+
+def test_a_map_put_together_is_certified_only_if_all_its_parts_are():
+    scene = Scene.load("soda_can").with_settings(heights=6, angles=12, redundancy=4)
+    m = create_map(scene, certify=True)
+    nothing = m.masked(np.zeros_like(m.feasible))
+    sure = replace(nothing, certified=np.ones_like(m.feasible))
+    assert merged([sure, replace(m, certified=None)]).certified is None
+    both = merged([sure, m])
+    assert np.array_equal(both.certified, m.certified)  # what either can hold counts
+
+
+def test_pitched_maps_are_put_together_whatever_resolution_the_scene_asks_for():
+    scene = so101("upright").with_settings(resolution={"mm": 10, "deg": 5})
+    with open_world(scene) as world:
+        found = MapMaker(world).maps_at_pitches("so101", "hold", [-1.2, -0.8, -0.4])
+    assert found.certified is None
+    assert found.refined is None
+    assert not found.masked(np.zeros_like(found.feasible)).feasible.any()
+
+
+def test_a_hand_without_joints_moves_nothing():
+    scene = Scene.load("soda_can")
+    arm = scene.arm("panda")
+    stiff = copy(arm)
+    stiff.hand = replace(arm.hand, joints={})
+    with open_world(scene) as world:
+        geometry = MapMaker(world)._engine(arm, None, scene.manifold)._geometry
+    links = [n.link for n in geometry.names[: geometry.moving.hand.shape[1]]]
+    rows, *_ = new_rows(stiff, scene.manifold, 1, links, geometry.pieces)
+    assert rows.play.shape == (3 * scene.manifold.heights, len(links))
+    assert not rows.play.any()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda parts: parts[:, :0],
+        lambda parts: parts[:, :-1],
+        lambda parts: parts[:1],
+        lambda parts: parts[0],
+    ],
+)
+def test_damaged_parts_of_a_saved_map_are_refused(damage, tmp_path):
+    scene = Scene.load("soda_can").with_settings(heights=6, angles=12, redundancy=4)
+    m = create_map(scene.with_settings(resolution={"mm": 15, "deg": 10}))
+    m.save(tmp_path / "map.npz")
+    with np.load(tmp_path / "map.npz") as file:
+        data = dict(file)
+    data |= {name: damage(data[name]) for name in ("refined_reason", "refined_certified")}
+    np.savez(tmp_path / "damaged.npz", **data)
+    with pytest.raises(MapError, match="whole parts of the cells"):
+        FeasibilityMap.load(tmp_path / "damaged.npz")
 
 
 @st.composite
