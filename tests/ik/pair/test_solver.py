@@ -22,7 +22,7 @@ from tests.ik.synthetic import distance, samples, synthetic
 
 compiled_branches_at = njit(**ENTRY)(branches_at)
 
-DATA = Path(__file__).parent.parent / "data"
+DATA = Path(__file__).parents[2] / "data"
 
 ARMS = ("offset_arm", "offset_wrist", "skewed_shoulder", "five_crossings", "turned_pair", "wrist_on_offsets")
 
