@@ -6,17 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symgrasp.poses import Array, from_position_rpy, from_rotation, rotation_about, rpy
+from symgrasp.poses import Array, from_rotation, rotation_about
 
-__all__ = ["DEFAULT_VELOCITY", "Joint", "joint_motion", "with_right_angles"]
+__all__ = ["DEFAULT_VELOCITY", "Joint", "joint_motion"]
 
 DEFAULT_VELOCITY = 1.0
 """Largest speed (rad/s or m/s) of joints for which a URDF states none above zero."""
-
-ROUNDED_ANGLE = 1e-9
-"""An angle (rad) closer than this to a multiple of a right angle is that multiple, written with ten digits or
-more: as 1.57079632679, which is 5e-12 rad off. At stretched elbows, where configurations depend on the square
-root of such an error, closed forms would be off by some 1e-3 rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +52,3 @@ def joint_motion(joint: Joint, value: Array) -> Array:
     if joint.kind == "prismatic":
         return from_rotation(np.eye(3), value[..., None] * joint.axis)
     return from_rotation(rotation_about(joint.axis, value))
-
-
-def with_right_angles(origin: Array) -> Array:
-    """Return a pose (4, 4) whose roll, pitch and yaw are right angles where they differ by rounding alone."""
-    stated = rpy(origin)
-    right = 0.5 * np.pi * np.round(stated / (0.5 * np.pi))
-    rounded = (stated != right) & (np.abs(stated - right) < ROUNDED_ANGLE)
-    return from_position_rpy(origin[:3, 3], np.where(rounded, right, stated)) if rounded.any() else origin

@@ -17,7 +17,7 @@ from symgrasp.descriptions.urdf import UrdfJoint, UrdfRobot, read_urdf
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
-from symgrasp.robot.joint import DEFAULT_VELOCITY, Joint, joint_motion, with_right_angles
+from symgrasp.robot.joint import DEFAULT_VELOCITY, Joint, joint_motion
 from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
 
@@ -150,7 +150,6 @@ class RobotModel:
         """
         if not np.isfinite(j.origin).all():
             raise UrdfError(self.path, f"joint {j.name}: origin", j.origin[:3, 3].tolist(), "finite numbers")
-        origin = with_right_angles(j.origin)
         axis = j.axis
         source, ratio, offset = -1, 1.0, 0.0
         lower, upper = -np.inf, np.inf
@@ -167,7 +166,7 @@ class RobotModel:
                 ends = [ratio * end + offset if ratio else offset for end in self._limits(followed)]
                 lower, upper = min(ends), max(ends)
         return Joint(
-            j.name, j.type, links[j.parent], links[j.child], origin, axis, lower, upper,
+            j.name, j.type, links[j.parent], links[j.child], j.origin, axis, lower, upper,
             source, ratio, offset, _stated_velocity(j),
         )  # fmt: skip
 

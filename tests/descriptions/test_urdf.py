@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from symgrasp.descriptions.urdf import UrdfJoint, UrdfShape, read_urdf
+from symgrasp.descriptions.urdf import ROUNDED_ANGLE, UrdfJoint, UrdfShape, read_urdf
 from symgrasp.errors import UrdfError
+from symgrasp.poses import from_position_rpy
 from symgrasp.robot.model import RobotModel
 from tests.conftest import SHIPPED, load_small
 
@@ -20,7 +21,8 @@ JOINT = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{}</
 
 
 def check_origin(origin: np.ndarray, expected: np.ndarray | None) -> None:
-    np.testing.assert_allclose(origin, np.eye(4) if expected is None else expected, atol=1e-15)
+    """Right angles that a file rounds are right here, and as the file has them there."""
+    np.testing.assert_allclose(origin, np.eye(4) if expected is None else expected, atol=2 * ROUNDED_ANGLE)
 
 
 def check_shape(shape: UrdfShape, expected: yourdfpy.Collision) -> None:
@@ -84,6 +86,24 @@ def test_what_a_file_may_leave_out_or_state():
         link = f'<inertial><origin xyz="1 2 3"/><mass value="2"/></inertial>{shape.format(scale)}'
         joint = '<axis/><limit lower="-1" effort="3"/><mimic joint="k"/>'
         check(f'<robot name="r">{LINKS.format(link)}{JOINT.format(joint)}</robot>'.encode())
+
+
+@pytest.mark.parametrize("stated", ["1.57079632679", "-1.5707963268", "3.14159265359", "4.712388980385"])
+@pytest.mark.parametrize("place", range(3))
+def test_right_angles_are_right_up_to_the_rounding_of_urdfs(stated, place):
+    """Axes that meet by their URDF then meet, and no others are moved."""
+    for text, exact in ((stated, True), (stated[:9], False)):
+        angles = ["0.3", "-0.2", "0.7"]
+        angles[place] = text
+        origin = f"<origin xyz='1 2 3' rpy='{' '.join(angles)}'/>"
+        robot = ET.fromstring(f'<robot name="r">{LINKS.format("")}{JOINT.format(origin)}</robot>')
+        (joint,) = read_urdf(robot).joints
+        as_stated = [float(angle) for angle in angles]
+        right = list(as_stated)
+        right[place] = np.round(float(text) / (np.pi / 2)) * np.pi / 2
+        off = np.abs(joint.origin - from_position_rpy([1, 2, 3], right)).max()
+        assert (off == 0) == exact
+        np.testing.assert_allclose(joint.origin, from_position_rpy([1, 2, 3], as_stated), atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -65,22 +65,6 @@ def test_a_mesh_without_a_vertical_is_not_turned(tmp_path):
         RobotModel(urdf, follow_up_axis=True)
 
 
-@pytest.mark.parametrize("stated", ["1.57079632679", "-1.5707963268", "3.14159265359", "4.712388980385"])
-def test_right_angles_are_right_up_to_the_rounding_of_urdfs(tmp_path, stated):
-    """Axes that meet by their URDF then meet, and no others are moved."""
-    for text, exact in ((stated, True), (stated[:9], False)):
-        (tmp_path / "robot.urdf").write_text(
-            f'<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>'
-            f'<child link="b"/><origin xyz="1 2 3" rpy="{text} 0.3 0"/></joint></robot>'
-        )
-        (joint,) = RobotModel(tmp_path / "robot.urdf").joints
-        right = np.round(float(text) / (np.pi / 2)) * np.pi / 2
-        off = np.abs(joint.origin - from_position_rpy([1, 2, 3], [right, 0.3, 0.0])).max()
-        assert (off < 1e-15) == exact
-        as_stated = from_position_rpy([1, 2, 3], [float(text), 0.3, 0.0])
-        np.testing.assert_allclose(joint.origin, as_stated, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
