@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -22,9 +23,9 @@ from symgrasp.survey.store import create_store
 from symgrasp.survey.survey import Survey
 from symgrasp.world import open_world
 
-__all__ = ["efficiency", "memory", "overhead", "run"]
+__all__ = ["efficiency", "memory", "overhead", "run", "scenes", "start"]
 
-SCENE = "bottle_on_table"
+SCENE, OTHER = "bottle_on_table", "pick_pour_place"
 GRID = MapSettings(heights=24, angles=48, redundancy=16)
 SMALL = MapSettings(heights=4, angles=12, redundancy=2)
 
@@ -32,6 +33,8 @@ SMALL = MapSettings(heights=4, angles=12, redundancy=2)
 def run() -> Iterator[Figure]:
     """Run the benchmarks of surveys and yield their figures as they are measured."""
     yield from overhead(side=16, rounds=3)
+    yield from scenes(count=12)
+    yield from start(rounds=3)
     yield from efficiency(side=20, rounds=3)
     yield from memory(side=100)
 
@@ -47,36 +50,74 @@ def _survey(side: int, settings: MapSettings) -> Survey:
 
 
 def overhead(side: int, rounds: int) -> Iterator[Figure]:
-    """Time the points of a survey, computed and written, and their maps alone, on one core."""
+    """Time the points of a survey, computed and written, and their maps alone, on one core.
+
+    Batch by batch, in turn: what else the machine does meets both alike.
+    """
     survey = _survey(side, GRID)
+    pairs, written = [], []
+    with _one_core(), open_world(survey.scene) as world, Evaluator(survey) as evaluator:
+        maker = MapMaker(world)
+        maker.map()
+        evaluator.point((0, 0))
+        for _ in range(rounds):
+            with TemporaryDirectory() as folder:
+                store = create_store(Path(folder) / "bench.zarr", survey)
+                computed, writing, alone = Time(0, 0), Time(0, 0), Time(0, 0)
+                for batch in range(survey.batches):
+                    points = list(survey.points_of(batch))
+                    tasks = [evaluator.task_at(point, survey.scene) for point in points]
+                    results = {}
+                    computed += time_of(lambda: results.update((p, evaluator.point(p)) for p in points))  # noqa: B023
+                    writing += time_of(lambda: store.write(batch, results))  # noqa: B023
+                    alone += time_of(lambda: [maker.map(task=task) for task in tasks])  # noqa: B023
+            pairs.append((computed + writing, alone))
+            written.append(writing / survey.batches)
+    yield times("a map alone, one core", "ms", [alone / survey.points for _, alone in pairs])
+    yield ratios("  a point of a survey, with all that is written, over it", pairs)
+    yield times("  writing a batch", "ms", written)
+
+
+def scenes(count: int) -> Iterator[Figure]:
+    """Time what a point needs besides its map where its scene is not that of the point before."""
+    axis = NumberAxis(name="x", of="base.x", from_=-0.1, to=0.1, count=count)
+    file = SurveyFile(schema_version=1, name="bench", scene=OTHER, map=GRID, axes=(axis,))
+    survey, found = Survey.of(file, Scene.load(OTHER)), []
+    with _one_core(), Evaluator(survey) as evaluator:
+        evaluator.point((0,))
+        for k in range(1, count):
+            first, again = (time_of(lambda: evaluator.point((k,))) for _ in range(2))  # noqa: B023
+            found.append(Time(first.wall - again.wall, first.cpu - again.cpu))
+    yield times(f"a world and an engine for another scene, {OTHER}", "ms", found)
+
+
+def start(rounds: int) -> Iterator[Figure]:
+    """Time a survey of one point in a process that is started for it; the CPU time is that of the process."""
+    axes = (NumberAxis(name="x", of="position.x", values=(0.5,)),)
+    survey = Survey.of(
+        SurveyFile(schema_version=1, name="bench", scene=SCENE, map=GRID, axes=axes), Scene.load(SCENE)
+    )
+    found = []
+    for _ in range(rounds):
+        began, spent = perf_counter(), 0.0
+
+        def note(done: Done) -> None:
+            nonlocal spent
+            spent = _spent()
+
+        with TemporaryDirectory() as folder:
+            run_survey(survey, Path(folder) / "bench.zarr", workers=1, progress=note)
+        found.append(Time(perf_counter() - began, spent))
+    yield times("starting a process, and its first point", "s", found)
+
+
+@contextmanager
+def _one_core() -> Iterator[None]:
     use_cores(1)
-    pairs = []
     try:
-        with open_world(survey.scene) as world, Evaluator(survey) as evaluator:
-            maker, points = MapMaker(world), survey.points
-            tasks = [
-                evaluator.task_at(point, survey.scene)
-                for batch in range(survey.batches)
-                for point in survey.points_of(batch)
-            ]
-            maker.map(task=tasks[0])
-            evaluator.point((0, 0))
-            for _ in range(rounds):
-                with TemporaryDirectory() as folder:
-                    store = create_store(Path(folder) / "bench.zarr", survey)
-
-                    def whole() -> None:
-                        for batch in range(survey.batches):
-                            own = survey.points_of(batch)
-                            store.write(batch, {point: evaluator.point(point) for point in own})  # noqa: B023
-
-                    surveyed = time_of(whole)
-                alone = time_of(lambda: [maker.map(task=task) for task in tasks])
-                pairs.append((surveyed, alone))
+        yield
     finally:
         use_cores(CORES)
-    yield times("a map alone, one core", "ms", [Time(*(t / points for t in alone)) for _, alone in pairs])
-    yield ratios("  a point of a survey, with all that is written, over it", pairs)
 
 
 def efficiency(side: int, rounds: int) -> Iterator[Figure]:
@@ -99,17 +140,19 @@ def _rate(survey: Survey, workers: int) -> Time:
     seen: list[tuple[int, float, float]] = []
 
     def note(done: Done) -> None:
-        spent = 0.0
-        for child in psutil.Process().children(recursive=True):
-            used = child.cpu_times()
-            spent += used.user + used.system
-        seen.append((done.points, perf_counter(), spent))
+        seen.append((done.points, perf_counter(), _spent()))
 
     with TemporaryDirectory() as folder:
         run_survey(survey, Path(folder) / "bench.zarr", workers=workers, progress=note)
     first, last = seen[len(seen) // 4], seen[-1]  # all have computed a batch by then
     points = last[0] - first[0]
     return Time((last[1] - first[1]) / points, (last[2] - first[2]) / points)
+
+
+def _spent() -> float:
+    """Return the CPU time (s) of all processes that this one has started and that run."""
+    used = [child.cpu_times() for child in psutil.Process().children(recursive=True)]
+    return sum(times.user + times.system for times in used)
 
 
 def memory(side: int) -> Iterator[Figure]:

@@ -6,6 +6,7 @@ import argparse
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,15 +74,14 @@ def run(args: argparse.Namespace) -> int:
 
     from symgrasp.survey.placement import place_base
     from symgrasp.survey.placement_picture import draw_placement
-    from symgrasp.survey.running import cluster
+    from symgrasp.survey.running import cluster, plan_margins_on
 
     with (
         _folder(args.store) as store,
         progress_of_points("bases") as progress,
         cluster(args.workers, args.scheduler) as client,
     ):
-        told = (lambda _, done: progress(done)) if progress else None
-        found = place_base(client, scene, robot, region, store, progress=told)
+        found = place_base(scene, robot, region, partial(plan_margins_on, client, store, progress))
     served = sum(not math.isnan(margin) for margin in found.margins.values())
     say(f"{served} of {len(found.margins)} bases of {robot} that were tried serve all tasks; the best:")
     for number, own in enumerate(found.proposals, start=1):

@@ -37,7 +37,7 @@ def in_parallel(function: Callable[[int], None], parts: Iterable[int]) -> None:
         parts: better more of them than cores, as they take different times.
     """
     parts = list(parts)
-    if len(parts) < 2:
+    if len(parts) < 2 or core_count() == 1:
         for part in parts:
             function(part)
         return

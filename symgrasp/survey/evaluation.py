@@ -16,7 +16,6 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.profile import Profile
 from symgrasp.plan.plan import Plan
 from symgrasp.planners.planning import (
-    MapsByKey,
     plan_bimanual,
     plan_handover,
     plan_sequential,
@@ -79,6 +78,8 @@ class _Stage(NamedTuple):
     scene: Scene
     world: BulletWorld | None
     maker: MapMaker | None
+    others: dict[tuple[str, str], FeasibilityMap]
+    """maps of the tasks that a point does not move"""
 
 
 class Evaluator:
@@ -133,7 +134,10 @@ class Evaluator:
         )
         if not file.plan:
             return found
-        plan = planned(stage.maker, scene, file.plan, arm, task.name, {(task.name, arm): m})
+        maps = {key: other for key, other in stage.others.items() if key[0] != task.name}
+        maps[task.name, arm] = m
+        plan = planned(stage.maker, scene, file.plan, arm, task.name, maps)
+        stage.others.update((key, other) for key, other in maps.items() if key[0] != task.name)
         return replace(
             found, plan=plan is not None, plan_margin=plan_margin(plan, scene.profile) if plan else 0.0
         )
@@ -168,14 +172,14 @@ class Evaluator:
             try:
                 check_homes(scene)
             except SceneError:
-                self._stage = _Stage(key, scene, None, None)
+                self._stage = _Stage(key, scene, None, None, {})
             else:
                 world = open_world(scene)
                 if all(stands_free(world, robot) for robot in self._moved_bases):
-                    self._stage = _Stage(key, scene, world, MapMaker(world))
+                    self._stage = _Stage(key, scene, world, MapMaker(world), {})
                 else:
                     world.close()
-                    self._stage = _Stage(key, scene, None, None)
+                    self._stage = _Stage(key, scene, None, None, {})
         return self._stage
 
     @cached_property
@@ -211,7 +215,12 @@ def best_cell(m: FeasibilityMap) -> tuple[tuple[int, int, int], float]:
 
 
 def planned(
-    maker: MapMaker, scene: Scene, kind: PlanKind, arm: str, task: str, known: MapsByKey | None = None
+    maker: MapMaker,
+    scene: Scene,
+    kind: PlanKind,
+    arm: str,
+    task: str,
+    known: dict[tuple[str, str], FeasibilityMap] | None = None,
 ) -> Plan | None:
     """Return the best plan of a scene, None if none exists.
 
@@ -221,9 +230,9 @@ def planned(
         kind: which planner.
         arm: of the sequential planner, the arm.
         task: of the bimanual planner, the task.
-        known: maps that are known.
+        known: maps that are known; those that are computed are added.
     """
-    maps = dict(known or {})
+    maps = {} if known is None else known
     for own in tasks_of_plan(scene, kind, arm, task):
         for name in own.arms:
             if (own.name, name) not in maps:

@@ -9,28 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from distributed import Client
 
 from symgrasp.errors import NoPlanError, SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
 from symgrasp.poses import Array, rotation_z
+from symgrasp.scene.format import MapSettings
 from symgrasp.scene.replacing import with_base
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.evaluation import plan_margin, planned
 from symgrasp.survey.format import KeepOut, NumberAxis, PlanKind, SurveyFile
-from symgrasp.survey.running import Done, run_on
-from symgrasp.survey.store import open_results
+from symgrasp.survey.regions import length_of_arm
 from symgrasp.survey.survey import Survey
 from symgrasp.world import open_world
 
-__all__ = ["Base", "Placement", "Proposal", "Region", "kind_of_plan", "place_base", "reach_of"]
+__all__ = ["Base", "Placement", "Proposal", "Region", "Surveyed", "kind_of_plan", "place_base", "reach_of"]
 
 SEEDS, ROUNDS = 3, 2
 """How many of the best bases are refined, and how often the step is halved."""
@@ -39,6 +36,9 @@ TURN = 90.0
 """Step (°) of the turn about the vertical at first."""
 
 FULL_TURN = (-180.0, 180.0)
+
+Surveyed: TypeAlias = "Callable[[Survey], Array]"
+"""Runs a survey; returns the margin (m) of the best plan at each of its points, NaN where none exists."""
 
 
 class Base(NamedTuple):
@@ -131,7 +131,7 @@ def reach_of(scene: Scene, robot: str, step: float = 0.2) -> Region:
     The square around it that the length of the arm gives, at the height where the robot stands.
     """
     arm = next(arm for arm in scene.arms.values() if arm.robot.name == robot)
-    length = float(np.linalg.norm(arm.P[1:], axis=-1).sum())
+    length = length_of_arm(scene, arm.name)
     middle = np.mean([task.T_world_object[:3, 3] for task in scene.tasks.values()], axis=0)
     side = step * math.floor(length / step)
     low, high = np.round(middle - side, 3).tolist(), np.round(middle + side, 3).tolist()
@@ -140,29 +140,27 @@ def reach_of(scene: Scene, robot: str, step: float = 0.2) -> Region:
 
 
 def place_base(
-    client: Client,
     scene: Scene,
     robot: str,
     region: Region,
-    store: Path,
+    surveyed: Surveyed,
     *,
     most: int = 5,
-    progress: Callable[[str, Done], None] | None = None,
+    settings: MapSettings | None = None,
 ) -> Placement:
     """Find the bases of a robot from which all tasks of a scene can be done.
 
     Args:
-        client: of the cluster that computes, see `symgrasp.survey.running.cluster`.
         scene: the scene.
         robot: name of the robot that is moved.
         region: where it may stand.
-        store: folder for the stores of the surveys; what is there from an earlier call is used.
+        surveyed: runs the surveys, such as `symgrasp.survey.running.plan_margins_on` on a cluster.
         most: largest number of proposals.
-        progress: called with what is being surveyed and how far it is; may raise `Cancelled`.
+        settings: of the maps of the surveys, the scene's if None; what is proposed is planned with the
+            scene's.
 
     Raises:
         NoPlanError: none of the bases that were surveyed serves all tasks.
-        SurveyError: a store is another survey's.
     """
     kind, margins = kind_of_plan(scene), dict[Base, float]()
 
@@ -172,12 +170,14 @@ def place_base(
             name=name,
             scene=scene.name,
             plan=kind,
+            map=settings,
             keep_out=region.keep_out,
             axes=tuple(axes),
         )
-        own, out = Survey.of(file, scene, scene.source), store / f"{name}.zarr"
-        run_on(client, own, out, partial(progress, name) if progress else None)
-        margins.update(_margins(out))
+        values = [axis.numbers() for axis in axes]
+        found = surveyed(Survey.of(file, scene, scene.source))
+        for where in np.ndindex(found.shape):
+            margins[Base(*(own[k] for own, k in zip(values, where, strict=True)))] = float(found[where])
 
     survey("all", list(_axes(robot, region)))
     step, turn = region.step, TURN
@@ -219,15 +219,6 @@ def _around(robot: str, region: Region, base: Base, step: float, turn: float) ->
 def _axis(name: str, robot: str, values: Array) -> NumberAxis:
     numbers = tuple(dict.fromkeys(np.round(values, 6).tolist()))
     return NumberAxis(name=name, of=f"base.{name}", robot=robot, values=numbers)
-
-
-def _margins(store: Path) -> Iterator[tuple[Base, float]]:
-    """Yield the bases of a survey, and the margin (m) of the best plan there, NaN where none exists."""
-    _, results = open_results(store)
-    margin = results["plan_margin"].where(results["plan"]).values
-    values = [results[name].values.tolist() for name in ("x", "y", "z", "yaw_deg")]
-    for where in np.ndindex(margin.shape):
-        yield Base(*(own[k] for own, k in zip(values, where, strict=True))), float(margin[where])
 
 
 def _best(margins: dict[Base, float], most: int, step: float) -> list[Base]:

@@ -10,6 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from dask import config
 from distributed import Client, LocalCluster, as_completed
 from distributed.security import Security
@@ -17,10 +18,10 @@ from distributed.security import Security
 from symgrasp.engine.threads import CORES, use_cores
 from symgrasp.errors import SurveyError
 from symgrasp.survey.evaluation import Evaluator
-from symgrasp.survey.store import SurveyStore, create_store
+from symgrasp.survey.store import SurveyStore, create_store, open_results
 from symgrasp.survey.survey import Survey
 
-__all__ = ["Done", "cluster", "run_on", "run_survey"]
+__all__ = ["Done", "cluster", "plan_margins_on", "run_on", "run_survey"]
 
 AHEAD = 3
 """Batches for each thread of the cluster that are submitted before their turn, so that none waits."""
@@ -99,6 +100,26 @@ def run_on(
             running.add(following)
 
 
+def plan_margins_on(
+    client: Client, folder: Path, progress: Callable[[Done], None] | None, survey: Survey
+) -> np.ndarray:
+    """Run a survey that asks for plans on a cluster that is there; see `symgrasp.survey.placement.Surveyed`.
+
+    Args:
+        client: of the cluster.
+        folder: of the stores of such surveys, by their names; what is there from an earlier call is used.
+        progress: see `run_on`.
+        survey: the survey.
+
+    Raises:
+        SurveyError: a store is another survey's, or the cluster was lost.
+    """
+    out = folder / f"{survey.file.name}.zarr"
+    run_on(client, survey, out, progress)
+    _, results = open_results(out)
+    return results["plan_margin"].where(results["plan"]).values
+
+
 def _result(future: Any) -> int:
     """Return the batch that was computed."""
     if future.status in ("cancelled", "lost"):
@@ -133,7 +154,9 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
         "distributed.scheduler.allowed-failures": FAILURES,
         "distributed.scheduler.work-stealing": False,
         "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.interval": "1s",  # by default 50 times a second, in every process
         "distributed.admin.tick.limit": "60s",
+        "distributed.admin.system-monitor.interval": "10s",
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],
     }
@@ -176,9 +199,9 @@ def run_batch(shared: tuple[Mapping[str, Any], str], batch: int) -> int:
         shared: the survey as plain data, and the folder of the store.
         batch: the number of the batch.
     """
-    use_cores(1)
     key = id(shared)
     if getattr(_own, "key", None) != key:
+        use_cores(1)
         if hasattr(_own, "evaluator"):
             _own.evaluator.close()
         survey = Survey.from_dict(shared[0])

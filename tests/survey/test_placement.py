@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from symgrasp.survey import placement
 from symgrasp.survey.format import KeepOut
 from symgrasp.survey.placement import Base, Region, kind_of_plan, place_base
 from symgrasp.survey.placement_picture import draw_placement
+from symgrasp.survey.running import plan_margins_on
 from symgrasp.world import open_world, stands_free
 from tests.conftest import load_small
 
@@ -54,7 +56,7 @@ def test_every_base_is_what_a_plan_of_its_own_says(client, tmp_path, monkeypatch
     monkeypatch.setattr(placement, "ROUNDS", 1)
     monkeypatch.setattr(placement, "SEEDS", 1)
     scene = load_small("pick_pour_place", 10, 24, 8)
-    found = place_base(client, scene, "panda", REGION, tmp_path)
+    found = place_base(scene, "panda", REGION, partial(plan_margins_on, client, tmp_path, None))
     expected = {base: brute(scene, base) for base in found.margins}
     assert len(found.margins) > 8
     assert np.allclose(list(found.margins.values()), list(expected.values()), rtol=1e-9, equal_nan=True)
@@ -71,7 +73,7 @@ def test_nothing_stands_where_it_may_not(client, tmp_path, monkeypatch):
     scene = load_small("bottle_on_table", 6, 12, 4)
     region = Region((0.0, 0.65), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), 0.65, (KeepOut(x=(-1, 0.1), y=(-1, 1)),))
     with pytest.raises(NoPlanError, match="none of 2 bases of panda"):  # kept out, and inside the bottle
-        place_base(client, scene, "panda", region, tmp_path)
+        place_base(scene, "panda", region, partial(plan_margins_on, client, tmp_path, None))
 
 
 @pytest.mark.parametrize(
