@@ -18,6 +18,7 @@ __all__ = [
     "Compiling",
     "ComputedMap",
     "Failure",
+    "Part",
     "Pipe",
     "ProgressReport",
     "Result",
@@ -66,6 +67,13 @@ class ComputedMap:
 
     map: FeasibilityMap
     contacts: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """From the process: what the call has found so far."""
+
+    value: Any
 
 
 @dataclass(frozen=True, eq=False)

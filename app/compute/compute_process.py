@@ -31,16 +31,21 @@ from ..state.requests import (
     MapResult,
     Maps,
 )
-from .channel import Call, Cancel, Compiling, ComputedMap, Failure, ProgressReport
+from ..state.survey import Stand, SurveyRequest
+from .channel import Call, Cancel, Compiling, ComputedMap, Failure, Part, ProgressReport
 from .limits import MEMORY_LIMIT
 from .plan_service import MotionOutcome, MotionRequest, OpenedPlan, PlanOutcome, PlanRequest
 from .process_pool import ProcessPool, WorkerProcess
+from .survey_service import SurveyPart
 from .turns import Place
 
 __all__ = ["ComputeProcess", "ProcessDied"]
 
 POLL_INTERVAL = 0.05
 """Longest time (s) between two checks for a cancel while the process sends nothing."""
+
+STEP_ASIDE = 0.01
+"""The same (s) of one in the background, which others may need the cores of at any time."""
 
 CANCEL_TIMEOUT = 10.0
 """Time (s) after a cancel until the process is killed: compiled code cannot be interrupted. Compiling
@@ -69,6 +74,8 @@ class ComputeProcess:
         compiling: called when the process begins to compile code.
         waiting: called while others have to compute first.
         preliminary: called with a coarse map that is to be shown until the exact one is computed.
+        part: called with what a survey has found so far.
+        background: whether it computes only while nobody else does.
     """
 
     def __init__(
@@ -78,10 +85,13 @@ class ComputeProcess:
         compiling: Callable[[], None] = lambda: None,
         waiting: Callable[[], None] = lambda: None,
         preliminary: Callable[[MapResult], None] = lambda _: None,
+        part: Callable[[SurveyPart], None] = lambda _: None,
+        *,
+        background: bool = False,
     ) -> None:
         self._pool, self._keep, self._compiling, self._waiting = pool, keep, compiling, waiting
-        self._preliminary = preliminary
-        self._place = Place(pool.turns)
+        self._preliminary, self._part = preliminary, part
+        self._place = Place(pool.turns, background=background)
         self._process: WorkerProcess | None = None
         self._planner: WorkerProcess | None = None
         self._requests: dict[tuple[str, str], MapRequest] = {}
@@ -185,6 +195,10 @@ class ComputeProcess:
         """Find the first of some plans that has a motion; see `PlanService.motion`."""
         return self._call("motion", progress, request)
 
+    def survey(self, request: SurveyRequest, progress: Progress) -> tuple[Stand, ...]:
+        """Find out where the object or the robot may stand; see `SurveyService.survey`."""
+        return self._call("survey", progress, request)
+
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
         """Read and verify a plan file; see `PlanService.open`."""
         return self._call("open", progress, content, name, reads=name)
@@ -246,6 +260,8 @@ class ComputeProcess:
             self.close()
         if self._process is None:
             self._process = self._pool.take()
+            if self._place.background:
+                self._process.give_way()
         return self._process
 
     def _await_end(self, process: WorkerProcess, since: float, progress: Progress) -> None:
@@ -257,7 +273,7 @@ class ComputeProcess:
                     self._receive_map(message)
                 elif isinstance(message, Compiling):
                     process.compiling = True
-                elif isinstance(message, ProgressReport):
+                elif isinstance(message, ProgressReport | Part):
                     process.compiling = False
                 else:
                     process.cancelled_at, process.compiling = None, False
@@ -279,7 +295,7 @@ class ComputeProcess:
                 finally:
                     process.resume()
                 heard = time.monotonic()
-            if not channel.poll(POLL_INTERVAL):
+            if not channel.poll(STEP_ASIDE if self._place.background else POLL_INTERVAL):
                 if reads and time.monotonic() - heard > READING_TIMEOUT:
                     self.close()
                     raise ProcessDied(f"{reads} takes longer to read than {READING_TIMEOUT:g} s")
@@ -293,6 +309,8 @@ class ComputeProcess:
                 progress(share)
             elif isinstance(message, ComputedMap):
                 self._receive_map(message)
+            elif isinstance(message, Part):
+                self._part(message.value)
             elif isinstance(message, Compiling):
                 self._compiling()
             elif isinstance(message, Failure):

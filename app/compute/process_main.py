@@ -21,10 +21,11 @@ from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
 
 from ..state.requests import MapRequest
-from .channel import Call, Cancel, Channel, Compiling, ComputedMap, Failure, ProgressReport, Result
+from .channel import Call, Cancel, Channel, Compiling, ComputedMap, Failure, Part, ProgressReport, Result
 from .limits import limit_memory, ran_out_of_memory
 from .map_service import MapService
 from .plan_service import PlanService
+from .survey_service import SurveyService
 from .upload_service import UploadService
 
 __all__ = ["serve"]
@@ -76,6 +77,7 @@ class _Server:
             "plan": plans.plan, "more": plans.more, "motion": plans.motion, "open": plans.open,
             "read_scene": uploads.read_scene, "file_kind": uploads.file_kind,
             "measure": uploads.measure, "mount": uploads.mount,
+            "survey": SurveyService(lambda part: channel.send(Part(part))).survey,
             "read_robot": uploads.read_robot, "put_robot": uploads.put_robot, "rearm": uploads.rearm,
         }  # fmt: skip
 

@@ -20,6 +20,10 @@ PROCESSES = multiprocessing.get_context("forkserver")
 PROCESSES.set_forkserver_preload([f"{__package__}.preload"])
 
 
+LEAST = 19
+"""The niceness of a process with the lowest priority."""
+
+
 class WorkerProcess:
     """A process that answers calls, and the channel to it; started at once.
 
@@ -55,6 +59,11 @@ class WorkerProcess:
     def is_alive(self) -> bool:
         """Whether the process runs."""
         return self._process.is_alive()
+
+    def give_way(self) -> None:
+        """Let it compute only where no other process needs the core, for good."""
+        with suppress(ProcessLookupError):
+            os.setpriority(os.PRIO_PROCESS, self.pid, LEAST)
 
     def pause(self) -> None:
         """Stop the process until it is resumed."""

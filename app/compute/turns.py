@@ -30,30 +30,43 @@ class Turns:
         self._count = count
         self._changed = threading.Condition()
         self._line: deque[Place] = deque()
+        self._background: deque[Place] = deque()
         self._running = 0
+        self._in_background = 0
+
+    def _line_of(self, place: Place) -> deque[Place]:
+        return self._background if place.background else self._line
 
     def _join(self, place: Place) -> None:
         with self._changed:
             place._wanted = True
-            if place not in self._line:
-                self._line.append(place)
+            line = self._line_of(place)
+            if place not in line:
+                line.append(place)
 
     def _admit(self, place: Place) -> bool:
         """Wait for a moment; return whether it is this place's turn, which begins then."""
 
+        line = self._line_of(place)
+
         def is_next() -> bool:
+            if place.background and (self._in_background or self._is_needed):
+                return False
             if self._running == self._count:
                 return False
-            while not self._line[0]._wanted:
-                self._line.popleft()
-            return self._line[0] is place
+            while not line[0]._wanted:
+                line.popleft()
+            return line[0] is place
 
         with self._changed:
             if not self._changed.wait_for(is_next, POLL_INTERVAL):
                 return False
-            self._line.popleft()
-            self._running += 1
-            place.cores = max(1, self._count // self._running)
+            line.popleft()
+            if place.background:
+                self._in_background, place.cores = 1, self._count
+            else:
+                self._running += 1
+                place.cores = max(1, self._count // self._running)
             self._changed.notify_all()
             return True
 
@@ -62,15 +75,25 @@ class Turns:
             place._wanted = False
             self._changed.notify_all()
 
-    def _leave(self) -> None:
+    def _leave(self, place: Place) -> None:
         with self._changed:
-            self._running -= 1
+            if place.background:
+                self._in_background = 0
+            else:
+                self._running -= 1
             self._changed.notify_all()
 
     @property
-    def _is_awaited(self) -> bool:
+    def _is_needed(self) -> bool:
+        """Whether anybody computes, or waits to, who goes before what runs in the background."""
+        return self._running > 0 or any(place._wanted for place in self._line)
+
+    def _is_over(self, place: Place) -> bool:
         with self._changed:
-            return any(place._wanted for place in self._line)
+            if place.background and self._is_needed:
+                return True
+            is_awaited = any(other._wanted for other in self._line_of(place))
+            return is_awaited and time.monotonic() - place._since > SLICE
 
 
 class Place:
@@ -81,13 +104,15 @@ class Place:
 
     Args:
         turns: the line.
+        background: whether to compute only while nobody else does, and to make room for others at once.
 
     Attributes:
+        background: as given.
         cores: how many cores may be used during the turn.
     """
 
-    def __init__(self, turns: Turns) -> None:
-        self._turns = turns
+    def __init__(self, turns: Turns, *, background: bool = False) -> None:
+        self._turns, self.background = turns, background
         self._wanted = self._held = False
         self._since = 0.0
         self.cores = 0
@@ -107,8 +132,8 @@ class Place:
 
     @property
     def is_over(self) -> bool:
-        """Whether the turn has lasted for `SLICE` and somebody waits."""
-        return time.monotonic() - self._since > SLICE and self._turns._is_awaited
+        """Whether the turn has lasted for `SLICE` and somebody waits, or others go first anyway."""
+        return self._turns._is_over(self)
 
     def renew(self, waiting: Callable[[], None]) -> None:
         """Let others go first, and wait for the rest of the turn; see `turn`."""
@@ -128,4 +153,4 @@ class Place:
     def _end(self) -> None:
         if self._held:
             self._held = False
-            self._turns._leave()
+            self._turns._leave(self)

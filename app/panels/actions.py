@@ -10,7 +10,7 @@ import viser
 from ..state.plan_results import PlanKind
 from ..state.state import State
 
-__all__ = ["Actions", "Change", "PlanActions"]
+__all__ = ["Actions", "Change", "PlanActions", "SurveyActions"]
 
 Change = Callable[[State], State]
 """Returns the new state, or raises a `SymgraspError`, which the page shows."""
@@ -35,12 +35,27 @@ class PlanActions(Protocol):
         """Send the plan to the browser in a format, a key of `app.files.plan_formats.FORMATS`."""
 
 
+class SurveyActions(Protocol):
+    """Actions about surveys, which run in the background."""
+
+    def run(self) -> None:
+        """Run the survey of what is shown, in place of the one under way."""
+
+    def stop(self) -> None:
+        """Stop the survey under way; what it has found stays."""
+
+
 class Actions(Protocol):
     """All actions; they return at once, computations run on the thread of the job queue."""
 
     @property
     def plans(self) -> PlanActions:
         """The actions about plans."""
+        ...
+
+    @property
+    def surveys(self) -> SurveyActions:
+        """The actions about surveys."""
         ...
 
     def change(self, change: Change, origin: str = "") -> None:

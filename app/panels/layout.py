@@ -22,6 +22,7 @@ from .robot_panel import RobotPanel
 from .scene_panel import ScenePanel
 from .sequence_panel import SequencePanel, TasksPanel
 from .status_panel import NotesPanel, StatusPanel
+from .survey_panel import SurveyPanel
 
 __all__ = ["Layout", "panel_widths"]
 
@@ -81,6 +82,8 @@ class Layout:
                 PlanPanel(gui, actions),
                 PlanFilePanel(gui, actions),
             ]
+        with left.add_tab("Survey", viser.Icon.GRID_DOTS):
+            survey_tab = [NotesPanel(gui, actions), SurveyPanel(gui, actions)]
         with left.add_tab("Files", viser.Icon.FILES):
             files_tab = [NotesPanel(gui, actions), FilesPanel(gui, actions)]
         left.dock_left()
@@ -94,7 +97,9 @@ class Layout:
             ObjectPanel(gui, actions),
             Keyboard(gui, actions, scenes),
         ]
-        self.panels: tuple[Panel, ...] = (*map_tab, *sequence_tab, *hands_tab, *files_tab, *main)
+        self.panels: tuple[Panel, ...] = (
+            *map_tab, *sequence_tab, *hands_tab, *survey_tab, *files_tab, *main,
+        )  # fmt: skip
 
     def show(self, state: State) -> None:
         """Update the outputs of the panels to a state."""

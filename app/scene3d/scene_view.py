@@ -19,6 +19,7 @@ from .ghost_view import GhostView
 from .nodes import set_pose
 from .object_view import ObjectView
 from .robot_view import RobotView
+from .survey_view import SurveyView
 from .tool_path import ToolPath
 from .viewpoint import FIELD_OF_VIEW, choose_viewpoint
 
@@ -35,6 +36,8 @@ class SceneView:
         on_flat_map: called with the cell that was clicked on the flat map.
         on_drag: called with the pose (4, 4) that the object's gizmo was dragged to.
         on_base_drag: called with the pose (4, 4) that the robot's gizmo was dragged to.
+        on_place: called with the index of a place of a survey that was clicked.
+        on_stand: called with the index of one of the best bases that was clicked.
 
     Attributes:
         camera: the camera to show the next scene from; None for a viewpoint that suits the scene.
@@ -49,10 +52,13 @@ class SceneView:
         on_flat_map: Callable[[int, int], None],
         on_drag: Callable[[Array], None],
         on_base_drag: Callable[[Array], None],
+        on_place: Callable[[int], None] = lambda _: None,
+        on_stand: Callable[[int], None] = lambda _: None,
     ) -> None:
         self.client = client
         self.on_surface, self.on_flat_map = on_surface, on_flat_map
         self.on_drag, self.on_base_drag = on_drag, on_base_drag
+        self.on_place, self.on_stand = on_place, on_stand
         self._first_width: int | None = width
         self._scene: Scene | None = None
         self._builds = self._ghosts = 0
@@ -86,6 +92,7 @@ class SceneView:
                 self.ghost.show(state)
             self.object.show(state, move_gizmo=move_gizmo)
             self.tool_path.show(state)
+            self.survey.show(state)
             self.base_gizmo.visible = state.display.base_handles
             if move_gizmo:
                 set_pose(self.base_gizmo, state.robot.T_world_base)
@@ -123,6 +130,7 @@ class SceneView:
             for k, (name, robot) in enumerate(scene.robots.items())
         }
         self.tool_path = ToolPath(client, root)
+        self.survey = SurveyView(client, f"{root}/survey", self.on_place, self.on_stand)
         self.base_gizmo = client.scene.add_transform_controls(
             f"{root}/base_gizmo", scale=0.3, line_width=3.0, depth_test=False, visible=False
         )

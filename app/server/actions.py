@@ -27,6 +27,7 @@ from .browser_messages import UploadButton
 from .plan_actions import PlanActions
 from .session_api import SessionApi
 from .snapshot import snapshot_html
+from .survey_actions import SurveyActions
 from .viser_server import end_upload, hide_upload
 
 __all__ = ["Actions", "camera_of"]
@@ -42,6 +43,7 @@ class Actions:
         client: the browser.
         cache: what all sessions share.
         process: computes for this session.
+        surveys: the actions about surveys.
         address: that the page was opened at, without the query.
         upload_buttons: uuid → a button that takes files; they are added here.
     """
@@ -52,12 +54,13 @@ class Actions:
         client: viser.ClientHandle,
         cache: SharedCache,
         process: ComputeProcess,
+        surveys: SurveyActions,
         address: str,
         upload_buttons: dict[str, UploadButton],
     ) -> None:
         self._session, self._client, self._cache = session, client, cache
         self._process, self._address, self._upload_buttons = process, address, upload_buttons
-        self.plans = PlanActions(session, process, cache)
+        self.plans, self.surveys = PlanActions(session, process, cache), surveys
         self.change = session.change
         self._refused_mesh: tuple[str, bytes] | None = None
 

@@ -24,7 +24,7 @@ from ..files.links import Link
 from ..files.shown_paths import shown_paths
 from ..panels.layout import Layout
 from ..scene3d.scene_view import SceneView
-from ..state import changes, job_changes, robot_changes
+from ..state import changes, job_changes, robot_changes, survey_changes
 from ..state.page_link import Camera
 from ..state.plan_changes import change_plan_results
 from ..state.plan_results import PlanResults
@@ -34,6 +34,7 @@ from ..state.undo import remember
 from .actions import Actions, camera_of
 from .front_door import BrowserConnection, Visit
 from .playback_clock import PlaybackClock
+from .survey_actions import SurveyActions
 
 __all__ = ["Session"]
 
@@ -89,6 +90,7 @@ class Session:
             lambda result: self.change(lambda s: job_changes.preliminary_arrived(s, result)),
         )
         self.jobs = JobQueue(f"jobs {client.client_id}", self.process.close)
+        self.surveys = SurveyActions(self, pool, client.client_id)
         try:
             self._build_page()
         except BaseException:
@@ -99,7 +101,9 @@ class Session:
         """Add everything to the page, start the drawing thread, and open the first scene."""
         client = self.client
         buttons = self._connection.upload_buttons
-        self.actions = Actions(self, client, self.cache, self.process, self.visit.address, buttons)
+        self.actions = Actions(
+            self, client, self.cache, self.process, self.surveys, self.visit.address, buttons
+        )
         self.layout = Layout(client, self.actions, self.cache.names)
         self.scene_view = SceneView(
             client,
@@ -108,6 +112,8 @@ class Session:
             on_flat_map=lambda i, j: self.change(lambda s: changes.choose_cell(s, i, j)),
             on_drag=lambda pose: self.change(lambda s: changes.drag(s, pose), "gizmo"),
             on_base_drag=lambda pose: self.change(lambda s: robot_changes.robot_dragged(s, pose), "gizmo"),
+            on_place=lambda k: self.change(lambda s: survey_changes.choose_place(s, k)),
+            on_stand=lambda k: self.change(lambda s: survey_changes.stand_at(s, k)),
         )
 
         @client.camera.on_update
@@ -120,11 +126,12 @@ class Session:
         self._open_first()
 
     def close(self) -> None:
-        """End both threads and the process; a second call does nothing."""
+        """End all threads and processes; a second call does nothing."""
         with self._changed:
             self._closed = True
             self._changed.notify()
         self.jobs.close()
+        self.surveys.close()
 
     def send(self, name: str, content: bytes) -> None:
         """Send a file to the browser."""

@@ -65,6 +65,7 @@ def open_scene(state: State, scene: Scene, name: str) -> State:
         uploaded_scene=state.uploaded_scene,
         uploaded_robot=state.uploaded_robot,
         map_view=state.map_view.for_another_scene(),
+        survey=state.survey,
         display=replace(state.display, drag_handles=False, base_handles=False, symmetry_error=False),
         history=state.history,
     )

@@ -32,6 +32,7 @@ from .object_pose import ObjectPose, with_poses
 from .page_link import PageLink
 from .plan_results import PlanKind, PlanResult, PlanResults
 from .requests import Busy, ExplainRequest, MapRequest, MapResult, Request
+from .survey import Places, SurveyRequest, SurveyState
 
 __all__ = ["Pick", "State"]
 
@@ -74,6 +75,7 @@ class State:
         map_view: how the map is shown, and what was computed for it.
         plan_results: the results of planners, and which part is shown.
         step: index of the plan's task that is shown; None once something else is shown.
+        survey: what is known and shown of surveys.
         busy: the computation under way.
         refused: the request that was cancelled or failed and is not restarted by itself.
         problem: one line about the last error.
@@ -101,6 +103,7 @@ class State:
     map_view: MapViewState = field(default_factory=MapViewState)
     plan_results: PlanResults = field(default_factory=PlanResults)
     step: int | None = None
+    survey: SurveyState = field(default_factory=SurveyState)
     busy: Busy | None = None
     refused: Request | None = None
     problem: str = ""
@@ -227,6 +230,22 @@ class State:
             return self.is_current
         follows = self.result is not None and self.result.request.differs_only_in_pose(self.request)
         return follows and self.busy is not None and not self.is_waiting
+
+    # -- surveys ----------------------------------------------------------------------------
+
+    @cached
+    def survey_request(self) -> SurveyRequest:
+        """The survey of what is shown now."""
+        kind = self.survey.kind
+        return SurveyRequest(self.scene, self.poses, self.task, self.arm, kind, self.survey.spacing[kind])
+
+    @cached
+    def shown_places(self) -> Places | None:
+        """What is known of places, if it is about what is shown now."""
+        survey = self.survey
+        if survey.places is None or survey.request is None:
+            return None
+        return survey.places if survey.request.subject == self.survey_request.subject else None
 
     # -- the map and the picked grasp -------------------------------------------------------
 

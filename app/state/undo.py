@@ -13,6 +13,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from ..choices.scene_assets import NO_ASSETS
 from .history import History
 from .state import State
+from .survey import SurveyState
 
 __all__ = ["PLANS_KEPT", "UPLOADS_KEPT", "redo", "remember", "undo"]
 
@@ -69,8 +70,9 @@ def _without_results(state: State) -> State:
     """Return a state without computed results; plans are kept, since planning again takes time."""
     map_view = state.map_view.without_results()
     return replace(
-        state, history=History(), map_view=map_view, result=None, refused=None, busy=None, problem=""
-    )
+        state, history=History(), map_view=map_view, survey=SurveyState(), result=None, refused=None,
+        busy=None, problem="",
+    )  # fmt: skip
 
 
 def _with_few_uploads(past: tuple[State, ...]) -> tuple[State, ...]:
@@ -109,4 +111,5 @@ def _restored(present: State, restored: State, history: History[State]) -> State
         result=result,
         plan_results=restored.plan_results.paused(),
         link=present.link,
+        survey=present.survey,
     )

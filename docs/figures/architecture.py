@@ -40,7 +40,7 @@ PLACES = {
     "symgrasp.world": Place(2, 5), "symgrasp.collision": Place(0, 2),
     "symgrasp.engine": Place(2, 6), "symgrasp.feasibility": Place(2, 7),
     "symgrasp.plan": Place(2, 8), "symgrasp.planners": Place(2, 9), "symgrasp.motion": Place(1, 9.5),
-    "symgrasp.survey": Place(2, 10), "symgrasp.bench": Place(2, 11),
+    "symgrasp.survey": Place(2, 9.68), "symgrasp.bench": Place(2, 11),
     "symgrasp.cli": Place(2, 12), "symgrasp.__main__": Place(1, 13),
     "app.choices": Place(5.75, 9), "app.state": Place(5, 10), "app.files": Place(6, 11),
     "app.render": Place(5, 11),

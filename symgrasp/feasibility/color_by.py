@@ -11,7 +11,9 @@ import numpy as np
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
-__all__ = ["ColorBy", "ColoredMap", "Scale", "Swatch", "color_map"]
+__all__ = [
+    "FEASIBLE", "INFEASIBLE", "NONE", "SCALE", "ColorBy", "ColoredMap", "Scale", "Swatch", "color_map",
+]  # fmt: skip
 
 
 class ColorBy(StrEnum):

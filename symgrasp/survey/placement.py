@@ -61,9 +61,8 @@ class Base(NamedTuple):
         return pose
 
     def is_near(self, other: Base, step: float) -> bool:
-        """Whether another base is closer than a step (m), and not turned by `TURN` or more."""
-        apart = abs((self.yaw_deg - other.yaw_deg + 180) % 360 - 180)
-        return math.dist(self[:3], other[:3]) < step - 1e-9 and apart < TURN - 1e-9
+        """Whether another base is closer than a step (m), whatever their turns."""
+        return math.dist(self[:3], other[:3]) < step - 1e-9
 
 
 @dataclass(frozen=True)

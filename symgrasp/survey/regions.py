@@ -24,9 +24,15 @@ class Rectangle(NamedTuple):
     y: tuple[float, float]
 
     def grid(self, spacing: float) -> tuple[Array, Array]:
-        """Return coordinates x (n,) and y (m,) of points at most a spacing (m) apart, corners included."""
-        x, y = (np.linspace(*own, 1 + math.ceil((own[1] - own[0]) / spacing - 1e-9)) for own in self)
-        return np.round(x, 6), np.round(y, 6)
+        """Return the multiples of a spacing (m) within, at least one: coordinates x (n,) and y (m,)."""
+        found = []
+        for low, high in self:
+            first, last = math.ceil(low / spacing - 1e-9), math.floor(high / spacing + 1e-9)
+            middle = round((low + high) / 2 / spacing)
+            found.append(
+                np.round(np.arange(first, last + 1) * spacing if first <= last else [middle * spacing], 6)
+            )
+        return found[0], found[1]
 
 
 def length_of_arm(scene: Scene, arm: str) -> float:

@@ -136,3 +136,50 @@ def test_nobody_has_to_stop_for_nobody(monkeypatch):
     place = Place(Turns(1))
     with place.turn(never):
         assert not place.is_over
+
+
+def test_what_runs_in_the_background_waits_while_anybody_computes():
+    turns = Turns(2)
+    survey, waited = Place(turns, background=True), []
+
+    def wait() -> None:
+        waited.append(None)
+        if len(waited) == 3:
+            raise Cancelled
+
+    with Place(turns).turn(never), pytest.raises(Cancelled), survey.turn(wait):
+        raise AssertionError
+    with survey.turn(never):
+        assert survey.cores == 2
+
+
+def test_what_runs_in_the_background_makes_room_at_once_and_takes_no_core_from_others():
+    turns = Turns(2)
+    survey, one = Place(turns, background=True), Place(turns)
+    with survey.turn(never):
+        assert not survey.is_over
+        with one.turn(never):  # it does not wait until the survey has stopped
+            assert survey.is_over
+            assert one.cores == 2
+        assert not survey.is_over
+
+
+def test_surveys_take_turns(monkeypatch):
+    monkeypatch.setattr(module, "SLICE", 0.0)
+    turns, order = Turns(2), []
+    one, two = Place(turns, background=True), Place(turns, background=True)
+    stands = threading.Event()
+
+    def other() -> None:
+        with two.turn(stands.set):
+            order.append("two")
+
+    with one.turn(never):
+        thread = threading.Thread(target=other)
+        thread.start()
+        assert stands.wait(WAIT)
+        assert one.is_over
+        one.renew(lambda: None)
+        order.append("one")
+    thread.join(WAIT)
+    assert order == ["two", "one"]
