@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench robots grids cells
+.PHONY: app test figures schemas bench surveys robots grids cells
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -37,6 +37,10 @@ schemas: $(VENV)/dev.stamp  ## write the JSON Schemas of the file formats again
 bench: $(VENV)/dev.stamp  ## measure, and write the README's table of times (minutes)
 	$(BIN)/symgrasp bench --out docs/bench.json
 	$(BIN)/python -m docs.speed
+
+surveys: $(VENV)/dev.stamp  ## measure what surveys cost, and write it to docs/surveys.md (minutes)
+	$(BIN)/symgrasp bench survey --out docs/surveys.json
+	$(BIN)/python -m docs.surveys
 
 robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write the table of docs/robots.md (minutes)
 	$(BIN)/symgrasp bench robots --out docs/robots.json

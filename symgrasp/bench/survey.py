@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, process_time
+from typing import NamedTuple
 
 import psutil
 
@@ -126,27 +127,41 @@ def efficiency(side: int, rounds: int) -> Iterator[Figure]:
     CPU time tells this on a busy machine too, where two processes do not have a core each.
     """
     survey = _survey(side, GRID)
-    clock, cpu = [], []
+    clock, cpu, handing = [], [], []
     for _ in range(rounds):
         one, two = _rate(survey, 1), _rate(survey, 2)
-        clock.append(one.wall / two.wall)
-        cpu.append(2 * one.cpu / two.cpu)
+        clock.append(one.point.wall / two.point.wall)
+        cpu.append(2 * one.point.cpu / two.point.cpu)
+        handing.append(1e3 * two.handing)
     yield Figure("a survey in two processes, over one", "×", tuple(clock))
     yield Figure("  in CPU time", "×", tuple(cpu))
+    yield Figure("  CPU time of the scheduler and the client for a batch", "ms", tuple(handing))
 
 
-def _rate(survey: Survey, workers: int) -> Time:
-    """Return the time (s) for a point once all workers are at work, by the clock and in CPU time of all."""
-    seen: list[tuple[int, float, float]] = []
+class _Rate(NamedTuple):
+    """What a survey takes once all workers are at work.
+
+    Attributes:
+        point: the time (s) for a point, by the clock and in CPU time of the workers.
+        handing: the CPU time (s) of the process of scheduler and client for a batch.
+    """
+
+    point: Time
+    handing: float
+
+
+def _rate(survey: Survey, workers: int) -> _Rate:
+    """Run a survey and return what it takes."""
+    seen: list[tuple[int, float, float, float]] = []
 
     def note(done: Done) -> None:
-        seen.append((done.points, perf_counter(), _spent()))
+        seen.append((done.points, perf_counter(), _spent(), process_time()))
 
     with TemporaryDirectory() as folder:
         run_survey(survey, Path(folder) / "bench.zarr", workers=workers, progress=note)
-    first, last = seen[len(seen) // 4], seen[-1]  # all have computed a batch by then
-    points = last[0] - first[0]
-    return Time((last[1] - first[1]) / points, (last[2] - first[2]) / points)
+    first = len(seen) // 4  # all have computed a batch by then
+    points, wall, cpu, own = (b - a for a, b in zip(seen[first], seen[-1], strict=True))
+    return _Rate(Time(wall / points, cpu / points), own / (len(seen) - 1 - first))
 
 
 def _spent() -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from dask import config
 from distributed import Client, LocalCluster, as_completed
+from distributed.comm.core import CommClosedError
 from distributed.security import Security
 
 from symgrasp.engine.threads import CORES, use_cores
@@ -122,9 +124,12 @@ def plan_margins_on(
 
 def _result(future: Any) -> int:
     """Return the batch that was computed."""
-    if future.status in ("cancelled", "lost"):
-        raise SurveyError("scheduler", "state", "lost", "a cluster that goes on running; run it again")
-    return future.result()
+    try:
+        if future.status not in ("cancelled", "lost"):
+            return future.result()
+    except (CommClosedError, CancelledError):
+        pass  # the scheduler was lost while it was asked for the result
+    raise SurveyError("scheduler", "state", "lost", "a cluster that goes on running; run it again")
 
 
 def _size(survey: Survey, batch: int) -> int:
@@ -160,7 +165,7 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],
     }
-    with config.set(settings):
+    with config.set(settings), _quiet():
         if scheduler is not None:
             try:
                 client = Client(scheduler, timeout=10, set_as_default=False)
@@ -184,6 +189,18 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
             Client(local, set_as_default=False) as client,
         ):
             yield client
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what Dask logs of connections that were lost out of what people read: an error says it."""
+    log = logging.getLogger("distributed")
+    before = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
 
 
 _own = threading.local()

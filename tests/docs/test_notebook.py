@@ -1,7 +1,8 @@
-"""The notebook that walks through the paper runs from top to bottom and shows what it promises."""
+"""The notebooks run from top to bottom and show what they promise."""
 
 from __future__ import annotations
 
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -9,14 +10,21 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
+from symgrasp.object.library import library_objects
+
 ROOT = Path(__file__).parent.parent.parent
 NOTEBOOK = ROOT / "docs/paper.ipynb"
+NOTEBOOKS = sorted((ROOT / "docs").glob("*.ipynb"))
 
 
 @pytest.fixture(scope="module")
 def executed(tmp_path_factory) -> nbformat.NotebookNode:
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
-    folder = tmp_path_factory.mktemp("notebook")
+    return execute(NOTEBOOK, tmp_path_factory.mktemp("notebook"))
+
+
+def execute(path: Path, folder: Path) -> nbformat.NotebookNode:
+    """Run a notebook in a folder."""
+    notebook = nbformat.read(path, as_version=4)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(ROOT))
         client = NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(folder)}})
@@ -36,10 +44,15 @@ def cell_with(notebook: nbformat.NotebookNode, text: str) -> nbformat.NotebookNo
     return next(cell for cell in notebook.cells if cell.cell_type == "code" and text in cell.source)
 
 
+def printed(notebook: nbformat.NotebookNode, stream: str = "stdout") -> str:
+    """What its cells print."""
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    return "".join(output.text for output in outputs if output.get("name") == stream)
+
+
 def test_it_runs_and_warns_of_nothing(executed):
-    outputs = [output for cell in executed.cells for output in cell.get("outputs", [])]
-    assert outputs
-    assert not [output for output in outputs if output.get("name") == "stderr"]
+    assert printed(executed)
+    assert not printed(executed, "stderr")
 
 
 def test_maps_and_plans_show_pictures_and_the_3d_view(executed):
@@ -52,9 +65,31 @@ def test_maps_and_plans_show_pictures_and_the_3d_view(executed):
     assert "__VISER_EMBED_DATA__" in frame
 
 
-def test_it_is_kept_without_outputs():
-    for cell in nbformat.read(NOTEBOOK, as_version=4).cells:
+def test_the_atlas_shows_every_object_of_the_library(tmp_path):
+    done = execute(ROOT / "docs/atlas.ipynb", tmp_path)
+    assert not printed(done, "stderr")
+    for name in library_objects():
+        assert re.search(rf"^{name} +\d+ % of the grasps, held at +\d+ % of the places$", printed(done), re.M)
+    assert kinds(cell_with(done, '"share")')) == ["image/png"]
+    assert kinds(cell_with(done, "feasible angles")) == ["image/png"]
+
+
+def test_one_of_two_grippers_is_chosen(tmp_path):
+    done = execute(ROOT / "docs/grippers.ipynb", tmp_path)
+    assert not printed(done, "stderr")
+    means = {
+        hand: float(mean)
+        for hand, mean in re.findall(r"^(\w+): +([\d.]+) % in the mean", printed(done), re.M)
+    }
+    assert len(means) == 2
+    assert printed(done).rstrip().endswith(f"catalogue: {max(means, key=lambda hand: means[hand])}")
+    assert kinds(cell_with(done, '"share")')) == ["image/png"]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_is_kept_without_outputs(path):
+    for cell in nbformat.read(path, as_version=4).cells:
         if cell.cell_type == "code":
             assert not cell.outputs
             assert cell.execution_count is None
-    assert "/home/" not in NOTEBOOK.read_text()
+    assert "/home/" not in path.read_text()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +17,14 @@ import psutil
 import pytest
 from distributed import LocalCluster
 
+from app.server.viser_server import any_port
 from symgrasp.cli.main import main
 from symgrasp.errors import SurveyError
 from symgrasp.feasibility.create import create_map
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.evaluation import Evaluator, State
-from symgrasp.survey.results import feasible_cells
+from symgrasp.survey.results import feasible_cells, workspace
 from symgrasp.survey.running import Done, run_survey
 from symgrasp.survey.store import SurveyStore, create_store, open_results
 from symgrasp.survey.survey import Survey
@@ -146,23 +150,84 @@ def test_a_killed_run_goes_on(survey, file, one_go, tmp_path):
     assert content(out) == content(one_go)
 
 
-def test_a_lost_scheduler_leaves_a_good_store(survey, one_go, tmp_path):
-    out = tmp_path / "b.zarr"
-    cluster = threads(1)
+@pytest.fixture
+def started(tmp_path) -> Iterator[Callable[[str, str], subprocess.Popen[bytes]]]:
+    """Start parts of a cluster, each a process of its own; they are killed in the end."""
+    running: list[subprocess.Popen[bytes]] = []
 
-    def stop(done: Done) -> None:
+    def start(*command: str) -> subprocess.Popen[bytes]:
+        program = [sys.executable, "-m", *command, "--no-dashboard"]
+        running.append(subprocess.Popen(program, stderr=subprocess.DEVNULL, cwd=tmp_path))
+        return running[-1]
+
+    yield start
+    for process in running:
+        process.kill()
+        process.wait()
+
+
+def test_a_killed_scheduler_leaves_a_good_store(survey, file, one_go, tmp_path, started, caplog):
+    """The scheduler is killed in the middle of a run on a cluster of separate processes."""
+    out, address = tmp_path / "b.zarr", f"tcp://127.0.0.1:{any_port()}"
+    scheduler = started("distributed.cli.dask_scheduler", "--host", address)
+    for _ in range(2):
+        started("distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny")
+    counts: list[Done] = []
+
+    def kill(done: Done) -> None:
+        counts.append(done)
         if done.points:
-            cluster.close()
+            scheduler.kill()
 
     with pytest.raises(SurveyError, match="run it again"):
-        run_survey(survey, out, scheduler=cluster.scheduler_address, progress=stop)
-    store = SurveyStore(out, survey)
-    missing = store.missing()
-    assert 0 < len(missing) < survey.batches
-    with Evaluator(survey) as evaluator:
-        for batch in missing:
-            store.write(batch, {p: evaluator.point(p) for p in survey.points_of(batch)})
+        run_survey(survey, out, scheduler=address, progress=kill)
+    assert not caplog.records
+    missing = len(SurveyStore(out, survey).missing())
+    assert 0 < missing < survey.batches
+    assert main(["survey", "run", str(file), "--out", str(out), "--workers", "1"]) == 0
     assert content(out) == content(one_go)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 8])
+def test_any_number_of_workers_writes_the_same(survey, one_go, tmp_path, workers):
+    cluster: Any = LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=False, dashboard_address=":0"
+    )
+    with cluster:
+        run_survey(survey, tmp_path / "b.zarr", scheduler=cluster.scheduler_address)
+    assert content(tmp_path / "b.zarr") == content(one_go)
+
+
+def test_the_workspace_of_a_grasp_is_what_the_maps_of_its_places_say(survey, one_go, tmp_path, capsys):
+    """Where may the object stand, for a grasp at a height and roll? Against maps that are computed alone."""
+    _, results = open_results(one_go)
+    h, roll = 0.06, 180
+    found = workspace(survey, results, h, roll).sel(table=-0.05, tilt=0)
+    scene = Scene.load("soda_can").with_settings(heights=3, angles=12, redundancy=4)
+    scene = with_number_of_table(scene, -0.05)
+    row, _ = scene.manifold.cell(h, 0.0)
+    for x in found.x.values:
+        for y in found.y.values:
+            share = float(found.sel(x=x, y=y))
+            if math.isnan(share):
+                continue
+            T = np.array(scene.task().T_world_object)
+            T[:2, 3] = x, y
+            m = create_map(scene.with_task(replace(scene.task(), T_world_object=T)))
+            assert share == pytest.approx(100 * m.feasible[1, row].mean())
+    assert 0 < float((found > 0).mean()) < 1
+    picture = tmp_path / "workspace.png"
+    shown = ["survey", "show", str(one_go), "--grasp", "6", "--roll", "180", "--out", str(picture)]
+    assert main(shown) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def with_number_of_table(scene: Scene, z: float) -> Scene:
+    """Return the scene with its table at another height."""
+    obstacles = [dict(o) for o in scene.content["obstacles"]]
+    (table,) = [o for o in obstacles if o["name"] == "table"]
+    table["pose"] = {**table["pose"], "position": [*table["pose"]["position"][:2], z]}
+    return Scene.from_content({**scene.content, "obstacles": obstacles})
 
 
 def test_damage_is_found(survey, one_go, tmp_path):

@@ -1,0 +1,102 @@
+"""Writes what large surveys cost into docs/surveys.md, from what the benchmark measured: ``make surveys``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from docs.pages import put_between
+from symgrasp.bench.figures import Figure, keyed
+from symgrasp.survey.survey import BATCH
+
+__all__ = ["BEGIN", "END", "MEASURED", "PAGE", "costs", "seconds"]
+
+ROOT = Path(__file__).parent.parent
+PAGE = ROOT / "docs/surveys.md"
+
+MEASURED = ROOT / "docs/surveys.json"
+"""What ``symgrasp bench survey --out`` wrote."""
+
+BEGIN, END = "<!-- measured: make surveys -->", "<!-- end -->"
+
+MILLION, CORES = 1_000_000, 200
+"""Points, and the cores of 100 machines with two each."""
+
+
+def seconds(start: float, point: float, scene: float, points: int, scenes: int, cores: float) -> float:
+    """Return how long (s) a survey takes.
+
+    Args:
+        start: time (s) in which a worker starts.
+        point: CPU time (s) of a point, with all that is written.
+        scene: CPU time (s) of another scene.
+        points, scenes: how many there are.
+        cores: how many cores compute all the time.
+    """
+    return start + (points * point + scenes * scene) / cores
+
+
+def costs(content: Mapping[str, Any]) -> str:
+    """Return what surveys cost, in Markdown."""
+    figures = keyed(map(Figure.from_dict, content["figures"]))
+
+    def cpu(name: str) -> float:
+        return float(np.median(figures[name].cpu))
+
+    def median(name: str) -> float:
+        return float(np.median(figures[name].values))
+
+    alone, two = "a map alone, one core", "a survey in two processes, over one"
+    over = median(f"{alone}: a point of a survey, with all that is written, over it")
+    another = next(name for name in figures if name.startswith("a world and an engine for another scene"))
+    start = median("starting a process, and its first point")
+    one, scene = cpu(alone) * over / 1e3, cpu(another) / 1e3
+    share = min(1.0, median(f"{two}: in CPU time") / 2)
+    handing = median(f"{two}: CPU time of the scheduler and the client for a batch")
+    early, late = (figures[name].values[0] for name in figures if name.startswith("memory after"))
+    many = {
+        name: (
+            seconds(0.0, one, scene, MILLION, scenes, 1.0) / 3600,
+            seconds(start, one, scene, MILLION, scenes, CORES * share) / 60,
+        )
+        for name, scenes in (("poses", 1), ("places", MILLION))
+    }
+    rate = MILLION / BATCH / (60 * many["poses"][1])
+    machine = content["machine"]
+    (hours, minutes), (scene_hours, scene_minutes) = many["poses"], many["places"]
+    return f"""
+Measured by `symgrasp bench survey` on {machine["cpus"]} cores ({machine["machine"]}): medians, and
+CPU times unless another kind is said.
+
+| what | |
+|---|---:|
+| a map of 24 × 48 × 2 cells at 16 samples, one core | {cpu(alone):.1f} ms |
+| a point of a survey, computed and written, over its map | × {over:.2f} |
+| writing a batch, of that | {cpu(f"{alone}: writing a batch"):.1f} ms |
+| a world and an engine for another scene | {1e3 * scene:.0f} ms |
+| starting a process until its first point is written, by the clock | {start:.1f} s |
+| two processes over one, by the clock | × {median(two):.2f} |
+| … in CPU time of the workers | × {median(f"{two}: in CPU time"):.2f} |
+| scheduler and client for a batch | {handing:.1f} ms |
+| memory of a process after 1,000 points | {early:.0f} MB |
+| … after 10,000 | {late:.0f} MB |
+
+So N points in S scenes on C cores take about
+
+    {start:.1f} s + (N · {1e3 * one:.1f} ms + S · {1e3 * scene:.0f} ms) / (C · {share:.2f})
+
+where {share:.2f} is how much of a core a worker gets, from the CPU time of two processes over one.
+This is reckoned on paper, not run: a million poses of the object in one scene are {hours:.1f} hours of
+one core, and {minutes:.1f} minutes on 100 machines with 2 cores each. A million places of a base are a
+million scenes: {scene_hours:.0f} hours of one core, {scene_minutes:.0f} minutes on those machines. The
+scheduler hands out {MILLION / BATCH:,.0f} batches of {BATCH} points; in the first case that is {rate:.0f} a second,
+of {1e3 / handing:.0f} for which it has time. Beyond that it, and the file system that all write to, come first.
+"""
+
+
+if __name__ == "__main__":
+    put_between(PAGE, BEGIN, END, costs(json.loads(MEASURED.read_text(encoding="utf-8"))))
