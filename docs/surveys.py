@@ -93,8 +93,9 @@ where {share:.2f} is how much of a core a worker gets, from the CPU time of two 
 This is reckoned on paper, not run: a million poses of the object in one scene are {hours:.1f} hours of
 one core, and {minutes:.1f} minutes on 100 machines with 2 cores each. A million places of a base are a
 million scenes: {scene_hours:.0f} hours of one core, {scene_minutes:.0f} minutes on those machines. The
-scheduler hands out {MILLION / BATCH:,.0f} batches of {BATCH} points; in the first case that is {rate:.0f} a second,
-of {1e3 / handing:.0f} for which it has time. Beyond that it, and the file system that all write to, come first.
+scheduler hands out {MILLION / BATCH:,.0f} batches of {BATCH} points; in the first case that is
+{rate:.0f} a second, of {1e3 / handing:.0f} for which it has time. Beyond that it, and the file system
+that all write to, come first.
 """
 
 
