@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from docs.pages import put_between
 from symgrasp.bench.figures import Figure, keyed
 from symgrasp.survey.survey import BATCH
 
-__all__ = ["BEGIN", "END", "MEASURED", "PAGE", "costs", "seconds"]
+__all__ = ["BEGIN", "END", "MEASURED", "PAGE", "Costs", "costs"]
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs/surveys.md"
@@ -27,17 +27,30 @@ MILLION, CORES = 1_000_000, 200
 """Points, and the cores of 100 machines with two each."""
 
 
-def seconds(start: float, point: float, scene: float, points: int, scenes: int, cores: float) -> float:
-    """Return how long (s) a survey takes.
+class Costs(NamedTuple):
+    """What the parts of a survey take (s).
 
-    Args:
-        start: time (s) in which a worker starts.
-        point: CPU time (s) of a point, with all that is written.
-        scene: CPU time (s) of another scene.
-        points, scenes: how many there are.
-        cores: how many cores compute all the time.
+    Attributes:
+        start: starting a worker.
+        point: a point, with all that is written, on one core.
+        scene: another scene, on one core.
+        batch: what the scheduler and the client take for a batch.
     """
-    return start + (points * point + scenes * scene) / cores
+
+    start: float
+    point: float
+    scene: float
+    batch: float
+
+    def seconds(self, points: int, scenes: int, cores: float) -> float:
+        """Return how long (s) a survey takes.
+
+        Args:
+            points, scenes: how many there are.
+            cores: how many cores compute all the time.
+        """
+        computing = (points * self.point + scenes * self.scene) / cores
+        return self.start + max(computing, points / BATCH * self.batch)
 
 
 def costs(content: Mapping[str, Any]) -> str:
@@ -58,16 +71,11 @@ def costs(content: Mapping[str, Any]) -> str:
     share = min(1.0, median(f"{two}: in CPU time") / 2)
     handing = median(f"{two}: CPU time of the scheduler and the client for a batch")
     early, late = (figures[name].values[0] for name in figures if name.startswith("memory after"))
-    many = {
-        name: (
-            seconds(0.0, one, scene, MILLION, scenes, 1.0) / 3600,
-            seconds(start, one, scene, MILLION, scenes, CORES * share) / 60,
-        )
-        for name, scenes in (("poses", 1), ("places", MILLION))
-    }
-    rate = MILLION / BATCH / (60 * many["poses"][1])
+    own = Costs(start, one, scene, handing / 1e3)
+    hours, scene_hours = (own.seconds(MILLION, scenes, 1.0) / 3600 for scenes in (1, MILLION))
+    minutes, scene_minutes = (own.seconds(MILLION, scenes, CORES * share) / 60 for scenes in (1, MILLION))
+    handed = MILLION / BATCH * own.batch / 60
     machine = content["machine"]
-    (hours, minutes), (scene_hours, scene_minutes) = many["poses"], many["places"]
     return f"""
 Measured by `symgrasp bench survey` on {machine["cpus"]} cores ({machine["machine"]}): medians, and
 CPU times unless another kind is said.
@@ -87,15 +95,15 @@ CPU times unless another kind is said.
 
 So N points in S scenes on C cores take about
 
-    {start:.1f} s + (N · {1e3 * one:.1f} ms + S · {1e3 * scene:.0f} ms) / (C · {share:.2f})
+    {start:.1f} s + (N · {1e3 * one:.1f} ms + S · {1e3 * scene:.0f} ms) / (C · {share:.2f}),
+    but at least {start:.1f} s + N / {BATCH} · {handing:.1f} ms
 
-where {share:.2f} is how much of a core a worker gets, from the CPU time of two processes over one.
-This is reckoned on paper, not run: a million poses of the object in one scene are {hours:.1f} hours of
-one core, and {minutes:.1f} minutes on 100 machines with 2 cores each. A million places of a base are a
-million scenes: {scene_hours:.0f} hours of one core, {scene_minutes:.0f} minutes on those machines. The
-scheduler hands out {MILLION / BATCH:,.0f} batches of {BATCH} points; in the first case that is
-{rate:.0f} a second, of {1e3 / handing:.0f} for which it has time. Beyond that it, and the file system
-that all write to, come first.
+where {share:.2f} is how much of a core a worker gets, from the CPU time of two processes over one, and the
+second line is what one scheduler can hand out. This is reckoned on paper, not run: a million poses of
+the object in one scene are {hours:.1f} hours of one core, and {minutes:.1f} minutes on 100 machines with 2
+cores each, of which the scheduler is busy {handed:.1f}. A million places of a base are a million scenes:
+{scene_hours:.0f} hours of one core, {scene_minutes:.0f} minutes on those machines. With more machines the
+scheduler, and the file system that all write to, come first.
 """
 
 

@@ -153,9 +153,14 @@ class _Rate(NamedTuple):
 def _rate(survey: Survey, workers: int) -> _Rate:
     """Run a survey and return what it takes."""
     seen: list[tuple[int, float, float, float]] = []
+    asking = 0.0
 
     def note(done: Done) -> None:
-        seen.append((done.points, perf_counter(), _spent(), process_time()))
+        nonlocal asking
+        before = process_time()
+        spent = _spent()
+        asking += process_time() - before  # to ask for it takes longer than to hand a batch out
+        seen.append((done.points, perf_counter(), spent, process_time() - asking))
 
     with TemporaryDirectory() as folder:
         run_survey(survey, Path(folder) / "bench.zarr", workers=workers, progress=note)

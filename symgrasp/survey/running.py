@@ -194,13 +194,15 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep what Dask logs of connections that were lost out of what people read: an error says it."""
-    log = logging.getLogger("distributed")
-    before = log.level
-    log.setLevel(logging.CRITICAL)
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in names}  # some have levels of their own
     try:
+        for name in names:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         yield
     finally:
-        log.setLevel(before)
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
 
 
 _own = threading.local()

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from docs.surveys import BEGIN, END, MEASURED, PAGE, costs, seconds
+from docs.surveys import BEGIN, END, MEASURED, PAGE, Costs, costs
 from symgrasp.bench import survey
 from symgrasp.bench.figures import keyed
 
@@ -19,8 +19,9 @@ def test_the_page_says_what_was_measured():
 
 
 def test_a_survey_takes_what_its_parts_take():
-    """A hundred points of 20 ms, every one in a scene of 80 ms, on two cores that are half free."""
-    assert seconds(2.0, 0.02, 0.08, 100, 100, 2 * 0.5) == pytest.approx(2.0 + 10.0)
+    costs = Costs(start=2.0, point=0.02, scene=0.08, batch=0.5)
+    assert costs.seconds(640, 640, 2 * 0.5) == pytest.approx(2.0 + 64.0)
+    assert costs.seconds(640, 1, 1000) == pytest.approx(2.0 + 5.0)  # as fast as ten batches are handed out
 
 
 def test_points_cost_little_besides_their_maps_and_scenes_cost_time():
