@@ -52,7 +52,7 @@ def test_every_place_of_the_object_has_the_share_of_its_map():
 def test_the_best_bases_are_where_plans_hold(monkeypatch):
     monkeypatch.setattr(placement, "ROUNDS", 1)
     monkeypatch.setattr(placement, "SEEDS", 1)
-    monkeypatch.setattr(placement, "TURN", 180.0)
+    monkeypatch.setattr(placement, "TURN", 360.0)
     scene = load_small("pick_pour_place", 6, 16, 4)
     request = SurveyRequest(scene, {}, "pick", "panda", "robot", 0.4)
     parts: list[SurveyPart] = []
