@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -72,9 +71,9 @@ def test_the_best_bases_are_where_plans_hold(monkeypatch):
             for h in task.holds
         ]
         assert stand.margin == pytest.approx(min(margins))
-    best = places.bases.index(stands[0].base)
+    (best,) = np.flatnonzero((places.xy == stands[0].base[:2]).all(axis=1))
     assert places.plan[best] == pytest.approx(np.nanmax(places.plan))
-    assert math.dist(places.xy[best], stands[0].base[:2]) == 0
+    assert all(tuple(xy) == base[:2] for xy, base in zip(places.xy.tolist(), places.bases, strict=True))
 
 
 def test_a_survey_can_be_cancelled():
