@@ -37,14 +37,14 @@ def title_html(state: State) -> str:
 
 
 def comparison_html(state: State) -> str:
-    """Say how many cells of the shifted map, drawn above, differ from the recomputed map, drawn below."""
+    """Say how many cells of the shifted map differ from the recomputed map, which is drawn below."""
     comparison = state.map_view.comparison
     if comparison is None:
         return '<div class="sg sg-faint">The map is being computed from scratch …</div>'
     turn, cells = np.rad2deg(comparison.request.delta), comparison.map.reason.size
     rolls, heights, angles = comparison.map.reason.shape
     return (
-        f'<div class="sg sg-check" role="status">Above: shifted. Below: from scratch for {turn:.2f}°: '
+        f'<div class="sg sg-check" role="status">Below: from scratch for {turn:.2f}°: '
         f"<b>{comparison.differing} of {cells} cells differ</b>: {heights * angles} places "
         f"with {rolls} rolls each.</div>"
     )

@@ -63,8 +63,8 @@ class Actions(Protocol):
 
         Args:
             change: the change.
-            origin: what changed it: "inputs", "gizmo", "scrub" or "play"; widgets of that origin are not
-                written back.
+            origin: what changed it: "inputs", "gizmo", "map", "scrub" or "play"; widgets of that origin
+                are not written back.
         """
 
     def limit_uploads(self, button: viser.GuiUploadButtonHandle, limit: int) -> None:

@@ -24,19 +24,20 @@ from .sequence_panel import SequencePanel, TasksPanel
 from .status_panel import NotesPanel, StatusPanel
 from .survey_panel import SurveyPanel
 
-__all__ = ["Layout", "panel_widths"]
+__all__ = ["Layout", "panels_width"]
 
-WINDOW = 1280
-"""Width (px) of a window from which on the panels have their full width."""
+WIDE = 1100
+"""Width (px) of viser's page from which on the panels stand side by side, not one above the other."""
 
-MAP_WIDTH, CONTROLS_WIDTH = 480, 320
-"""Full widths (px) of the panels on the left and on the right."""
+PANEL_WIDTH = 320
+"""Full width (px) of a panel."""
 
-MIN_CONTROLS_WIDTH = 240
+MOST = 0.4
+"""Share of the width that panels which stand above each other take at most."""
 
 
 class Layout:
-    """All panels of a browser: maps and plans on the left, scene and object on the right.
+    """All panels of a browser: scene and object on the right, and grasps and plans beside or below them.
 
     Args:
         client: the browser.
@@ -51,12 +52,11 @@ class Layout:
         gui = client.gui
         self.gui, self._dark = gui, False
         window = client.camera.image_width  # read before the panels narrow the canvas
-        map_width, controls_width = panel_widths(window)
-        self.view_width = window - map_width - controls_width
+        self.view_width = window - panels_width(window)
         self._theme(dark=False)
         gui.set_panel_label("symgrasp")
-        left = gui.add_panel()
-        with left.add_tab("Grasp map", viser.Icon.MAP_2):
+        grasps = gui.add_panel()
+        with grasps.add_tab("Grasp map", viser.Icon.MAP_2):
             gui.add_html(f"<style>{_style()}</style>")
             map_tab: list[Panel] = [
                 MapPanel(gui, actions),
@@ -67,7 +67,7 @@ class Layout:
                 map_tab += [GraspPanel(gui, actions), CandidatesPanel(gui, actions)]
             with tabs.add_tab("View", viser.Icon.PALETTE):
                 map_tab.append(MapOptionsPanel(gui, actions))
-        with left.add_tab("Sequence", viser.Icon.ROUTE):
+        with grasps.add_tab("Sequence", viser.Icon.ROUTE):
             sequence_tab = [
                 NotesPanel(gui, actions),
                 SequencePanel(gui, actions),
@@ -75,21 +75,25 @@ class Layout:
                 TasksPanel(gui, actions),
                 PlanFilePanel(gui, actions),
             ]
-        with left.add_tab("Hands", viser.Icon.USERS):
+        with grasps.add_tab("Hands", viser.Icon.USERS):
             hands_tab = [
                 NotesPanel(gui, actions),
                 HandsPanel(gui, actions),
                 PlanPanel(gui, actions),
                 PlanFilePanel(gui, actions),
             ]
-        with left.add_tab("Survey", viser.Icon.GRID_DOTS):
+        with grasps.add_tab("Survey", viser.Icon.GRID_DOTS):
             survey_tab = [NotesPanel(gui, actions), SurveyPanel(gui, actions)]
-        with left.add_tab("Files", viser.Icon.FILES):
+        with grasps.add_tab("Files", viser.Icon.FILES):
             files_tab = [NotesPanel(gui, actions), FilesPanel(gui, actions)]
-        left.dock_left()
-        left.set_width(map_width)
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(controls_width)
+        if window >= WIDE:
+            gui.main_panel.set_width(PANEL_WIDTH)
+            grasps.dock_right()
+            grasps.set_width(PANEL_WIDTH)
+        else:
+            gui.main_panel.set_width(panels_width(window))
+            grasps.dock_below(gui.main_panel)
         main = [
             StatusPanel(gui, actions),
             ScenePanel(gui, actions, scenes),
@@ -124,10 +128,9 @@ class Layout:
         )
 
 
-def panel_widths(window: int) -> tuple[int, int]:
-    """Return the widths (px) of the left and right panels; a narrow window keeps room for the 3D view."""
-    share = min(1.0, window / WINDOW)
-    return round(MAP_WIDTH * share), max(round(CONTROLS_WIDTH * share), MIN_CONTROLS_WIDTH)
+def panels_width(window: int) -> int:
+    """Return the width (px) that all panels take; a narrow window keeps room for the 3D view."""
+    return 2 * PANEL_WIDTH if window >= WIDE else min(PANEL_WIDTH, round(MOST * window))
 
 
 def _style() -> str:

@@ -1,4 +1,4 @@
-"""The ghost: the robot at a candidate that fails, and the bodies that collide, as plain meshes."""
+"""The ghost: the robot at a candidate that fails, with what collides, or at a cell that is pointed at."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ INFLATION = 0.0015
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """A robot in a configuration that fails.
+    """A robot in a configuration that fails, or that is only previewed.
 
     Attributes:
         robot: its name.
@@ -48,7 +48,29 @@ class Ghost:
 
 
 def ghost(state: State) -> Ghost | None:
-    """Return the ghost of the candidate that is shown; None if it is feasible or something else is shown."""
+    """Return the ghost of the grasp that is pointed at, else of the candidate that is shown.
+
+    None where that is feasible, and thus what the arm itself shows, or where the arms show something else.
+    """
+    return _preview(state) or _failing(state)
+
+
+def _preview(state: State) -> Ghost | None:
+    """Return the ghost of the feasible grasp that is pointed at, unless it is the picked one."""
+    cell = state.map_view.hovered
+    if cell is None or not state.is_current or state.result is None or cell == state.base_cell:
+        return None
+    grid = state.result.map.manifold
+    if cell.row >= grid.heights or cell.column >= grid.angles:  # of an earlier map
+        return None
+    witness = state.result.map.witness(cell)
+    if witness is None:
+        return None
+    arm = state.scene.arm(state.arm)
+    return Ghost(arm.robot.name, arm.robot_values(witness.q, witness.opening), frozenset())
+
+
+def _failing(state: State) -> Ghost | None:
     candidate = state.shown_candidate
     if candidate is None or state.explanation is None or candidate.reason == Reason.FEASIBLE:
         return None

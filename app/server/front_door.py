@@ -9,9 +9,11 @@ passes; those that become websockets are read at a limited rate. The door refuse
 * to be shown inside another page,
 * more browsers at once than were allowed, and connections that do not say in time what they want.
 
-A websocket alone serves an empty page: a browser gets a session after it has loaded a picture with a secret
-token in its path, from a page of the same origin. The ``Referer`` of that request is the address that was
-opened.
+The page that is served is the project's own; it shows viser's in a frame, whose address has the setting
+`VIEW`: a token that the page has made up. A websocket alone serves an empty view: a browser gets a session
+after the view has loaded a picture with a secret token in its path, from a page of the same origin. The
+``Referer`` of that request is the address that was opened. The page's own websocket, for the map, has its token
+in its path.
 """
 
 from __future__ import annotations
@@ -35,15 +37,29 @@ from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 from websockets.typing import Data
 
+from ..shell import commands
+from ..shell.files import PageFile, page_file
 from .browser_messages import MESSAGES, BrowserMessage, Misuse, UploadButton, Uploads
 from .inbox import Inbox, TokenBucket
 
-__all__ = ["HELLO", "BrowserConnection", "FrontDoor", "Visit", "current_connection", "is_foreign"]
+__all__ = ["HELLO", "MAP", "BrowserConnection", "FrontDoor", "Visit", "current_connection", "is_foreign"]
 
 log = logging.getLogger(__name__)
 
 HELLO = "/hello/"
 """Path of the picture, followed by its secret token."""
+
+FILES = "/shell/"
+"""Path of the files of the page, followed by a name."""
+
+MAP = "/map/"
+"""Path of the websocket of the map, followed by the token of the page."""
+
+VIEW = "view"
+"""The setting in the address of viser's page that has the token of the page around it."""
+
+TOKEN = re.compile(r"[\w-]{22,64}", re.ASCII)
+"""A token that the page has made up: of 128 random bits at least."""
 
 HEAD_TIMEOUT = 10.0
 """Time (s) within which the head of a request must arrive."""
@@ -83,8 +99,23 @@ MAX_WAITING = 256
 
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
 
+# The page loads its own files alone.
+PAGE_POLICY = "; ".join(
+    [
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data:",
+        "connect-src ws://{host} wss://{host}",
+        "frame-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    ]
+)
+
 # viser's page is one file, whose inline script unpacks styles, fonts, code, workers and WebAssembly.
-CONTENT_SECURITY_POLICY = "; ".join(
+VIEW_POLICY = "; ".join(
     [
         "default-src 'none'",
         "script-src 'unsafe-inline' 'wasm-unsafe-eval'",
@@ -95,7 +126,7 @@ CONTENT_SECURITY_POLICY = "; ".join(
         "connect-src ws://{host} wss://{host} data: blob:",
         "base-uri 'none'",
         "form-action 'none'",
-        "frame-ancestors 'none'",
+        "frame-ancestors 'self'",
     ]
 )
 
@@ -114,11 +145,13 @@ class Visit:
         token: the secret token in the path of the picture.
         query: what stood behind the ``?`` of the address it opened.
         address: the address without that.
+        page: the token of the page around the view; empty where there is none.
     """
 
     token: str
     query: str = ""
     address: str = "/"
+    page: str = ""
 
 
 def is_foreign(headers: Mapping[str, str], *, loopback: bool) -> bool:
@@ -146,6 +179,11 @@ def _is_own_picture(headers: Mapping[str, str]) -> bool:
     return urlsplit(headers.get("referer", "")).netloc == headers.get("host")
 
 
+def _is_own_frame(headers: Mapping[str, str]) -> bool:
+    """Return whether a page of the same origin shows it in a frame."""
+    return headers["sec-fetch-dest"] == "iframe" and headers.get("sec-fetch-site") == "same-origin"
+
+
 def _is_loopback(name: str) -> bool:
     if name == "localhost":
         return True
@@ -170,6 +208,7 @@ class BrowserConnection(ServerConnection):
         self._reading = TokenBucket(READ_RATE, READ_BURST)
         self._handling = TokenBucket(HANDLE_RATE, HANDLE_BURST)
         self._arrived, self._taken = asyncio.Event(), asyncio.Event()
+        self._decode: Callable[[Data], BrowserMessage | commands.Command | None] = self._of_viser
         self._reader: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
 
@@ -197,6 +236,10 @@ class BrowserConnection(ServerConnection):
         """Keep the connection open from now on: the page of this websocket has loaded its picture."""
         if self._timer:
             self._timer.cancel()
+
+    def expect_commands(self) -> None:
+        """Let no messages of viser's through, but those about the map."""
+        self._decode = _command
 
     def _close_after(self, timeout: float) -> None:
         self._timer = self.loop.call_later(timeout, self.transport.abort)
@@ -227,10 +270,8 @@ class BrowserConnection(ServerConnection):
             while True:
                 data = await super().recv()
                 await asyncio.sleep(self._reading.take(1.0 + len(data) / MESSAGE_BYTES))
-                message = BrowserMessage.decode(data)
-                if len(data) > MESSAGE_LIMIT and message.type != "FileTransferPart":
-                    raise Misuse("a message that is too long")
-                if not self._is_wanted(message):
+                message = self._decode(data)
+                if message is None:
                     continue
                 while len(self._inbox) >= MAX_WAITING:
                     self._taken.clear()
@@ -244,10 +285,24 @@ class BrowserConnection(ServerConnection):
             log.info("a browser is sent away: %s", misuse)
             await self.close(CloseCode.POLICY_VIOLATION, "not a message of this page")
 
-    def _is_wanted(self, message: BrowserMessage) -> bool:
+    def _of_viser(self, data: Data) -> BrowserMessage | None:
+        """Decode a message for viser; None if it is not to reach it."""
+        message = BrowserMessage.decode(data)
+        if len(data) > MESSAGE_LIMIT and message.type != "FileTransferPart":
+            raise Misuse("a message that is too long")
         if message.type not in MESSAGES:
-            return False
-        return not message.type.startswith("FileTransfer") or self._uploads.accepts(message)
+            return None
+        if message.type.startswith("FileTransfer") and not self._uploads.accepts(message):
+            return None
+        return message
+
+
+def _command(data: Data) -> commands.Command:
+    """Decode a message about the map."""
+    try:
+        return commands.decode(data)
+    except ValueError as error:
+        raise Misuse(str(error)) from error
 
 
 _connection: contextvars.ContextVar[BrowserConnection] = contextvars.ContextVar("connection")
@@ -265,13 +320,21 @@ class FrontDoor:
         host, port: the address to listen on.
         on_visit: called when a browser loads its picture; returns whether its token is valid.
         max_browsers: how many browsers may be in at the same time.
+        on_map: called with the websocket of a page's map and the token of the page; handles it.
 
     Raises:
         OSError: the address cannot be listened on.
     """
 
-    def __init__(self, host: str, port: int, on_visit: Callable[[Visit], bool], max_browsers: int) -> None:
-        self._on_visit, self._max_browsers = on_visit, max_browsers
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        on_visit: Callable[[Visit], bool],
+        max_browsers: int,
+        on_map: Callable[[BrowserConnection, str], Awaitable[None]] | None = None,
+    ) -> None:
+        self._on_visit, self._max_browsers, self._on_map = on_visit, max_browsers, on_map
         self._loopback = _is_loopback(host)
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         self._socket = socket.create_server(address[:2], family=family)
@@ -279,6 +342,7 @@ class FrontDoor:
             # The machine acknowledges for a browser that is slowed down, whose answers to pings come late.
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1000 * GONE_TIMEOUT))
         self._browsers: set[BrowserConnection] = set()
+        self._maps: set[BrowserConnection] = set()
 
     def serve(
         self,
@@ -296,6 +360,11 @@ class FrontDoor:
 
         async def handle(connection: ServerConnection) -> None:
             assert isinstance(connection, BrowserConnection)
+            assert connection.request
+            path, _ = _split(connection.request)
+            if path.startswith(MAP):
+                await self._show_map(connection, path.removeprefix(MAP))
+                return
             _connection.set(connection)
             self._browsers.add(connection)
             try:
@@ -306,7 +375,7 @@ class FrontDoor:
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             assert isinstance(connection, BrowserConnection)
             connection.request_received()
-            return self._refusal(connection, request) or process_request(connection, request)
+            return self._answer(connection, request) or process_request(connection, request)
 
         options |= {"max_size": PART_LIMIT, "open_timeout": ANSWER_TIMEOUT, "ping_timeout": None}
         return serve(
@@ -320,33 +389,75 @@ class FrontDoor:
             **options,
         )
 
-    def _refusal(self, connection: BrowserConnection, request: Request) -> Response | None:
-        """Return the answer to a request that is not for viser."""
+    async def _show_map(self, connection: BrowserConnection, token: str) -> None:
+        assert self._on_map
+        self._maps.add(connection)
+        try:
+            connection.expect_commands()
+            await self._on_map(connection, token)
+        finally:
+            self._maps.discard(connection)
+
+    def _answer(self, connection: BrowserConnection, request: Request) -> Response | None:
+        """Return the answer to a request that is not for viser; None for one that is, and for websockets."""
         headers = _headers(request)
+        path, settings = _split(request)
         if is_foreign(headers, loopback=self._loopback):
             return connection.respond(HTTPStatus.FORBIDDEN, "It may only be opened by its own address.\n")
-        if headers.get("sec-fetch-dest") in FRAMES:
+        is_view = path == "/" and VIEW in settings
+        if headers.get("sec-fetch-dest") in FRAMES and not (is_view and _is_own_frame(headers)):
             return connection.respond(HTTPStatus.FORBIDDEN, "It may not be shown inside another page.\n")
-        if request.path.startswith(HELLO):
-            return self._picture(connection, request.path.removeprefix(HELLO), headers)
+        if path.startswith(FILES):
+            return _found(connection, page_file(path.removeprefix(FILES)))
+        if path.startswith(HELLO):
+            return self._picture(connection, path.removeprefix(HELLO), headers)
+        if path.startswith(MAP):
+            return self._map_refusal(connection, path.removeprefix(MAP))
         if len(self._browsers) >= self._max_browsers:
             return connection.respond(
                 HTTPStatus.SERVICE_UNAVAILABLE,
                 f"This server is in use by {self._max_browsers} browsers, which is all it takes at a time "
                 "(symgrasp app --max-sessions). Close one of them, or load this page again later.\n",
             )
+        if path == "/" and not is_view and "upgrade" not in headers:
+            return _found(connection, page_file("index.html"))
+        return None
+
+    def _map_refusal(self, connection: BrowserConnection, token: str) -> Response | None:
+        """Return why a page gets no websocket for its map; None if it does."""
+        if self._on_map is None or not TOKEN.fullmatch(token):
+            return connection.respond(HTTPStatus.NOT_FOUND, "")
+        if len(self._maps) >= 2 * self._max_browsers:  # some may not have noticed that their page has gone
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "")
         return None
 
     def _picture(self, connection: BrowserConnection, token: str, headers: Mapping[str, str]) -> Response:
         opened = urlsplit(headers.get("referer", "/"))
         address = urlunsplit((opened.scheme, opened.netloc, opened.path, "", ""))
-        if not _is_own_picture(headers) or not self._on_visit(Visit(token, opened.query, address)):
+        settings = opened.query.split("&")
+        query = "&".join(s for s in settings if s.partition("=")[0] != VIEW)
+        page = next((s.partition("=")[2] for s in settings if s.startswith(f"{VIEW}=")), "")
+        visit = Visit(token, query, address, page if TOKEN.fullmatch(page) else "")
+        if not _is_own_picture(headers) or not self._on_visit(visit):
             return connection.respond(HTTPStatus.NOT_FOUND, "")
-        response = connection.respond(HTTPStatus.OK, PICTURE)
-        response.headers["Cache-Control"] = "no-store"
-        del response.headers["Content-Type"]
-        response.headers["Content-Type"] = "image/svg+xml"
-        return response
+        return _found(connection, PageFile(PICTURE, "image/svg+xml"))
+
+
+def _found(connection: BrowserConnection, file: PageFile | None) -> Response:
+    """Return the answer with a file of the page."""
+    if file is None:
+        return connection.respond(HTTPStatus.NOT_FOUND, "")
+    response = connection.respond(HTTPStatus.OK, file.text)
+    response.headers["Cache-Control"] = "no-store"
+    del response.headers["Content-Type"]
+    response.headers["Content-Type"] = file.media_type
+    return response
+
+
+def _split(request: Request) -> tuple[str, frozenset[str]]:
+    """Return the path of a request, and the names of the settings behind it."""
+    path, _, query = request.path.partition("?")
+    return path, frozenset(setting.partition("=")[0] for setting in query.split("&"))
 
 
 def _headers(request: Request) -> dict[str, str]:
@@ -361,9 +472,13 @@ def _headers(request: Request) -> dict[str, str]:
 def _with_headers(_: ServerConnection, request: Request, response: Response) -> None:
     """Add to a response what keeps other pages from using it."""
     host = _headers(request).get("host", "")
-    policy = CONTENT_SECURITY_POLICY.format(host=host if HOST.fullmatch(host) else "invalid")
-    response.headers["Content-Security-Policy"] = policy
-    response.headers["X-Frame-Options"] = "DENY"
+    path, settings = _split(request)
+    is_view = path == "/" and VIEW in settings
+    policy = VIEW_POLICY if is_view else PAGE_POLICY
+    response.headers["Content-Security-Policy"] = policy.format(
+        host=host if HOST.fullmatch(host) else "invalid"
+    )
+    response.headers["X-Frame-Options"] = "SAMEORIGIN" if is_view else "DENY"
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Referrer-Policy"] = "same-origin"
 

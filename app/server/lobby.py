@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import secrets
 import threading
@@ -35,7 +36,7 @@ def open_lobby(cache: SharedCache, host: str, port: int, max_sessions: int = 16)
         OSError: the port cannot be listened on.
     """
     with closing(Lobby(cache)) as lobby:
-        server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions))
+        server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions, lobby.show_map))
         server.on_client_connect(lobby.connected)
         server.on_client_disconnect(lobby.disconnected)
         try:
@@ -58,6 +59,8 @@ class Lobby:
         self._lock = threading.Condition()
         self._waiting: dict[str, _Waiting] = {}
         self._sessions: dict[int, Session] = {}
+        self._pages: dict[str, Session] = {}
+        self._awaited: dict[str, asyncio.Event] = {}
         self._closed = False
         threading.Thread(target=self._pool.prepare, daemon=True).start()
 
@@ -93,10 +96,36 @@ class Lobby:
         threading.Thread(target=self._open, args=(waiting, visit), daemon=True).start()
         return True
 
+    async def show_map(self, connection: BrowserConnection, token: str) -> None:
+        """Show the map of a page on a websocket, as soon as its view has a session; on the event loop.
+
+        Args:
+            connection: the websocket.
+            token: of the page.
+        """
+        while (session := self._session_of(token)) is None:
+            opened = self._awaited.setdefault(token, asyncio.Event())
+            gone = connection.wait_closed()
+            waits = [asyncio.ensure_future(wait) for wait in (opened.wait(), gone)]
+            await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+            for wait in waits:
+                wait.cancel()
+            if connection.state is not State.OPEN:
+                self._awaited.pop(token, None)
+                return
+        connection.stay()
+        await session.map_pane.serve(connection)
+
+    def _session_of(self, token: str) -> Session | None:
+        with self._lock:
+            return self._pages.get(token)
+
     def disconnected(self, client: viser.ClientHandle) -> None:
         """Handle a browser that disconnected: close its session."""
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
+            if session and self._pages.get(session.visit.page) is session:
+                del self._pages[session.visit.page]
             self._lock.notify_all()
             self._waiting = {
                 token: waiting for token, waiting in self._waiting.items() if waiting.client is not client
@@ -110,6 +139,7 @@ class Lobby:
             self._closed = True
             sessions, self._sessions = list(self._sessions.values()), {}
             self._waiting.clear()
+            self._pages.clear()
             self._lock.notify_all()
         for session in sessions:
             session.close()
@@ -130,8 +160,17 @@ class Lobby:
             return
         with self._lock:
             self._sessions[client.client_id] = session
+            if visit.page:
+                self._pages[visit.page] = session
+        waiting.connection.loop.call_soon_threadsafe(self._tell_page, visit.page)
         if waiting.connection.state is not State.OPEN:  # it disconnected while its session was opened
             self.disconnected(client)
+
+
+    def _tell_page(self, token: str) -> None:
+        """Wake the websocket that waits for the session of its page; on the event loop."""
+        if opened := self._awaited.pop(token, None):
+            opened.set()
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from ..state.state import State
 from ..state.undo import remember
 from .actions import Actions, camera_of
 from .front_door import BrowserConnection, Visit
+from .map_pane import MapPane
 from .playback_clock import PlaybackClock
 from .survey_actions import SurveyActions
 
@@ -63,6 +64,7 @@ class Session:
 
     Attributes:
         state: what is shown; None before the first scene is loaded.
+        map_pane: the map on the page.
     """
 
     def __init__(
@@ -82,6 +84,7 @@ class Session:
         self._writing = False
         self._closed = False
         self._playback = PlaybackClock()
+        self.map_pane = MapPane(self.change)
         self.process = ComputeProcess(
             pool,
             cache.keep,
@@ -130,6 +133,7 @@ class Session:
         with self._changed:
             self._closed = True
             self._changed.notify()
+        self.map_pane.close()
         self.jobs.close()
         self.surveys.close()
 
@@ -308,6 +312,7 @@ class Session:
 
     def _draw(self, state: State, *, write_inputs: bool, move_gizmo: bool) -> None:
         try:
+            self.map_pane.show(state)
             self.layout.show(state)
             if write_inputs:
                 asyncio.run_coroutine_threadsafe(self._inputs_written(state), self._connection.loop).result()

@@ -58,6 +58,7 @@ class MapViewState:
         comparison: the newest result of that.
         explained: the candidates of the cell that was picked last.
         candidate: index of the candidate shown; None for the default, see `State.candidate`.
+        hovered: the cell of the unshifted map that is pointed at.
     """
 
     roll: RollChoice = RollChoice.EITHER
@@ -67,6 +68,7 @@ class MapViewState:
     comparison: Comparison | None = None
     explained: ExplainResult | None = None
     candidate: int | None = None
+    hovered: Cell | None = None
 
     @property
     def input_values(self) -> tuple[object, ...]:
@@ -108,7 +110,7 @@ class MapViewState:
 
     def without_results(self) -> MapViewState:
         """Drop what was computed."""
-        return replace(self, comparison=None, explained=None)
+        return replace(self, comparison=None, explained=None, hovered=None)
 
     def for_another_scene(self) -> MapViewState:
         """Return it for another scene: both rolls, the same display options, nothing computed."""

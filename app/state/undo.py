@@ -31,7 +31,7 @@ def remember(before: State, after: State, origin: str, time: float) -> State:
     Args:
         before: the state that was changed.
         after: the changed one.
-        origin: "inputs", "gizmo" or "scrub" if the change may be part of a drag; "play" for the playback,
+        origin: "inputs", "gizmo", "map" or "scrub" if the change may be part of a drag; "play" for the playback,
             which is not recorded.
         time: of the change (s), by a monotonic clock.
     """

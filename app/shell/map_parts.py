@@ -1,0 +1,122 @@
+"""The map as the page draws it: messages with numbers for each cell, of which only changed ones are sent.
+
+A message is binary: the length of a JSON text (4 bytes, little-endian), that text padded to a multiple of
+four bytes, and arrays. Its ``kind`` says what it is about:
+
+``cells``
+    the map that was computed, before it is shifted by δ. Arrays over its grid (rows from the lowest height):
+    clearance in 0.1 mm (uint16, `UNKNOWN` where there is none), then as uint8 the index of the colour, the
+    reason and the roll that is shown.
+``prints``
+    the cells under the hands, in the frame of the turned object: the index of the colour (uint8).
+``look``
+    everything else, δ among it: no arrays.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.object.manifold import wrap
+from symgrasp.reason import Reason
+
+from ..render.cell_colors import colored_map
+from ..render.marks import marks_of
+from ..render.palette import OVERLAP, PRINTS
+from ..render.prints import hand_color, print_index, print_names, shown_prints
+from ..render.weak_cache import cached_with_first
+from ..state.map_view_state import RollChoice
+from ..state.state import State
+
+__all__ = ["UNKNOWN", "map_parts"]
+
+UNKNOWN = 0xFFFF
+"""Clearance of a cell that has none."""
+
+
+def map_parts(state: State) -> dict[str, bytes]:
+    """Return the messages that show the map of a state, by their kind."""
+    m, view = state.result and state.result.map, state.map_view
+    return {
+        "cells": _cells(m, view.roll, view.color_by) if m else _message("cells", {"heights": 0, "angles": 0}),
+        "prints": _prints(state),
+        "look": _message("look", _look(state)),
+    }
+
+
+def _message(kind: str, head: dict[str, Any], *arrays: np.ndarray) -> bytes:
+    text = json.dumps({"kind": kind, **head}, ensure_ascii=False, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    return len(text).to_bytes(4, "little") + text + b"".join(array.tobytes() for array in arrays)
+
+
+@cached_with_first
+def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy) -> bytes:
+    grid, colored = m.manifold, colored_map(m, roll, color_by)
+    clearance = roll.of(m, m.clearance)
+    known = np.isfinite(clearance)
+    tenths = np.where(known, np.clip(np.round(1e4 * np.where(known, clearance, 0)), 0, UNKNOWN - 1), UNKNOWN)
+    head = {
+        "heights": grid.heights,
+        "angles": grid.angles,
+        "low": grid.profile.h_min,
+        "high": grid.profile.h_max,
+        "start": grid.theta_start,
+        "colors": [_hex(color) for color in colored.colors],
+        "reasons": [reason.legend for reason in Reason],
+        "feasible": int(Reason.FEASIBLE),
+        "profile": grid.profile.points.tolist(),
+    }
+    return _message(
+        "cells",
+        head,
+        tenths.astype("<u2"),
+        colored.index.astype(np.uint8),
+        roll.reason(m).astype(np.uint8),
+        roll.rolls(m).astype(np.uint8),
+    )
+
+
+def _prints(state: State) -> bytes:
+    prints = shown_prints(state)
+    if not prints:
+        return _message("prints", {"heights": 0, "angles": 0})
+    index = print_index(prints).astype(np.uint8)
+    legend = [[_hex(PRINTS[hand_color(k)]), f"hand of {name}"] for k, name in enumerate(print_names(state))]
+    if OVERLAP in index:
+        legend.append([_hex(PRINTS[OVERLAP]), "both hands"])
+    colors = [_hex(color) for color in PRINTS]
+    heights, angles = index.shape
+    return _message(
+        "prints", {"heights": heights, "angles": angles, "colors": colors, "legend": legend}, index
+    )
+
+
+def _look(state: State) -> dict[str, Any]:
+    look: dict[str, Any] = {
+        "title": f"{state.scene.name} · {state.task} · {state.arm}",
+        "busy": not state.is_current or state.busy is not None,
+        "stale": not state.is_fresh,
+        "delta": state.delta,
+        "dark": state.display.dark,
+        "object": state.scene.file.object.name,
+        "marks": [[mark.h, float(wrap(mark.theta)), mark.label] for mark in marks_of(state)],
+        "picked": [state.base_cell.row, state.base_cell.column] if state.base_cell else None,
+        "legend": [],
+    }
+    if state.result:
+        colored = colored_map(state.result.map, state.map_view.roll, state.map_view.color_by)
+        look["legend"] = [list(swatch) for swatch in colored.swatches]
+        if colored.scale:
+            scale = colored.scale
+            look["scale"] = [scale.label, scale.high, [_hex(c) for c in scale.colors[::36]]]
+    return look
+
+
+def _hex(color: np.ndarray) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*color)

@@ -1,0 +1,195 @@
+/* How the map is drawn: cells, axes, marks, and the object's profile beside it, sharp at every size. */
+import { TURN, mod } from "./frame.js";
+
+const FONT = "11px system-ui, sans-serif";
+const ROOM = { left: 46, bottom: 38, top: 10, right: 12, profile: 64 };
+const GREY = [236, 238, 241];
+
+/** A canvas with one pixel a cell, lowest θ left and highest h on top. */
+export function texture({ heights, angles }, index, colors, alpha = 255) {
+  const rgb = colors.map((color) => [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16)));
+  const picture = new OffscreenCanvas(angles, heights);
+  const context = picture.getContext("2d");
+  const pixels = context.createImageData(angles, heights);
+  for (let row = 0; row < heights; row++) {
+    for (let column = 0; column < angles; column++) {
+      const value = index[(heights - 1 - row) * angles + column];
+      pixels.data.set([...rgb[value], alpha < 255 && !value ? 0 : alpha], 4 * (row * angles + column));
+    }
+  }
+  context.putImageData(pixels, 0, 0);
+  return picture;
+}
+
+/** Fit the canvas to its room, and the map into it: a long object lies along the longer side. */
+export function layout(pane) {
+  const { canvas, frame, cells } = pane;
+  const ratio = devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  const around = cells ? TURN * Math.max(...cells.profile.map(([, r]) => r)) : 1;
+  const lying = Boolean(cells) && cells.high - cells.low > around === width > height && width !== height && cells.high - cells.low > 1.25 * around;
+  const { left, bottom, top, right, profile } = ROOM;
+  frame.place(left, top + (lying ? profile : 0), Math.max(20, width - left - right - (lying ? 0 : profile)),
+    Math.max(20, height - top - bottom - (lying ? profile : 0)), lying);
+}
+
+export function draw(pane) {
+  const { canvas, frame, cells, look, style } = pane;
+  const context = canvas.getContext("2d"), ratio = devicePixelRatio;
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+  if (!cells || !look) return;
+  const { x, y, width, height } = frame;
+  context.save();
+  context.beginPath();
+  context.rect(x, y, width, height);
+  context.clip();
+  context.imageSmoothingEnabled = false;
+  context.globalAlpha = look.stale ? 0.3 : 1;
+  if (look.stale) {
+    context.globalAlpha = 1;
+    context.fillStyle = `rgb(${GREY})`;
+    context.fillRect(x, y, width, height);
+    context.globalAlpha = 0.3;
+  }
+  drawCells(context, pane, pane.picture, mod((cells.start - pane.delta + Math.PI) / TURN, 1));
+  context.globalAlpha = 1;
+  if (pane.prints) drawCells(context, pane, pane.shade, 0);
+  if (pane.hovered) outline(context, pane, pane.hovered);
+  for (const mark of look.marks) drawMark(context, pane, mark);
+  context.restore();
+  context.strokeStyle = style.line;
+  context.lineWidth = 1;
+  context.strokeRect(x - 0.5, y - 0.5, width + 1, height + 1);
+  axes(context, pane);
+  profile(context, pane);
+}
+
+/** Draw a picture of all cells that begins at a share of the turn, and goes on from its other end. */
+function drawCells(context, { frame }, picture, begin) {
+  const ratio = devicePixelRatio, whole = (value) => Math.round(value * ratio) / ratio;
+  for (const from of [begin - 1, begin]) {
+    const [x0, y0] = frame.toScreen(from, 0).map(whole), [x1, y1] = frame.toScreen(from + 1, 1).map(whole);
+    context.save();
+    if (frame.lying) {
+      context.transform(0, y1 - y0, x1 - x0, 0, x0, y0); // θ upwards, h to the right
+      context.transform(1, 0, 0, -1, 0, 1);
+    } else {
+      context.transform(x1 - x0, 0, 0, y0 - y1, x0, y1);
+    }
+    context.drawImage(picture, 0, 0, 1, 1);
+    context.restore();
+  }
+}
+
+function outline(context, pane, cell) {
+  const { frame, cells, style } = pane, { low, high, heights, angles } = cells;
+  const [theta, h] = pane.middle(cell);
+  const u = (theta + Math.PI) / TURN, v = (h - low) / (high - low);
+  for (const turn of [-1, 0, 1]) {
+    const [x0, y0] = frame.toScreen(u + turn - 0.5 / angles, v - 0.5 / heights);
+    const [x1, y1] = frame.toScreen(u + turn + 0.5 / angles, v + 0.5 / heights);
+    for (const [color, wide] of [[style.halo, 4], [style.ink, 1.5]]) {
+      context.strokeStyle = color;
+      context.lineWidth = wide;
+      context.strokeRect(Math.min(x0, x1), Math.min(y0, y1), Math.abs(x1 - x0), Math.abs(y1 - y0));
+    }
+  }
+}
+
+function drawMark(context, { frame, cells, style }, [h, theta, label]) {
+  const [x, y] = frame.toScreen((theta + Math.PI) / TURN, (h - cells.low) / (cells.high - cells.low));
+  for (const [color, wide] of [[style.halo, 5.5], [style.mark, 2.5]]) {
+    context.strokeStyle = color;
+    context.lineWidth = wide;
+    context.beginPath();
+    context.arc(x, y, 6, 0, TURN);
+    context.stroke();
+  }
+  if (!label) return;
+  context.font = FONT;
+  const wide = context.measureText(label).width, right = x + 12 + wide < frame.x + frame.width;
+  const at = right ? x + 11 : x - 11 - wide;
+  context.fillStyle = style.back;
+  context.globalAlpha = 0.85;
+  context.fillRect(at - 3, y - 8, wide + 6, 16);
+  context.globalAlpha = 1;
+  context.fillStyle = style.ink;
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  context.fillText(label, at, y);
+}
+
+// -- axes -----------------------------------------------------------------------------------------
+
+function axes(context, { frame, cells, style }) {
+  const { x, y, width, height, lying, span, u0, v0 } = frame;
+  const low = 100 * cells.low, high = 100 * cells.high;
+  const across = lying
+    ? { from: low + v0 * (high - low), to: low + (v0 + span) * (high - low), name: "h (cm)" }
+    : { from: 360 * u0 - 180, to: 360 * (u0 + span) - 180, name: "θ (°)", angle: true };
+  const upwards = lying
+    ? { from: 360 * u0 - 180, to: 360 * (u0 + span) - 180, name: "θ (°)", angle: true }
+    : { from: low + v0 * (high - low), to: low + (v0 + span) * (high - low), name: "h (cm)" };
+  context.font = FONT;
+  context.fillStyle = style.ink;
+  context.textAlign = "center";
+  context.textBaseline = "top";
+  for (const tick of ticks(across, width / 48)) {
+    context.fillText(label(tick), x + ((tick - across.from) / (across.to - across.from)) * width, y + height + 4);
+  }
+  context.fillText(across.name, x + width / 2, y + height + 20);
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  for (const tick of ticks(upwards, height / 28)) {
+    context.fillText(label(tick), x - 5, y + height - ((tick - upwards.from) / (upwards.to - upwards.from)) * height);
+  }
+  context.save();
+  context.translate(9, y + height / 2);
+  context.rotate(-Math.PI / 2);
+  context.textAlign = "center";
+  context.fillText(upwards.name, 0, 0);
+  context.restore();
+}
+
+const label = (value) => String(Number(value.toPrecision(6)) + 0).replace("-", "−");
+
+/** Round values from one end of an axis to the other, so many at most. */
+function ticks({ from, to, angle }, most) {
+  const room = (to - from) / Math.max(3, most);
+  const decade = 10 ** Math.floor(Math.log10(room));
+  const steps = angle && room > 1 ? [5, 10, 15, 30, 45, 60, 90, 180] : [1, 2, 5, 10].map((k) => k * decade);
+  const step = steps.find((value) => value >= room * (1 - 1e-9)) ?? steps.at(-1);
+  const values = [];
+  for (let k = Math.ceil(from / step - 1e-9); k * step <= to + 1e-9 * step; k++) values.push(k * step);
+  return values;
+}
+
+/** Draw the half section of the object along its heights: beside the map, or above one that lies. */
+function profile(context, { frame, cells, style }) {
+  const { x, y, width, lying } = frame, { low, high, profile: points } = cells;
+  const most = Math.max(...points.map(([, r]) => r)), room = ROOM.profile - 22;
+  const at = (h, r) => {
+    const [across, up] = frame.toScreen(frame.u0, (h - low) / (high - low));
+    return lying ? [across, y - 8 - (r / most) * room] : [x + width + 10 + (r / most) * room, up];
+  };
+  context.save();
+  context.beginPath();
+  if (lying) context.rect(x, 0, width, y);
+  else context.rect(x + width + 2, y - 1, ROOM.profile + ROOM.right, frame.height + 2);
+  context.clip();
+  context.beginPath();
+  context.moveTo(...at(points[0][0], 0));
+  for (const [h, r] of points) context.lineTo(...at(h, r));
+  context.lineTo(...at(points.at(-1)[0], 0));
+  context.closePath();
+  context.fillStyle = style.body;
+  context.fill();
+  context.strokeStyle = style.ink;
+  context.lineWidth = 1.2;
+  context.stroke();
+  context.restore();
+}

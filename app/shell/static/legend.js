@@ -1,0 +1,35 @@
+/* The words around the map: its title and legend. Texts may come from files, and are never markup. */
+export function describe(element, pane) {
+  const { look, prints } = pane;
+  if (!look) return;
+  const title = element("title");
+  title.textContent = look.title + (look.stale && pane.hasMap ? " — of an earlier pose" : "");
+  title.setAttribute("aria-busy", String(look.busy));
+  const all = look.legend.reduce((sum, [, , cells]) => sum + cells, 0);
+  const rows = look.legend.map(([color, label, cells]) => row(color, label, `${cells} · ${share(cells, all)} %`));
+  for (const [color, label] of prints?.legend ?? []) rows.push(row(color, label, ""));
+  element("legend").replaceChildren(...rows);
+  const scale = element("scale");
+  scale.hidden = !look.scale;
+  if (look.scale) {
+    const [label, high, colors] = look.scale;
+    const [name, bar, end] = scale.children;
+    name.textContent = `${label}: 0`;
+    bar.style.background = `linear-gradient(to right, ${colors.join(", ")})`;
+    end.textContent = String(high);
+  }
+}
+
+function share(cells, all) {
+  return cells && 200 * cells < all ? "<1" : String(Math.round((100 * cells) / all));
+}
+
+function row(color, label, count) {
+  const item = document.createElement("li");
+  const [swatch, name, number] = ["i", "span", "small"].map((tag) => document.createElement(tag));
+  swatch.style.background = color;
+  name.textContent = label;
+  number.textContent = count;
+  item.append(swatch, name, number);
+  return item;
+}

@@ -1,0 +1,53 @@
+/* The page: makes the token that ties map and view together, and hands what one says to the other. */
+import { Link } from "./link.js";
+import { MapPane } from "./map_pane.js";
+import { describe } from "./legend.js";
+import { split } from "./splitter.js";
+
+const element = (id) => document.getElementById(id);
+const view = element("view"), canvas = element("map");
+
+const token = btoa(String.fromCharCode(...crypto.getRandomValues(new Uint8Array(24))))
+  .replaceAll("+", "-").replaceAll("/", "_");
+const opened = location.search.slice(1);
+view.src = `/?${opened ? `${opened}&` : ""}view=${token}`;
+// viser connects again only while its own document has the focus.
+view.addEventListener("load", () => view.contentWindow.focus());
+
+const pane = new MapPane(canvas, {
+  send: (command) => link.send(command),
+  say: (text) => { element("readout").textContent = text; },
+  speak: (text) => { element("spoken").textContent = text; },
+  turned: (text) => { element("turn").textContent = text; },
+});
+const link = new Link(`/map/${token}`, {
+  message: (head, data) => {
+    pane.take(head, data);
+    element("nothing").hidden = pane.hasMap;
+    if (head.kind === "look") {
+      document.documentElement.dataset.theme = head.dark ? "dark" : "light";
+      pane.restyle();
+    }
+    if (head.kind !== "cells") describe(element, pane);
+  },
+  closed: () => {
+    element("title").setAttribute("aria-busy", "true");
+    if (document.activeElement === canvas) view.contentWindow.focus();
+  },
+});
+split(element("splitter"));
+
+/* Keys that mean nothing here are the view's: its commands, and the palette of them. */
+document.addEventListener("keydown", (event) => {
+  if (event.defaultPrevented || ["Tab", "Shift", "Control", "Alt", "Meta"].includes(event.key)) return;
+  const there = view.contentWindow;
+  if (!there) return;
+  if (event.ctrlKey || event.metaKey) {
+    if (event.key !== "k" && event.key !== "z" && event.key !== "Z" && event.key !== "s") return;
+    event.preventDefault();
+    if (event.key === "k") there.focus();
+  }
+  const { key, code, ctrlKey, metaKey, shiftKey, altKey } = event;
+  const same = { key, code, ctrlKey, metaKey, shiftKey, altKey, bubbles: true, cancelable: true };
+  there.document.body.dispatchEvent(new there.KeyboardEvent("keydown", same));
+});
