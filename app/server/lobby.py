@@ -17,7 +17,8 @@ from websockets.protocol import State
 from ..compute.cache import SharedCache
 from ..compute.process_pool import ProcessPool
 from ..files.shown_paths import shown_paths
-from .front_door import HELLO, BrowserConnection, FrontDoor, Visit, current_connection
+from .browser_connection import BrowserConnection, current_connection
+from .front_door import HELLO, FrontDoor, Visit
 from .session import Session
 from .viser_server import quiet_server
 
@@ -165,7 +166,6 @@ class Lobby:
         waiting.connection.loop.call_soon_threadsafe(self._tell_page, visit.page)
         if waiting.connection.state is not State.OPEN:  # it disconnected while its session was opened
             self.disconnected(client)
-
 
     def _tell_page(self, token: str) -> None:
         """Wake the websocket that waits for the session of its page; on the event loop."""

@@ -14,7 +14,7 @@ from websockets.frames import CloseCode
 from ..shell import commands
 from ..shell.map_parts import map_parts
 from ..state.state import State
-from .front_door import BrowserConnection
+from .browser_connection import BrowserConnection
 
 __all__ = ["MapPane"]
 
@@ -32,6 +32,7 @@ class _Link:
     def put(self, parts: dict[str, bytes]) -> None:
         """Add messages, on the event loop; those of their kinds that were not sent are dropped."""
         self.unsent |= parts
+        self.unsent["look"] = self.unsent.pop("look")  # it comes last
         self.some.set()
 
     async def send(self) -> None:
@@ -66,6 +67,7 @@ class MapPane:
             changed = {kind: part for kind, part in parts.items() if part != self._parts.get(kind)}
             self._parts = parts
             if self._link and changed:
+                changed["look"] = parts["look"]
                 self._link.connection.loop.call_soon_threadsafe(self._link.put, changed)
 
     async def serve(self, connection: BrowserConnection) -> None:
@@ -73,7 +75,8 @@ class MapPane:
         link = _Link(connection)
         with self._lock:
             closed, earlier, self._link = self._closed, self._link, link
-            link.put(self._parts)
+            if self._parts:
+                link.put(self._parts)
         if closed:
             return
         if earlier:

@@ -32,7 +32,8 @@ from ..state.requests import CompareRequest, ExplainRequest, MapRequest, Request
 from ..state.state import State
 from ..state.undo import remember
 from .actions import Actions, camera_of
-from .front_door import BrowserConnection, Visit
+from .browser_connection import BrowserConnection
+from .front_door import Visit
 from .map_pane import MapPane
 from .playback_clock import PlaybackClock
 from .survey_actions import SurveyActions

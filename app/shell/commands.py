@@ -39,7 +39,7 @@ class _Deed(msgspec.Struct, tag_field="do", forbid_unknown_fields=True, frozen=T
         raise NotImplementedError
 
 
-class Pick(_Deed, tag="pick"):
+class Pick(_Deed, frozen=True, tag="pick"):
     """Picks a cell (row, column) of the map before it is shifted."""
 
     row: Index
@@ -50,7 +50,7 @@ class Pick(_Deed, tag="pick"):
         return changes.choose_surface_cell(state, self.row, self.column) if _has(state, self) else state
 
 
-class Turn(_Deed, tag="turn"):
+class Turn(_Deed, frozen=True, tag="turn"):
     """Turns the object to δ (rad)."""
 
     delta: Angle
@@ -70,7 +70,7 @@ class Turn(_Deed, tag="turn"):
         return changes.turn(state, self.delta)
 
 
-class Hover(_Deed, tag="hover"):
+class Hover(_Deed, frozen=True, tag="hover"):
     """Points at a cell (row, column) of the map before it is shifted."""
 
     row: Index
@@ -90,7 +90,7 @@ class Hover(_Deed, tag="hover"):
         return replace(state, map_view=replace(state.map_view, hovered=cell))
 
 
-class Leave(_Deed, tag="leave"):
+class Leave(_Deed, frozen=True, tag="leave"):
     """Points at no cell any more."""
 
     @property

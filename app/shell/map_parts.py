@@ -10,7 +10,7 @@ four bytes, and arrays. Its ``kind`` says what it is about:
 ``prints``
     the cells under the hands, in the frame of the turned object: the index of the colour (uint8).
 ``look``
-    everything else, δ among it: no arrays.
+    everything else, δ among it: no arrays. It comes last, and what came before it is shown with it.
 """
 
 from __future__ import annotations

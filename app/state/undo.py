@@ -31,8 +31,8 @@ def remember(before: State, after: State, origin: str, time: float) -> State:
     Args:
         before: the state that was changed.
         after: the changed one.
-        origin: "inputs", "gizmo", "map" or "scrub" if the change may be part of a drag; "play" for the playback,
-            which is not recorded.
+        origin: "inputs", "gizmo", "map" or "scrub" if the change may be part of a drag; "play" for the
+            playback, which is not recorded.
         time: of the change (s), by a monotonic clock.
     """
     if after.history is not before.history:  # the change was an undo or a redo

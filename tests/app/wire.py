@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import http.client
 import re
+import secrets
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
@@ -12,12 +15,18 @@ from typing import Any, Self
 import msgspec
 import viser
 import zstandard
-from websockets.sync.client import connect
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from app.server.front_door import HELLO
+from app.server.front_door import HELLO, MAP
+from app.server.origins import VIEW
+from tests.app.shown_map import ShownMap
 
 WAIT = 60.0
+
+PAUSE = 0.02
+"""How long (s) one connection is waited for before the other is looked at."""
 
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (1.5, 1.5, 1.0), "fov": 0.7,
@@ -33,12 +42,17 @@ class Wire:
         widgets: uuid → the properties of everything in the panels.
         commands: label → uuid of the commands in the palette.
         socket: the connection.
+        map: what it is shown of the map.
+        map_socket: the connection for that; None before it has its session.
+        token: of its page.
     """
 
     def __init__(self, port: int, query: str = "") -> None:
         self.port, self.query = port, query
         self.widgets: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, str] = {}
+        self.map, self.map_socket = ShownMap(), None
+        self.token = secrets.token_urlsafe(24)
         self.socket = connect(
             f"ws://127.0.0.1:{port}",
             origin=Origin(f"http://127.0.0.1:{port}"),
@@ -55,10 +69,17 @@ class Wire:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.socket.close()
+        if self.map_socket:
+            self.map_socket.close()
 
     def html(self) -> str:
-        """Everything that is written in the panels."""
-        return "\n".join(w["content"] for w in self.widgets.values() if isinstance(w.get("content"), str))
+        """Everything that is written in the panels and around the map, and the map as a picture."""
+        written = [w["content"] for w in self.widgets.values() if isinstance(w.get("content"), str)]
+        picture = self.map.picture()
+        if picture is not None:
+            digest = hashlib.sha256(picture.tobytes()).hexdigest()
+            written.append(f'<img alt="map" src="{digest}">')
+        return "\n".join([*written, self.map.title, *self.map.legend])
 
     def wait_for(self, text: str | Callable[[str], bool]) -> str:
         """Read on until the panels say so; return what they say."""
@@ -97,7 +118,21 @@ class Wire:
         self.socket.send(msgspec.msgpack.encode(message))
 
     def _read(self, timeout: float = WAIT) -> None:
-        data = self.socket.recv(timeout)
+        """Take the next message for the panels or for the map."""
+        deadline = time.monotonic() + timeout
+        while time.monotonic() < deadline:
+            with suppress(TimeoutError, ConnectionClosed):
+                if self.map_socket:
+                    message = self.map_socket.recv(0)
+                    assert isinstance(message, bytes)
+                    self.map.take(message)
+                    return
+            with suppress(TimeoutError):
+                self._take_all(self.socket.recv(PAUSE))
+                return
+        raise TimeoutError
+
+    def _take_all(self, data: str | bytes) -> None:
         assert isinstance(data, bytes)
         size = int.from_bytes(data[8:16], "little")
         inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
@@ -119,11 +154,23 @@ class Wire:
                 self.greet(found[1])
 
     def greet(self, path: str) -> None:
-        page = f"http://127.0.0.1:{self.port}/" + (f"?{self.query}" if self.query else "")
+        settings = [setting for setting in (self.query, f"{VIEW}={self.token}") if setting]
+        page = f"http://127.0.0.1:{self.port}/?{'&'.join(settings)}"
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT)
         connection.request("GET", path, headers={"Referer": page})
         assert connection.getresponse().status == 200
         connection.close()
+        self.map_socket = self.open_map()
+
+    def open_map(self, token: str | None = None) -> ClientConnection:
+        """Open the websocket of the map, by default that of this visitor's page."""
+        return connect(
+            f"ws://127.0.0.1:{self.port}{MAP}{token or self.token}",
+            origin=Origin(f"http://127.0.0.1:{self.port}"),
+            compression=None,
+            max_size=None,
+            open_timeout=WAIT,
+        )
 
 
 def _is_input(widget: dict[str, Any], label: str) -> bool:

@@ -5,19 +5,22 @@ from __future__ import annotations
 import base64
 import io
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Frame, Locator, Page, WebSocket, expect
 
-from app.panels.layout import panel_widths
+from app.panels.layout import panels_width
 from app.render.palette import rgb
 from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
+from app.server.front_door import MAP
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
+from tests.app.shown_map import ShownMap
 
 WAIT = 30_000
 """Longest wait (ms) for anything: the machine may be busy."""
@@ -52,56 +55,86 @@ class GraspPage:
     def __init__(self, page: Page, address: str, wait_for_map: bool = True) -> None:
         self.page = page
         self.complaints: list[str] = []
+        self.shown_map = ShownMap()
         page.set_default_timeout(WAIT)
+        page.on("websocket", self._listen)
         page.on("console", lambda message: self._note(message.text if message.type == "error" else ""))
         page.on("pageerror", lambda error: self._note(str(error)))
         page.goto(address)
         if wait_for_map:
-            self.map.wait_for()
+            expect(page.locator("#nothing")).to_be_hidden()
 
     def _note(self, complaint: str) -> None:
         if complaint and not any(text in complaint for text in HARMLESS):
             self.complaints.append(complaint)
 
+    def _listen(self, websocket: WebSocket) -> None:
+        if MAP in websocket.url:
+            websocket.on("framereceived", self._take)
+
+    def _take(self, message: bytes | str) -> None:
+        assert isinstance(message, bytes)
+        self.shown_map.take(message)
+
+    @property
+    def frame(self) -> Frame:
+        """viser's part of the page."""
+        frame = self.page.frame(name="view")
+        assert frame
+        return frame
+
     # -- what is seen -----------------------------------------------------------------------
 
     @property
     def map(self) -> Locator:
-        return self.page.locator("img[alt='map']")
+        return self.page.get_by_test_id("map")
 
     @property
     def alerts(self) -> Locator:
-        return self.page.get_by_role("alert").filter(visible=True).and_(self.page.locator(".sg-note"))
+        return self.frame.get_by_role("alert").filter(visible=True).and_(self.frame.locator(".sg-note"))
 
     def text(self, text: str) -> Locator:
         """What is seen of a text; tabs that were looked at before are still there, out of sight."""
-        return self.page.get_by_text(text).filter(visible=True)
+        return self.frame.get_by_text(text).filter(visible=True)
+
+    def around(self, text: str) -> Locator:
+        """What is seen of a text around the map."""
+        return self.page.locator("#pane").get_by_text(text).filter(visible=True)
+
+    @property
+    def legend(self) -> Locator:
+        return self.page.locator("#legend")
 
     def expect_title(self, text: str) -> None:
         """Wait for the map of that scene, task or arm, up to date."""
-        title = self.page.locator(".sg-title")
+        title = self.page.locator("#title")
         expect(title).to_contain_text(text)
         expect(title).to_have_attribute("aria-busy", "false")
         expect(self.text("Ready.")).to_be_visible()
 
     def picture(self, alt: str = "map") -> np.ndarray:
-        """Decode a picture that is shown: (H, W, 3)."""
-        return decode(self.page.locator(f"img[alt='{alt}']").get_attribute("src") or "")
+        """Return a picture that is shown: (H, W, 3)."""
+        if alt == "map":
+            shown = self.shown_map.picture()
+            assert shown is not None
+            return shown
+        return decode(self.frame.locator(f"img[alt='{alt}']").get_attribute("src") or "")
 
     def wait_for_picture(self, right: Callable[[np.ndarray], bool]) -> np.ndarray:
         """Wait until the map's picture is right."""
-        while True:
-            source = self.map.get_attribute("src") or ""
-            picture = decode(source)
-            if right(picture):
-                return picture
-            self.page.wait_for_function(
-                "old => document.querySelector(\"img[alt='map']\")?.src !== old", arg=source, timeout=WAIT
-            )
+        deadline = time.monotonic() + WAIT / 1000
+        while not right(picture := self.picture()):
+            assert time.monotonic() < deadline, "the map never became right"
+            self.next_frame()
+        return picture
+
+    def next_frame(self) -> None:
+        """Wait until the page has drawn again."""
+        self.page.evaluate("() => new Promise(done => requestAnimationFrame(done))")
 
     def view(self) -> np.ndarray:
         """Return the 3D view between the panels: (H, W, 3)."""
-        png = self.page.locator("canvas").first.screenshot()
+        png = self.frame.locator("canvas").first.screenshot()
         return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
 
     def wait_for_view(self, right: Callable[[np.ndarray], bool]) -> np.ndarray:
@@ -110,7 +143,7 @@ class GraspPage:
             view = self.view()
             if right(view):
                 return view
-            self.page.evaluate("() => new Promise(done => requestAnimationFrame(done))")
+            self.next_frame()
         raise AssertionError("the 3D view never became right")
 
     def settled_view(self) -> np.ndarray:
@@ -133,14 +166,14 @@ class GraspPage:
     # -- what can be done -------------------------------------------------------------------
 
     def button(self, name: str) -> Locator:
-        return self.page.get_by_role("button", name=name, exact=True)
+        return self.frame.get_by_role("button", name=name, exact=True)
 
     def tab(self, name: str) -> None:
-        self.page.get_by_role("tab", name=name, exact=True).click()
+        self.frame.get_by_role("tab", name=name, exact=True).click()
 
     def choose(self, label: str, option: str) -> None:
-        self.page.get_by_label(label, exact=True).filter(visible=True).click()
-        self.page.get_by_role("option", name=option, exact=True).click()
+        self.frame.get_by_label(label, exact=True).filter(visible=True).click()
+        self.frame.get_by_role("option", name=option, exact=True).click()
 
     def upload(self, path: Path) -> None:
         with self.page.expect_file_chooser() as chooser:
@@ -148,7 +181,7 @@ class GraspPage:
         chooser.value.set_files(path)
 
     def number(self, label: str, value: float) -> None:
-        self._enter(self.page.get_by_label(label, exact=True), value)
+        self._enter(self.frame.get_by_label(label, exact=True), value)
 
     def slide(self, label: str, value: float) -> None:
         """Set a slider through its number box; arrow keys would turn the camera as well."""
@@ -166,16 +199,17 @@ class GraspPage:
         box.press("Enter", delay=PACE)
 
     def slider_box(self, label: str) -> Locator:
-        row = self.page.locator(f"xpath=//*[normalize-space(text())='{label}']/ancestor::*[.//input][1]")
+        row = self.frame.locator(f"xpath=//*[normalize-space(text())='{label}']/ancestor::*[.//input][1]")
         return row.locator("input").filter(visible=True).last
 
     def at(self, scene: Scene, point: np.ndarray) -> tuple[float, float]:
         """Return the pixel of a point (3,) of the world, seen from where the page looks at first."""
-        box, size = self.page.locator("canvas").first.bounding_box(), self.page.viewport_size
+        box = self.frame.locator("canvas").first.bounding_box()
+        size = self.page.locator("#view").bounding_box()
         assert box
         assert size
         view = choose_viewpoint(scene, scene.task().T_world_object)
-        eye = view.camera((size["width"] - sum(panel_widths(size["width"]))) / size["height"])
+        eye = view.camera((size["width"] - panels_width(round(size["width"]))) / size["height"])
         forward = (view.look_at - eye) / np.linalg.norm(view.look_at - eye)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)

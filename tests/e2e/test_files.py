@@ -23,11 +23,11 @@ SCRIPT = "<script>window.hacked=1</script>"
 
 
 def files(page: GraspPage) -> None:
-    page.page.get_by_role("tab", name="Files").click()
+    page.frame.get_by_role("tab", name="Files").click()
 
 
 def maps(page: GraspPage) -> None:
-    page.page.get_by_role("tab", name="Grasp map").click()
+    page.frame.get_by_role("tab", name="Grasp map").click()
 
 
 def download(page: GraspPage, button: str, to: Path) -> Path:
@@ -59,7 +59,7 @@ def test_a_scene_is_saved_as_it_was_changed_and_opened_again(open_page, tmp_path
     page.choose("Scene", "soda_can")
     expect(page.text("the can turns")).to_be_visible()
     open_scene(page, path)
-    expect(page.page.get_by_label("Scene", exact=True)).to_have_value(f"{path.name} (upload)")
+    expect(page.frame.get_by_label("Scene", exact=True)).to_have_value(f"{path.name} (upload)")
     maps(page)
     page.expect_title("bottle_on_table")
     page.wait_for_picture(lambda p: np.array_equal(p, seen))
@@ -83,10 +83,10 @@ def test_a_link_opens_the_page_as_it_was(open_page, browser: Browser):
     page.number("θ (°)", 60)
     page.expect_title("· pour ·")
     expect(page.text("h = 12 cm, θ = 60°")).to_be_visible()  # each number is answered in its turn
-    seen, held = page.picture(), page.page.locator(".sg", has_text="h = 12 cm").inner_text()
+    seen, held = page.picture(), page.frame.locator(".sg", has_text="h = 12 cm").inner_text()
     files(page)
     page.button("Make a link").click()
-    address = page.page.locator(".sg-link").get_attribute("href") or ""
+    address = page.frame.locator(".sg-link").get_attribute("href") or ""
     assert re.match(r"http://127\.0\.0\.1:\d+/\?scene=pick_pour_place&task=pour&", address)
     shoot(page, "files")
     context = browser.new_context(viewport={"width": 1280, "height": 800})
@@ -95,12 +95,12 @@ def test_a_link_opens_the_page_as_it_was(open_page, browser: Browser):
         other.expect_title("pick_pour_place · pour · panda")
         other.wait_for_picture(lambda p: np.array_equal(p, seen))
         expect(other.text("h = 12 cm")).to_be_visible()
-        assert other.page.locator(".sg", has_text="h = 12 cm").inner_text() == held
+        assert other.frame.locator(".sg", has_text="h = 12 cm").inner_text() == held
         expect(other.slider_box("Rotation (°)")).to_have_value("-40")
-        expect(other.page.get_by_label("Scene", exact=True)).to_have_value("pick_pour_place")
+        expect(other.frame.get_by_label("Scene", exact=True)).to_have_value("pick_pour_place")
         wrong = GraspPage(context.new_page(), address.split("?")[0] + f"?scene={SCRIPT}")
         expect(wrong.alerts).to_contain_text("expected one of")  # and the first scene is there all the same
-        assert wrong.page.evaluate("window.hacked") is None
+        assert wrong.frame.evaluate("window.hacked") is None
         assert page.complaints == other.complaints == wrong.complaints == []
     finally:
         context.close()
@@ -143,7 +143,7 @@ def test_what_a_hostile_scene_says_is_shown_as_text(open_page, content, tmp_path
     files(page)
     open_scene(page, path)
     expect(page.text(f"the {HOSTILE} turns")).to_be_visible()
-    expect(page.page.get_by_label("Scene", exact=True)).to_have_value(f"{path.name} (upload)")
+    expect(page.frame.get_by_label("Scene", exact=True)).to_have_value(f"{path.name} (upload)")
     maps(page)
     page.expect_title(f"{SCRIPT} · {HOSTILE}task · {HOSTILE}robot")
     page.number("h (cm)", 4)
@@ -170,7 +170,7 @@ def test_what_a_hostile_scene_says_is_shown_as_text(open_page, content, tmp_path
     expect(page.alerts).to_contain_text(
         f"robots[0].urdf: '{HOSTILE}': expected a file of an installed package"
     )
-    assert page.page.evaluate("window.hacked") is None
+    assert page.frame.evaluate("window.hacked") is None
     assert page.complaints == []
 
 
@@ -184,7 +184,7 @@ def test_a_scene_that_asks_for_the_servers_files_is_refused(open_page, content, 
     open_scene(page, path)
     expect(page.alerts).to_contain_text("mine.yaml: obstacles[3].mesh:")
     expect(page.alerts).to_contain_text("expected a file of an installed package")
-    expect(page.page.get_by_label("Scene", exact=True)).to_have_value("bottle_on_table")
+    expect(page.frame.get_by_label("Scene", exact=True)).to_have_value("bottle_on_table")
     large = tmp_path / "large.yaml"
     large.write_bytes(bytes(1_000_001))
     open_scene(page, large)

@@ -52,7 +52,7 @@ def test_a_file_that_is_too_large_is_refused_and_the_next_one_is_taken(open_page
     large, empty = tmp_path / "large.stl", tmp_path / "empty.stl"
     large.write_bytes(bytes(20_000_001))
     empty.write_bytes(b"")
-    chooser = page.page.locator("input[type=file]").nth(1)  # that of "Upload a mesh"
+    chooser = page.frame.locator("input[type=file]").nth(1)  # that of "Upload a mesh"
     chooser.set_input_files(large)
     expect(page.alerts).to_contain_text("large.stl: size of the file")
     expect(page.alerts).to_contain_text("expected a file of at most 20 MB")

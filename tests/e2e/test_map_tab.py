@@ -62,8 +62,8 @@ def reds(view: np.ndarray) -> int:
 
 def test_shifted_against_recomputed(open_page, bottle_map):
     page = open_page()
-    page.page.get_by_role("tab", name="View").click()
-    page.page.get_by_label("Compare").check()
+    page.frame.get_by_role("tab", name="View").click()
+    page.frame.get_by_label("Compare").check()
     cells = bottle_map.reason.size
     for degrees in (0.0, 37.25, -120.0):
         page.slide("Rotation (°)", degrees)
@@ -71,25 +71,25 @@ def test_shifted_against_recomputed(open_page, bottle_map):
         shifted = bottle_map.shift(np.deg2rad(degrees))
         page.wait_for_picture(lambda p, m=shifted: np.array_equal(p, drawn(m, ColorBy.REASON)))
         assert np.array_equal(page.picture("recomputed map"), page.picture())
-    slider = page.page.get_by_role("slider").first
+    slider = page.frame.get_by_role("slider").first
     slider.focus()
     for _ in range(4):
         slider.press("ArrowRight")
     expect(page.text(f"for -119.00°: 0 of {cells} cells differ")).to_be_visible()
     shoot(page, "compare")
-    page.page.get_by_label("Compare").uncheck()
-    expect(page.page.locator("img[alt='recomputed map']")).to_have_count(0)
+    page.frame.get_by_label("Compare").uncheck()
+    expect(page.frame.locator("img[alt='recomputed map']")).to_have_count(0)
     assert page.complaints == []
 
 
 def test_views_of_the_map_and_their_pictures(open_page, bottle_map, tmp_path):
     page = open_page()
     before = page.settled_view()
-    page.page.get_by_role("tab", name="View").click()
+    page.frame.get_by_role("tab", name="View").click()
     for view in (ColorBy.FEASIBLE, ColorBy.ALONG, ColorBy.AROUND, ColorBy.OPENING, ColorBy.CLEARANCE):
         page.choose("Colours show", view)
         page.wait_for_picture(lambda p, v=view: np.array_equal(p, drawn(bottle_map, v)))
-        expect(page.text(f"{view} ({view.unit})" if view.unit else "not feasible").first).to_be_visible()
+        expect(page.around(f"{view} ({view.unit})" if view.unit else "not feasible").first).to_be_visible()
     page.wait_for_change(before, share=0.001)  # the bottle and the board have the same colours
     shoot(page, "clearance")
     for kind, check in (("PNG", _is_png), ("SVG", _is_svg)):
@@ -117,7 +117,7 @@ def test_the_candidates_of_a_cell(open_page, bottle_map):
     best = hit.best
     assert best
     expect(page.text(candidate_text(best))).to_be_visible()
-    expect(page.page.locator("img[alt='candidates']")).to_be_visible()
+    expect(page.frame.locator("img[alt='candidates']")).to_be_visible()
     page.wait_for_view(lambda v: reds(v) > reds(parked) + 300)
     shoot(page, "ghost")
     last = len(hit.candidates)
@@ -136,9 +136,10 @@ def test_the_candidates_of_a_cell(open_page, bottle_map):
 
     pick(page, bottle_map, Reason.UNREACHABLE)
     expect(page.text("Out of reach: no configuration of the arm gets there")).to_be_visible()
-    expect(page.page.locator("img[alt='candidates']")).to_have_count(0)
-    page.page.get_by_role("tab", name="View").click()
-    page.page.get_by_label("Handprint").check()
-    expect(page.page.locator("img[alt='handprints']")).to_have_count(1)
+    expect(page.frame.locator("img[alt='candidates']")).to_have_count(0)
+    page.frame.get_by_role("tab", name="View").click()
+    page.frame.get_by_label("Handprint").check()
+    expect(page.around("hand of panda")).to_be_visible()
+    assert page.shown_map.has_prints
     shoot(page, "handprint")
     assert page.complaints == []

@@ -57,8 +57,8 @@ def test_the_first_page(open_page, bottle_map):
     expect(page.text("Then click a green cell")).to_be_visible()
     page.expect_title("bottle_on_table · pick · panda")
     assert np.array_equal(page.picture(), drawn(bottle_map))
-    for text in ("h (cm)", "θ (°)", "feasible", "hits an obstacle", "out of reach"):
-        expect(page.text(text).first).to_be_visible()
+    for text in ("feasible", "hits an obstacle", "out of reach"):
+        expect(page.around(text).first).to_be_visible()
     page.settled_view()
     assert page.complaints == []
 
@@ -67,13 +67,13 @@ def test_the_first_page(open_page, bottle_map):
 def test_turning_the_object_rolls_the_map(open_page, bottle_map, degrees):
     page = open_page()
     before = page.picture()
-    counts = page.page.locator(".sg-legend").inner_text()
+    counts = page.legend.inner_text()
     columns = -int(degrees * COLUMNS_PER_DEGREE)
     assert not np.array_equal(np.roll(before, columns, axis=1), before)
     page.slide("Rotation (°)", degrees)
     after = page.wait_for_picture(lambda p: np.array_equal(p, np.roll(before, columns, axis=1)))
     assert np.array_equal(after, drawn(bottle_map.shift(np.deg2rad(degrees))))
-    assert page.page.locator(".sg-legend").inner_text() == counts
+    assert page.legend.inner_text() == counts
     expect(page.text("Ready.")).to_be_visible()
     expect(page.button("Cancel")).to_be_disabled()
 
@@ -81,7 +81,7 @@ def test_turning_the_object_rolls_the_map(open_page, bottle_map, degrees):
 def test_dragging_the_slider_rolls_the_map_too(open_page):
     page = open_page()
     before = page.picture()
-    slider = page.page.get_by_role("slider").first
+    slider = page.frame.get_by_role("slider").first
     slider.focus()
     for _ in range(3):
         slider.press("ArrowRight")
@@ -115,7 +115,7 @@ def test_a_feasible_cell_poses_the_arm(open_page, bottle_map):
     expect(page.text("panda holds it: feasible")).to_be_visible()
     expect(page.text(f"Joints {joints}")).to_be_visible()
     page.wait_for_change(parked)
-    expect(page.page.locator(".sg-mark")).to_have_count(1)
+    assert len(page.shown_map.look["marks"]) == 1
     page.button("Let go").click()
     expect(page.text("No grasp picked")).to_be_visible()
 
@@ -174,7 +174,7 @@ def test_clicking_the_flat_map_picks_a_cell(open_page, bottle_map):
 def test_dragging_the_handles_moves_the_object(open_page):
     page = open_page()
     page.settled_view()
-    page.page.get_by_label("Drag handles").check()
+    page.frame.get_by_label("Drag handles").check()
     bottle = BOTTLE.task().T_world_object[:3, 3]
     page.drag_3d(BOTTLE, bottle + np.array([0.0, 0.13, 0.0]), bottle + np.array([0.0, 0.23, 0.0]))
     box = page.slider_box("y (cm)")
@@ -220,11 +220,11 @@ def test_one_grasp_for_a_sequence(open_page, tmp_path):
     assert [task.name for task in plan.tasks] == ["pick", "pour", "place"]
     for k, task in enumerate(plan.tasks):
         page.slide("Plan step", k + 1)
-        expect(page.page.get_by_label("Task", exact=True)).to_have_value(task.name)
+        expect(page.frame.get_by_label("Task", exact=True)).to_have_value(task.name)
         turn = round(4 * np.rad2deg(task.delta)) / 4
         expect(page.slider_box("Rotation (°)")).to_have_value(f"{turn:g}")
-        assert page.page.locator(f"img[alt='plan map {task.name} panda']").count() == 1
-    marks = page.page.locator(".sg-mark").filter(visible=True)
+        assert page.frame.locator(f"img[alt='plan map {task.name} panda']").count() == 1
+    marks = page.frame.locator(".sg-mark").filter(visible=True)
     expect(marks).to_have_count(len(plan.tasks) + 1)  # and in all over each other
     page.tab("Grasp map")
     page.expect_title("· place ·")
@@ -241,10 +241,10 @@ def test_two_arms_together(open_page, tmp_path):
     expect(page.text("2 arms hold the object together in lift.")).to_be_visible()
     plan = check_plan(page.download_plan(tmp_path), "bimanual")
     assert [hold.arm for hold in plan.tasks[0].holds] == ["left", "right"]
-    expect(page.page.locator("img[alt='handprints']").filter(visible=True)).to_have_count(2)
+    expect(page.frame.locator("img[alt='handprints']").filter(visible=True)).to_have_count(2)
     page.tab("Grasp map")
     for arm in ("left", "right"):
-        expect(page.text(f"hand of {arm}")).to_be_visible()
+        expect(page.around(f"hand of {arm}")).to_be_visible()
     page.wait_for_change(parked)
     page.choose("Arm", "right")
     page.expect_title("· right")
@@ -307,7 +307,7 @@ def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
     assert np.array_equal(page.picture(), drawn(bottle_map))
     page.choose("Mesh unit", "mm")
     page.upload(path)
-    expect(page.page.get_by_label("Object", exact=True)).to_have_value(f"{hostile} (upload)")
+    expect(page.frame.get_by_label("Object", exact=True)).to_have_value(f"{hostile} (upload)")
     expect(page.alerts).to_have_count(0)
     page.expect_title("bottle_on_table")
     object_choice = from_mesh(hostile, path.read_bytes(), 1e-3)
@@ -318,20 +318,20 @@ def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
     page.choose("Object", f"{hostile} (upload)")  # it may go into any scene
     expect(page.text(f"the {object_choice.name} turns")).to_be_visible()
     page.expect_title("soda_can")
-    assert page.page.evaluate("window.hacked") is None
+    assert page.frame.evaluate("window.hacked") is None
     assert page.complaints == []
 
 
 def test_the_symmetry_error_is_told_and_painted(open_page, tmp_path):
     page = open_page()
     expect(page.text("The hand franka fits from 0.9 to 19.1 and 24.0 to 29.1 cm.")).to_be_visible()
-    expect(page.page.get_by_label("Colours", exact=True)).to_have_count(0)
+    expect(page.frame.get_by_label("Colours", exact=True)).to_have_count(0)
     path = tmp_path / "oval.stl"
     path.write_bytes(oval_stl())
     page.upload(path)
     expect(page.text("Symmetry error: 0.99 mm at most")).to_be_visible()
     page.expect_title("bottle_on_table")
-    page.page.get_by_label("Flat map").uncheck()
+    page.frame.get_by_label("Flat map").uncheck()
 
     def reds(view: np.ndarray) -> int:  # of the cells whose grasps hit an obstacle
         red = REASONS[Reason.SCENE_COLLISION].astype(int)
@@ -348,11 +348,11 @@ def test_the_symmetry_error_is_told_and_painted(open_page, tmp_path):
 
 def test_another_hand_is_mounted_where_the_scene_mounts_one(open_page):
     page = open_page(scene="log_iiwa_and_panda")
-    page.page.get_by_text("Robot", exact=True).first.click()
-    expect(page.page.get_by_label("Hand", exact=True)).to_have_value("as in the URDF")  # the Panda's own
+    page.frame.get_by_text("Robot", exact=True).first.click()
+    expect(page.frame.get_by_label("Hand", exact=True)).to_have_value("as in the URDF")  # the Panda's own
     page.choose("Arm", "iiwa")
     page.expect_title("· iiwa")
-    expect(page.page.get_by_label("Hand", exact=True)).to_have_value("wsg50")
+    expect(page.frame.get_by_label("Hand", exact=True)).to_have_value("wsg50")
     page.choose("Hand", "pr2")
     expect(page.text("The hand pr2 fits from ")).to_be_visible()
     page.expect_title("· iiwa")
@@ -360,7 +360,7 @@ def test_another_hand_is_mounted_where_the_scene_mounts_one(open_page):
     assert np.array_equal(page.picture(), drawn(create_map(changed, task="lift", arm="iiwa")))
     page.choose("Object", "log_70mm")  # into the scene with the other hand
     expect(page.text("the log_70mm turns")).to_be_visible()
-    expect(page.page.get_by_label("Hand", exact=True)).to_have_value("pr2")
+    expect(page.frame.get_by_label("Hand", exact=True)).to_have_value("pr2")
     assert page.complaints == []
 
 
@@ -374,7 +374,7 @@ def test_meshes_that_are_unusable_are_refused_in_a_line(open_page, bottle_map, t
     page.upload(large)
     expect(page.alerts).to_contain_text("large.stl: size of the file: 20.0 MB")
     expect(page.alerts).to_contain_text("at most 20 MB")
-    expect(page.page.get_by_label("Object", exact=True)).to_have_value("the scene's own")
+    expect(page.frame.get_by_label("Object", exact=True)).to_have_value("the scene's own")
     page.expect_title("bottle_on_table")
     assert np.array_equal(page.picture(), drawn(bottle_map))
     assert page.complaints == []
@@ -422,12 +422,12 @@ def test_names_from_a_file_are_shown_as_text(open_page, tmp_path, content):
     expect(page.text(f"the {hostile} turns")).to_be_visible()
     page.number("h (cm)", 4)
     page.number("θ (°)", 90)
-    why = page.page.locator(".sg-candidate")
+    why = page.frame.locator(".sg-candidate")
     expect(why).to_contain_text(f"{hostile}robot/")
     expect(why).to_contain_text(f"and {hostile}")
     page.tab("Sequence")
     page.button("One grasp for all tasks").click()
     expect(page.text(f"{hostile}robot: {script}task")).to_be_visible()
-    expect(page.page.locator(".sg-now", has_text=f"1 · {script}task").first).to_be_visible()
-    assert page.page.evaluate("window.hacked") is None
+    expect(page.frame.locator(".sg-now", has_text=f"1 · {script}task").first).to_be_visible()
+    assert page.frame.evaluate("window.hacked") is None
     assert page.complaints == []

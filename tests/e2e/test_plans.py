@@ -23,11 +23,11 @@ def shoot(page: GraspPage, name: str) -> None:
 
 
 def shown(page: GraspPage, selector: str) -> Locator:
-    return page.page.locator(selector).filter(visible=True)
+    return page.frame.locator(selector).filter(visible=True)
 
 
 def chosen(page: GraspPage, label: str) -> Locator:
-    return page.page.get_by_label(label, exact=True).filter(visible=True)
+    return page.frame.get_by_label(label, exact=True).filter(visible=True)
 
 
 def download(page: GraspPage, form: str, to: Path) -> Path:
@@ -179,7 +179,7 @@ def test_a_plan_goes_out_in_every_format_and_comes_back_verified(open_page, tmp_
     other.slide("Plan step", 3)
     expect(chosen(other, "Task")).to_have_value("place")
     assert Plan.load(download(other, "JSON", tmp_path)) == plan
-    assert other.page.evaluate("window.hacked") is None
+    assert other.frame.evaluate("window.hacked") is None
     assert page.complaints == other.complaints == []
 
 

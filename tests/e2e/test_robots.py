@@ -20,7 +20,7 @@ HANDLE = np.array([0.073, 0.073, 0.0])
 
 
 def open_robot_folder(page: GraspPage) -> None:
-    page.page.get_by_text("Robot", exact=True).first.click()
+    page.frame.get_by_text("Robot", exact=True).first.click()
     expect(page.button("Upload a robot")).to_be_visible()
 
 
@@ -39,7 +39,7 @@ def test_a_robot_from_the_list_and_back(open_page):
     assert not page.alerts.all()
     open_page().expect_title("panda")  # another browser sees nothing of it
     page.number("Base x (cm)", 12.5)
-    expect(page.page.get_by_label("Base x (cm)")).to_have_value("12.5")
+    expect(page.frame.get_by_label("Base x (cm)")).to_have_value("12.5")
     page.expect_title("iiwa")
     page.button("Undo").click()
     page.button("Undo").click()
@@ -53,7 +53,7 @@ def test_nothing_of_the_panel_is_cut_off(open_page, size):
     expect(page.text("Ready.")).to_be_visible()
     open_robot_folder(page)
     for label in ("Robot", "Tool link", "Hand", "Base x (cm)", "Base turn (°)", "Base handles"):
-        box = page.page.get_by_label(label, exact=True).filter(visible=True).bounding_box()
+        box = page.frame.get_by_label(label, exact=True).filter(visible=True).bounding_box()
         assert box
         assert 0 < box["x"] < box["x"] + box["width"] < size[0]
     text = page.button("Upload a robot").locator("span", has_text="Upload a robot").last
@@ -65,13 +65,13 @@ def test_the_base_is_dragged_saved_and_put_back(open_page, tmp_path):
     page.expect_title("panda")
     before = page.map.get_attribute("src")
     open_robot_folder(page)
-    page.page.get_by_label("Base handles").check()
+    page.frame.get_by_label("Base handles").check()
     page.drag_3d(BOTTLE, HANDLE, HANDLE + np.array([0.1, 0.0, 0.0]))
     page.expect_title("panda")
-    shown = page.page.get_by_label("Base x (cm)").input_value()
+    shown = page.frame.get_by_label("Base x (cm)").input_value()
     x = float(shown)
     assert x == pytest.approx(10.0, abs=1.5)
-    assert float(page.page.get_by_label("Base z (cm)").input_value()) == pytest.approx(0.0, abs=1e-3)
+    assert float(page.frame.get_by_label("Base z (cm)").input_value()) == pytest.approx(0.0, abs=1e-3)
     assert page.map.get_attribute("src") != before
     page.tab("Files")
     with page.page.expect_download() as download:
@@ -81,7 +81,7 @@ def test_the_base_is_dragged_saved_and_put_back(open_page, tmp_path):
     assert 100 * Scene.load(saved).robots["panda"].T_world_base[0, 3] == pytest.approx(x, abs=1e-3)
     page.tab("Grasp map")
     page.button("Undo").click()  # on a slow machine a drag may be several steps
-    expect(page.page.get_by_label("Base x (cm)")).not_to_have_value(shown)
+    expect(page.frame.get_by_label("Base x (cm)")).not_to_have_value(shown)
     assert not page.complaints
 
 
@@ -97,7 +97,7 @@ def test_an_uploaded_robot_goes_into_a_file_and_opens_again(open_page, tmp_path)
     good = tmp_path / "my panda.zip"
     good.write_bytes(panda_archive())
     upload(page, "Upload a robot", good)
-    expect(page.page.get_by_label("Robot", exact=True)).to_have_value("my panda.zip (upload)")
+    expect(page.frame.get_by_label("Robot", exact=True)).to_have_value("my panda.zip (upload)")
     page.expect_title("panda")
     page.tab("Files")
     with page.page.expect_download() as download:
@@ -110,5 +110,5 @@ def test_an_uploaded_robot_goes_into_a_file_and_opens_again(open_page, tmp_path)
     another = open_page()
     another.tab("Files")
     upload(another, "Open a scene (YAML or ZIP)", saved)
-    expect(another.page.get_by_label("Scene", exact=True)).to_have_value(f"{saved.name} (upload)")
+    expect(another.frame.get_by_label("Scene", exact=True)).to_have_value(f"{saved.name} (upload)")
     assert not page.complaints

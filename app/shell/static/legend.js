@@ -1,7 +1,6 @@
 /* The words around the map: its title and legend. Texts may come from files, and are never markup. */
 export function describe(element, pane) {
   const { look, prints } = pane;
-  if (!look) return;
   const title = element("title");
   title.textContent = look.title + (look.stale && pane.hasMap ? " — of an earlier pose" : "");
   title.setAttribute("aria-busy", String(look.busy));

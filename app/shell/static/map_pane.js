@@ -19,6 +19,7 @@ export class MapPane {
     this.on = on;
     this.frame = new Frame();
     this.pointers = new Map();
+    this.arrived = [];
     this.cells = this.prints = this.look = this.own = this.hovered = null;
     new ResizeObserver(() => this.redraw()).observe(canvas);
     matchMedia("(resolution: 1dppx)").addEventListener("change", () => this.redraw());
@@ -43,7 +44,16 @@ export class MapPane {
     return this.own ?? this.look?.delta ?? 0;
   }
 
+  /** Keep a message; all of them are shown with the next look. */
   take(head, data) {
+    this.arrived.push([head, data]);
+    if (head.kind !== "look") return false;
+    for (const message of this.arrived.splice(0)) this.apply(...message);
+    this.redraw();
+    return true;
+  }
+
+  apply(head, data) {
     const size = head.heights * head.angles;
     if (head.kind === "cells") {
       this.cells = size ? {
@@ -64,7 +74,6 @@ export class MapPane {
       this.canvas.setAttribute("aria-label", `Unwrapped map: ${head.title}`);
       if (this.asked) this.speak();
     }
-    this.redraw();
   }
 
   restyle() {

@@ -22,13 +22,11 @@ const pane = new MapPane(canvas, {
 });
 const link = new Link(`/map/${token}`, {
   message: (head, data) => {
-    pane.take(head, data);
+    if (!pane.take(head, data)) return;
     element("nothing").hidden = pane.hasMap;
-    if (head.kind === "look") {
-      document.documentElement.dataset.theme = head.dark ? "dark" : "light";
-      pane.restyle();
-    }
-    if (head.kind !== "cells") describe(element, pane);
+    document.documentElement.dataset.theme = head.dark ? "dark" : "light";
+    pane.restyle();
+    describe(element, pane);
   },
   closed: () => {
     element("title").setAttribute("aria-busy", "true");

@@ -13,8 +13,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from app.server import front_door
-from app.server.front_door import HELLO, FrontDoor, Visit, is_foreign
+from app.server import browser_connection
+from app.server.front_door import HELLO, FrontDoor, Visit
+from app.server.origins import is_foreign
 from app.server.viser_server import any_port, quiet_server
 from tests.app.wire import CAMERA, Wire
 
@@ -90,6 +91,10 @@ def test_the_page_is_served(port):
     ("path", "headers", "status"),
     [
         ("/", {}, 200),
+        ("/shell/shell.js", {}, 200),
+        ("/shell/nothing.js", {}, 404),
+        ("/shell/../files.py", {}, 404),
+        ("/map/short", {}, 404),
         ("/nothing", {}, 404),
         (f"{HELLO}known", {"Sec_Fetch_Site": "same-origin"}, 200),
         (f"{HELLO}guessed", {"Sec_Fetch_Site": "same-origin"}, 404),
@@ -108,8 +113,30 @@ def test_every_answer_keeps_other_pages_from_using_it(port, path, headers, statu
     (policy,) = [line for line in lines if line.startswith("content-security-policy: ")]
     assert "default-src 'none'" in policy
     assert "frame-ancestors 'none'" in policy
-    assert f"connect-src ws://127.0.0.1:{port} wss://127.0.0.1:{port} data: blob:" in policy
-    assert "'unsafe-eval'" not in policy
+    assert "script-src 'self';" in policy
+    assert f"connect-src ws://127.0.0.1:{port} wss://127.0.0.1:{port};" in policy
+    assert "unsafe" not in policy
+
+
+def test_the_view_is_shown_inside_the_page_alone(port):
+    for inside, site, status in (
+        ("iframe", "same-origin", 200), ("iframe", "same-site", 403), ("iframe", "cross-site", 403),
+        ("embed", "same-origin", 403), ("document", "none", 200),
+    ):  # fmt: skip
+        answer = ask(port, "/?scene=soda_can&view=x", Sec_Fetch_Dest=inside, Sec_Fetch_Site=site)
+        assert answer.startswith(f"HTTP/1.1 {status} ".encode())
+        head = answer.partition(b"\r\n\r\n")[0].decode().lower()
+        assert "x-frame-options: sameorigin" in head
+        assert "frame-ancestors 'self'" in head
+        assert f"connect-src ws://127.0.0.1:{port} wss://127.0.0.1:{port} data: blob:" in head
+        assert "'unsafe-eval'" not in head
+
+
+def test_the_token_of_the_page_is_no_part_of_the_address_that_was_opened(port, visits):
+    token, address = "a" * 32, f"http://127.0.0.1:{port}/"
+    page = f"{address}?scene=soda_can&view={token}&turn=30"
+    ask(port, f"{HELLO}known", Referer=page, Sec_Fetch_Site="same-origin")
+    assert visits == [Visit("known", "scene=soda_can&turn=30", address, token)]
 
 
 def test_a_host_that_is_none_does_not_get_into_the_policy(port):
@@ -255,7 +282,7 @@ def test_when_it_is_full_it_says_so_and_those_who_are_in_stay(port):
 
 def test_who_never_loads_the_picture_has_to_go(port, monkeypatch):
     with own(port) as one:
-        monkeypatch.setattr(front_door, "HELLO_TIMEOUT", 0.1)
+        monkeypatch.setattr(browser_connection, "HELLO_TIMEOUT", 0.1)
         with own(port) as two, pytest.raises(ConnectionClosed):
             while True:
                 two.recv(WAIT)
@@ -263,15 +290,15 @@ def test_who_never_loads_the_picture_has_to_go(port, monkeypatch):
 
 
 def test_half_a_request_is_not_waited_for(port, monkeypatch):
-    monkeypatch.setattr(front_door, "HEAD_TIMEOUT", 0.1)
+    monkeypatch.setattr(browser_connection, "HEAD_TIMEOUT", 0.1)
     with socket.create_connection(("127.0.0.1", port), timeout=WAIT) as s:
         s.sendall(b"GET / HTTP/1.1\r\nHost: ")
         assert read_all(s) == b""
 
 
 def test_many_who_send_their_requests_slowly_keep_nobody_out(port, monkeypatch):
-    monkeypatch.setattr(front_door, "MAX_REQUESTS", 20)
-    monkeypatch.setattr(front_door, "HEAD_TIMEOUT", 10 * WAIT)
+    monkeypatch.setattr(browser_connection, "MAX_REQUESTS", 20)
+    monkeypatch.setattr(browser_connection, "HEAD_TIMEOUT", 10 * WAIT)
     with ExitStack() as stack:
         slow = [
             stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=WAIT))

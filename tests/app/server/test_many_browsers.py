@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed
 
 from app.compute.cache import SharedCache
 from app.compute.warm_up import compute_first_map
-from app.server.front_door import READ_BURST
+from app.server.browser_connection import READ_BURST
 from app.server.lobby import open_lobby
 from app.server.viser_server import any_port
 from tests.app.server.test_session import picture, processes, ready

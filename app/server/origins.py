@@ -1,0 +1,131 @@
+"""What a browser's requests say of where they come from, and what answers say against use by other pages."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from collections.abc import Mapping
+from urllib.parse import urlsplit
+
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
+
+__all__ = [
+    "FRAMES",
+    "VIEW",
+    "add_headers",
+    "headers_of",
+    "is_foreign",
+    "is_loopback",
+    "is_own_frame",
+    "is_own_picture",
+    "is_view",
+]
+
+VIEW = "view"
+"""The setting in the address of viser's page that has the token of the page around it."""
+
+# The page loads its own files alone.
+PAGE_POLICY = "; ".join(
+    [
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data:",
+        "connect-src ws://{host} wss://{host}",
+        "frame-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    ]
+)
+
+# viser's page is one file, whose inline script unpacks styles, fonts, code, workers and WebAssembly.
+VIEW_POLICY = "; ".join(
+    [
+        "default-src 'none'",
+        "script-src 'unsafe-inline' 'wasm-unsafe-eval'",
+        "worker-src blob: data:",
+        "style-src 'unsafe-inline'",
+        "font-src data:",
+        "img-src 'self' data: blob:",
+        "connect-src ws://{host} wss://{host} data: blob:",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'self'",
+    ]
+)
+
+HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)
+"""A value of the ``Host`` header."""
+
+FRAMES = ("embed", "fencedframe", "frame", "iframe", "object")
+"""Values of ``Sec-Fetch-Dest`` of a page that is shown inside another."""
+
+
+def is_foreign(headers: Mapping[str, str], *, loopback: bool) -> bool:
+    """Return whether a request comes from a page of another origin, or names another host.
+
+    Args:
+        headers: of the request, names in lower case.
+        loopback: whether the server listens on a loopback address only.
+    """
+    host = headers.get("host", "")
+    if not HOST.fullmatch(host):
+        return True
+    if loopback and not is_loopback(urlsplit(f"//{host}").hostname or ""):
+        return True
+    origin = headers.get("origin")
+    return origin is not None and urlsplit(origin).netloc != host
+
+
+def is_own_picture(headers: Mapping[str, str]) -> bool:
+    """Return whether a page of the same origin loads the picture, by one of two headers of browsers."""
+    if headers.get("sec-fetch-dest", "image") != "image":
+        return False
+    if "sec-fetch-site" in headers:
+        return headers["sec-fetch-site"] == "same-origin"
+    return urlsplit(headers.get("referer", "")).netloc == headers.get("host")
+
+
+def is_own_frame(headers: Mapping[str, str]) -> bool:
+    """Return whether a page of the same origin shows it in a frame."""
+    return headers["sec-fetch-dest"] == "iframe" and headers.get("sec-fetch-site") == "same-origin"
+
+
+def is_loopback(name: str) -> bool:
+    """Return whether a name is that of this machine, for itself."""
+    if name == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(name).is_loopback
+    except ValueError:
+        return False
+
+
+def is_view(request: Request) -> bool:
+    """Return whether a request is for viser's page, which the page around it shows in a frame."""
+    path, _, query = request.path.partition("?")
+    return path == "/" and any(setting.partition("=")[0] == VIEW for setting in query.split("&"))
+
+
+def headers_of(request: Request) -> dict[str, str]:
+    """Return the headers of a request, names in lower case; repeated ones become one that no page sends."""
+    headers: dict[str, str] = {}
+    for name, value in request.headers.raw_items():
+        name = name.lower()
+        headers[name] = f"{headers[name]}, {value}" if name in headers else value
+    return headers
+
+
+def add_headers(_: ServerConnection, request: Request, response: Response) -> None:
+    """Add to a response what keeps other pages from using it."""
+    host = headers_of(request).get("host", "")
+    framed = is_view(request)
+    policy = VIEW_POLICY if framed else PAGE_POLICY
+    response.headers["Content-Security-Policy"] = policy.format(
+        host=host if HOST.fullmatch(host) else "invalid"
+    )
+    response.headers["X-Frame-Options"] = "SAMEORIGIN" if framed else "DENY"
+    response.headers["X-Content-Type-Options"] = "nosniff"
+    response.headers["Referrer-Policy"] = "same-origin"

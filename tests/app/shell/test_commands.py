@@ -1,0 +1,93 @@
+"""What a page may ask for, and what becomes of it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from app.scene3d.ghost import ghost
+from app.shell.commands import LONGEST, decode
+from app.state import changes
+from app.state.state import State
+from app.state.undo import remember, undo
+from symgrasp.reason import Reason
+from tests.app.state.test_state import opened
+
+
+def done(state: State, **command: object) -> State:
+    return decode(json.dumps(command)).applied(state)
+
+
+def test_a_pick_is_of_the_map_before_it_is_shifted():
+    state = changes.turn(opened(), 0.7)
+    after = done(state, do="pick", row=2, column=7)
+    assert after.base_cell
+    assert (after.base_cell.row, after.base_cell.column) == (2, 7)
+
+
+def test_a_turn_is_that_of_the_slider():
+    assert done(opened(), do="turn", delta=0.25).delta == changes.turn(opened(), 0.25).delta
+
+
+def test_a_drag_is_one_step_and_picks_are_several():
+    state, time = opened(), 0.0
+    for command in (
+        {"do": "turn", "delta": 0.1}, {"do": "turn", "delta": 0.2},
+        {"do": "pick", "row": 1, "column": 1}, {"do": "pick", "row": 1, "column": 2},
+    ):  # fmt: skip
+        deed = decode(json.dumps(command))
+        time += 0.01
+        state = remember(state, deed.applied(state), deed.origin, time)
+    one = undo(state)
+    two = undo(one)
+    assert one.pick
+    assert (one.delta, two.pick, two.delta, undo(two).delta) == (0.2, None, 0.2, 0.0)
+
+
+def test_pointing_at_a_feasible_cell_shows_its_grasp_and_changes_nothing_else():
+    state = opened()
+    assert state.result
+    m = state.result.map
+    row, column = np.argwhere(state.map_view.roll.reason(m) == Reason.FEASIBLE)[0].tolist()
+    pointed = done(state, do="hover", row=row, column=column)
+    assert pointed.input_values == state.input_values
+    shown = ghost(pointed)
+    assert shown
+    witness = m.witness((state.map_view.roll.roll(m, row, column), row, column))
+    assert witness
+    arm = state.scene.arm(state.arm)
+    assert np.array_equal(shown.values, arm.robot_values(witness.q, witness.opening))
+    assert not shown.hits
+    assert ghost(done(pointed, do="leave")) is None
+    assert ghost(done(pointed, do="pick", row=row, column=column)) is None  # the arm itself is there
+
+
+def test_pointing_at_a_cell_that_fails_shows_nothing():
+    state = opened()
+    assert state.result
+    fails = state.map_view.roll.reason(state.result.map) != Reason.FEASIBLE
+    row, column = np.argwhere(fails)[0].tolist()
+    assert ghost(done(state, do="hover", row=row, column=column)) is None
+
+
+@pytest.mark.parametrize("deed", ["pick", "hover"])
+def test_a_cell_that_the_map_does_not_have_is_ignored(deed):
+    state = opened()
+    for row, column in ((1000, 0), (0, 1000)):
+        assert done(state, do=deed, row=row, column=column) is state
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "", "[]", "{}", "null", '{"do":"quit"}', '{"do":"turn"}', '{"do":"turn","delta":"1"}',
+        '{"do":"turn","delta":1e9}', '{"do":"turn","delta":NaN}', '{"do":"pick","row":-1,"column":0}',
+        '{"do":"pick","row":1.5,"column":0}', '{"do":"pick","row":0,"column":0,"more":1}', b"{}",
+        '{"do":"leave"' + " " * LONGEST + "}",
+    ],
+)  # fmt: skip
+def test_anything_else_is_an_error(message):
+    with pytest.raises(ValueError, match=r"."):
+        decode(message)

@@ -1,0 +1,95 @@
+"""What a page is sent of the map, against the map."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.html.map import sample_columns
+from app.render.cell_colors import colored_map
+from app.render.palette import faded
+from app.shell.map_parts import UNKNOWN, map_parts
+from app.state import changes
+from app.state.map_view_state import RollChoice
+from app.state.state import State
+from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.reason import Reason
+from tests.app.shown_map import ShownMap
+from tests.app.state.test_state import load_small, opened, with_plan
+
+
+def shown(state: State) -> ShownMap:
+    page = ShownMap()
+    for message in map_parts(state).values():
+        page.take(message)
+    return page
+
+
+@settings(deadline=None)
+@given(steps=st.integers(-720, 720), roll=st.sampled_from(RollChoice), color_by=st.sampled_from(ColorBy))
+def test_the_page_shows_the_shifted_map_in_its_colours(steps, roll, color_by):
+    state = changes.turn(opened(), np.deg2rad(steps / 4))
+    state = replace(state, map_view=replace(state.map_view, roll=roll, color_by=color_by))
+    assert state.map
+    colored = colored_map(state.map, roll, color_by)
+    expected = colored.colors[colored.index[::-1, sample_columns(state.map.manifold)]]
+    assert np.array_equal(shown(state).picture(), expected)
+
+
+def test_a_turn_changes_nothing_but_the_look():
+    before, after = map_parts(opened()), map_parts(changes.turn(opened(), 0.3))
+    assert [kind for kind in before if before[kind] != after[kind]] == ["look"]
+
+
+def test_every_cell_has_its_reason_roll_and_clearance():
+    state = opened()
+    m, roll = state.map, state.map_view.roll
+    assert m
+    message = map_parts(state)["cells"]
+    data = message[4 + int.from_bytes(message[:4], "little") :]
+    size = m.reason[0].size
+    clearance = np.frombuffer(data[: 2 * size], "<u2").reshape(m.reason[0].shape)
+    reason, rolls = (
+        np.frombuffer(data[k * size : (k + 1) * size], np.uint8).reshape(clearance.shape) for k in (3, 4)
+    )
+    assert np.array_equal(reason, roll.reason(m))
+    assert np.array_equal(np.take_along_axis(m.reason, rolls[None].astype(int), 0)[0], reason)
+    feasible = reason == Reason.FEASIBLE
+    assert feasible.any()
+    assert np.abs(clearance[feasible] - 1e4 * roll.of(m, m.clearance)[feasible]).max() <= 0.5
+    assert (clearance[~feasible] == UNKNOWN).all()
+
+
+def test_a_map_of_an_earlier_pose_is_faded_and_said_to_be_one():
+    state = changes.moved(opened(), x=0.5)
+    page = shown(state)
+    assert "of an earlier pose" in page.title
+    fresh = shown(opened()).picture()
+    assert fresh is not None
+    assert np.array_equal(page.picture(), faded(fresh))
+
+
+def test_there_is_no_picture_before_the_first_map():
+    page = shown(State.of(load_small("bottle_on_table"), ""))
+    assert page.picture() is None
+    assert page.look["busy"]
+    assert page.legend == []
+
+
+def test_the_picked_cell_is_that_of_the_map_before_it_is_shifted():
+    state = changes.turn(changes.choose_surface_cell(opened(), 3, 5), 1.0)
+    look = shown(state).look
+    assert state.base_cell
+    assert look["picked"] == [state.base_cell.row, state.base_cell.column]
+    assert state.pick
+    assert look["marks"] == [[state.pick.h, pytest.approx(state.pick.theta), ""]]
+
+
+def test_the_hands_of_a_plan_are_named():
+    page = shown(with_plan("log_two_robots", "bimanual"))
+    assert page.has_prints
+    assert page.legend[-2:] == ["hand of left", "hand of right"]

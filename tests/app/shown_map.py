@@ -1,0 +1,76 @@
+"""The map as a page shows it, from the messages that the page gets."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from app.html.map import COLUMNS
+
+GREY = np.array([236, 238, 241])
+"""What cells of an old map are blended with."""
+
+
+class ShownMap:
+    """The newest message of each kind.
+
+    Attributes:
+        on_cells: called when another map arrives.
+    """
+
+    def __init__(self) -> None:
+        self._heads: dict[str, dict[str, Any]] = {}
+        self._data: dict[str, bytes] = {}
+        self._arrived: dict[str, tuple[dict[str, Any], bytes]] = {}
+        self.on_cells = lambda: None
+
+    def take(self, message: bytes) -> None:
+        """Take a message; see `app.shell.map_parts`."""
+        length = int.from_bytes(message[:4], "little")
+        head = json.loads(message[4 : 4 + length])
+        self._arrived[head["kind"]] = head, message[4 + length :]
+        if head["kind"] != "look":
+            return
+        self._heads |= {kind: head for kind, (head, _) in self._arrived.items()}
+        self._data |= {kind: data for kind, (_, data) in self._arrived.items()}
+        if "cells" in self._arrived:
+            self.on_cells()
+        self._arrived.clear()
+
+    @property
+    def look(self) -> dict[str, Any]:
+        return self._heads.get("look", {"title": "", "legend": [], "marks": [], "delta": 0.0, "busy": True})
+
+    @property
+    def title(self) -> str:
+        """As the page writes it."""
+        return self.look["title"] + (" — of an earlier pose" if self.look.get("stale") else "")
+
+    @property
+    def legend(self) -> list[str]:
+        return [f"{label}: {cells}" for _, label, cells in self.look["legend"]] + [
+            label for _, label in self._heads.get("prints", {}).get("legend", [])
+        ]
+
+    @property
+    def has_prints(self) -> bool:
+        return bool(self._data.get("prints"))
+
+    def picture(self) -> np.ndarray | None:
+        """The colours (H, COLUMNS, 3) of the map, the highest cells first; None while there is none."""
+        head = self._heads.get("cells")
+        if not head or not head["heights"]:
+            return None
+        size = head["heights"] * head["angles"]
+        data = np.frombuffer(self._data["cells"], np.uint8)
+        assert len(data) == 5 * size
+        index = data[2 * size : 3 * size].reshape(head["heights"], head["angles"])
+        theta = -np.pi + (np.arange(COLUMNS) + 0.5) * (2 * np.pi / COLUMNS) + self.look["delta"]
+        share = np.mod(theta - head["start"], 2 * np.pi) / (2 * np.pi)
+        colors = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in head["colors"]])
+        if self.look["stale"]:
+            colors = np.round(0.3 * colors + 0.7 * GREY)
+        columns = np.floor(share * head["angles"]).astype(int) % head["angles"]
+        return colors.astype(np.uint8)[index[::-1, columns]]
