@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from typing import Any
 
@@ -25,6 +26,7 @@ class ShownMap:
         self._data: dict[str, bytes] = {}
         self._arrived: dict[str, tuple[dict[str, Any], bytes]] = {}
         self.on_cells = lambda: None
+        self._digest: str | None = ""
 
     def take(self, message: bytes) -> None:
         """Take a message; see `app.shell.map_parts`."""
@@ -38,6 +40,7 @@ class ShownMap:
         if "cells" in self._arrived:
             self.on_cells()
         self._arrived.clear()
+        self._digest = None
 
     @property
     def look(self) -> dict[str, Any]:
@@ -57,6 +60,14 @@ class ShownMap:
     @property
     def has_prints(self) -> bool:
         return bool(self._data.get("prints"))
+
+    @property
+    def digest(self) -> str:
+        """Of the picture; empty while there is none."""
+        if self._digest is None:
+            picture = self.picture()
+            self._digest = "" if picture is None else hashlib.sha256(picture.tobytes()).hexdigest()
+        return self._digest
 
     def picture(self) -> np.ndarray | None:
         """The colours (H, COLUMNS, 3) of the map, the highest cells first; None while there is none."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import http.client
 import re
 import secrets
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from html import escape
 from types import TracebackType
 from typing import Any, Self
 
@@ -75,11 +75,10 @@ class Wire:
     def html(self) -> str:
         """Everything that is written in the panels and around the map, and the map as a picture."""
         written = [w["content"] for w in self.widgets.values() if isinstance(w.get("content"), str)]
-        picture = self.map.picture()
-        if picture is not None:
-            digest = hashlib.sha256(picture.tobytes()).hexdigest()
-            written.append(f'<img alt="map" src="{digest}">')
-        return "\n".join([*written, self.map.title, *self.map.legend])
+        if self.map.digest:
+            written.append(f'<img alt="map" src="{self.map.digest}">')
+        written.append(f"<h1>{escape(self.map.title)}</h1><ul>{escape('; '.join(self.map.legend))}</ul>")
+        return "\n".join(written)
 
     def wait_for(self, text: str | Callable[[str], bool]) -> str:
         """Read on until the panels say so; return what they say."""

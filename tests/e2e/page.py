@@ -78,10 +78,8 @@ class GraspPage:
 
     @property
     def frame(self) -> Frame:
-        """viser's part of the page."""
-        frame = self.page.frame(name="view")
-        assert frame
-        return frame
+        """viser's part of the page; a file has no other."""
+        return self.page.frame(name="view") or self.page.main_frame
 
     # -- what is seen -----------------------------------------------------------------------
 
