@@ -1,4 +1,4 @@
-"""The unwrapped map as a picture with axes and a legend: small palette PNGs inside HTML.
+"""The unwrapped map as a picture with axes: small palette PNGs inside HTML.
 
 The picture is drawn in the object's coordinates: h upwards, θ from -180° to 180°. It has four
 columns a degree, so a turn by a step of the page's slider rolls it by exactly one column.
@@ -13,14 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image
 
-from symgrasp.feasibility.color_by import ColorBy, Scale
+from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import Manifold, wrap
 
 from ..render.cell_colors import colored_map
 from ..render.marks import Mark
 from ..render.palette import OVERLAP, PRINTS, faded
-from ..render.prints import hand_color, print_index
+from ..render.prints import print_index
 from ..state.map_view_state import RollChoice
 from .escaping import escape
 
@@ -29,12 +29,9 @@ __all__ = [
     "THETA_AXIS",
     "circle",
     "h_axis",
-    "legend_html",
     "map_html",
     "picture_html",
-    "prints_html",
     "sample_columns",
-    "scale_html",
     "to_png",
 ]
 
@@ -128,60 +125,6 @@ def picture_html(png: bytes, name: str, over: str, height: int, across: Axis, up
         f'<div class="sg-h">{beside}<b>{escape(up[1])}</b></div>'
         f'<div class="sg-theta">{below}<b>{escape(across[1])}</b></div></div>'
     )
-
-
-def legend_html(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy = ColorBy.REASON) -> str:
-    """Draw the legend of a map: the colour scale, if any, and how many cells have each of the other colours.
-
-    Args:
-        m: the map.
-        roll: which rolls are shown.
-        color_by: what the colours stand for.
-    """
-    colored = colored_map(m, roll, color_by)
-    rows = []
-    for color, label, count in colored.swatches:
-        share = (
-            f"{100 * count / colored.index.size:.0f}"
-            if 200 * count >= colored.index.size or not count
-            else "<1"
-        )
-        rows.append(
-            f'<div><i style="background:{color}"></i><span>{escape(label)}</span>'
-            f"<small>{count} · {escape(share)} %</small></div>"
-        )
-    scale = scale_html(colored.scale) if colored.scale else ""
-    return f'{scale}<div class="sg-legend">{"".join(rows)}</div>{_counted(m, roll)}'
-
-
-def _counted(m: FeasibilityMap, roll: RollChoice) -> str:
-    """Say what a legend counts."""
-    rolls, heights, angles = m.reason.shape
-    which = f"the better of its {rolls} rolls" if roll is RollChoice.EITHER else f"roll {roll.value}"
-    text = f"{heights * angles} places on the object, each with {which}"
-    return f'<div class="sg sg-small sg-faint">{text}</div>'
-
-
-def scale_html(scale: Scale) -> str:
-    """Draw a colour scale with its label and the values at its ends."""
-    stops = ", ".join(f"rgb{tuple(color)}" for color in scale.colors[::36].tolist())
-    return (
-        f'<div class="sg sg-rows sg-scale" role="img" aria-label="scale"><span>{escape(scale.label)}</span>'
-        f'<span>0</span><i style="background:linear-gradient(to right, {stops})"></i>'
-        f"<span>{scale.high:g}</span></div>"
-    )
-
-
-def prints_html(names: Sequence[str], prints: Sequence[np.ndarray]) -> str:
-    """Draw the legend of handprints: the colour of each arm's hand, and of their overlap if there is one."""
-    rows = [(hand_color(k), f"hand of {name}") for k, name in enumerate(names)]
-    if OVERLAP in print_index(prints):
-        rows.append((OVERLAP, "both hands"))
-    swatches = (
-        f'<div><i style="background:rgb{tuple(PRINTS[color].tolist())}"></i><span>{escape(name)}</span></div>'
-        for color, name in rows
-    )
-    return f'<div class="sg-legend">{"".join(swatches)}</div>'
 
 
 def _img(png: bytes, name: str) -> str:

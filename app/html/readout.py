@@ -22,18 +22,7 @@ __all__ = [
     "solution_html",
     "status_html",
     "tasks_html",
-    "title_html",
 ]
-
-
-def title_html(state: State) -> str:
-    """Name the map that is shown; ``aria-busy`` says whether a computation is under way."""
-    names = f"{escape(state.scene.name)} · {escape(state.task)} · {escape(state.arm)}"
-    age = "" if state.is_fresh or not state.result else " — of an earlier pose"
-    if state.is_preliminary:
-        age = " — coarse and preliminary"
-    busy = "false" if state.is_current and not state.busy else "true"
-    return f'<div class="sg sg-title" aria-busy="{busy}">{names}{age}</div>'
 
 
 def comparison_html(state: State) -> str:

@@ -26,6 +26,7 @@ from symgrasp.object.manifold import wrap
 from symgrasp.reason import Reason
 
 from ..render.cell_colors import colored_map
+from ..render.holds import hand_holds
 from ..render.marks import marks_of
 from ..render.palette import OVERLAP, PRINTS
 from ..render.prints import hand_color, print_index, print_names, shown_prints
@@ -107,15 +108,24 @@ def _look(state: State) -> dict[str, Any]:
         "object": state.scene.file.object.name,
         "marks": [[mark.h, float(wrap(mark.theta)), mark.label] for mark in marks_of(state)],
         "picked": [state.base_cell.row, state.base_cell.column] if state.base_cell else None,
+        "holds": [[_hex(PRINTS[holds.color]), holds.spans] for holds in hand_holds(state)],
         "legend": [],
     }
     if state.result:
         colored = colored_map(state.result.map, state.map_view.roll, state.map_view.color_by)
         look["legend"] = [list(swatch) for swatch in colored.swatches]
+        look["counted"] = _counted(state.result.map, state.map_view.roll)
         if colored.scale:
             scale = colored.scale
             look["scale"] = [scale.label, scale.high, [_hex(c) for c in scale.colors[::36]]]
     return look
+
+
+def _counted(m: FeasibilityMap, roll: RollChoice) -> str:
+    """Say what the legend counts."""
+    rolls, heights, angles = m.reason.shape
+    which = f"the better of its {rolls} rolls" if roll is RollChoice.EITHER else f"roll {roll.value}"
+    return f"{heights * angles} places on the object, each with {which}"
 
 
 def _hex(color: np.ndarray) -> str:

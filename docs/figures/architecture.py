@@ -44,7 +44,8 @@ PLACES = {
     "symgrasp.cli": Place(2, 12), "symgrasp.__main__": Place(1, 13),
     "app.choices": Place(5.75, 9), "app.state": Place(5, 10), "app.files": Place(6, 11),
     "app.render": Place(5, 11),
-    "app.html": Place(5, 12), "app.scene3d": Place(4, 12), "app.shell": Place(6, 12), "app.panels": Place(5, 13),
+    "app.html": Place(5, 12), "app.scene3d": Place(4, 12),
+    "app.shell": Place(6, 12), "app.panels": Place(5, 13),
     "app.compute": Place(4, 14), "app.server": Place(5, 15), "app.__main__": Place(4, 15),
 }  # fmt: skip
 """A room that is new needs a place here, above all that it imports and out of the way of the arrows."""

@@ -82,7 +82,7 @@ def page_plays() -> None:
         it.tab("Sequence")
         it.button("One grasp for all tasks").click()
         it.button("With motion").click()
-        now = it.page.get_by_text(re.compile(r"; \d+\.\d of \d+\.\d s")).filter(visible=True)
+        now = it.frame.get_by_text(re.compile(r"; \d+\.\d of \d+\.\d s")).filter(visible=True)
         now.wait_for(timeout=10 * WAIT)
         end = float(now.inner_text().split()[-2])
         add(it, REST)
@@ -112,7 +112,7 @@ def _open(scene: str) -> Iterator[GraspPage]:
     with _server(scene) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         it = GraspPage(browser.new_page(viewport=SIZE, device_scale_factor=1), address)
-        notice = it.page.locator(".mantine-Notification-closeButton")
+        notice = it.frame.locator(".mantine-Notification-closeButton")
         if notice.count():
             notice.first.click()
         yield it

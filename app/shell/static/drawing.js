@@ -168,10 +168,13 @@ function ticks({ from, to, angle }, most) {
   return values;
 }
 
-/** Draw the half section of the object along its heights: beside the map, or above one that lies. */
-function profile(context, { frame, cells, style }) {
+/**
+ * Draw the half section of the object along its heights, beside the map or above one that lies, and bars where hands
+ * can hold it.
+ */
+function profile(context, { frame, cells, look, style }) {
   const { x, y, width, lying } = frame, { low, high, profile: points } = cells;
-  const most = Math.max(...points.map(([, r]) => r)), room = ROOM.profile - 22;
+  const most = Math.max(...points.map(([, r]) => r)), bars = 8 * look.holds.length, room = ROOM.profile - 16 - bars;
   const at = (h, r) => {
     const [across, up] = frame.toScreen(frame.u0, (h - low) / (high - low));
     return lying ? [across, y - 8 - (r / most) * room] : [x + width + 10 + (r / most) * room, up];
@@ -191,5 +194,24 @@ function profile(context, { frame, cells, style }) {
   context.strokeStyle = style.ink;
   context.lineWidth = 1.2;
   context.stroke();
+  look.holds.forEach(([color, spans], k) => {
+    for (const [from, to] of spans) {
+      const beyond = most * (1 + (8 * (k + 1)) / room);
+      const [x0, y0] = at(from, beyond), [x1, y1] = at(to, beyond);
+      context.lineWidth = 6;
+      context.strokeStyle = style.line;
+      line(context, x0, y0, x1, y1);
+      context.lineWidth = 4.5;
+      context.strokeStyle = color;
+      line(context, x0, y0, x1, y1);
+    }
+  });
   context.restore();
+}
+
+function line(context, x0, y0, x1, y1) {
+  context.beginPath();
+  context.moveTo(x0, y0);
+  context.lineTo(x1, y1);
+  context.stroke();
 }

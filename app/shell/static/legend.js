@@ -8,6 +8,7 @@ export function describe(element, pane) {
   const rows = look.legend.map(([color, label, cells]) => row(color, label, `${cells} · ${share(cells, all)} %`));
   for (const [color, label] of prints?.legend ?? []) rows.push(row(color, label, ""));
   element("legend").replaceChildren(...rows);
+  element("counted").textContent = look.counted ?? "";
   const scale = element("scale");
   scale.hidden = !look.scale;
   if (look.scale) {

@@ -16,7 +16,6 @@ import yaml
 
 import app.html
 from app.compute.plan_service import PlanRequest
-from app.html.map import prints_html
 from app.state import changes, job_changes, plan_changes
 from app.state.requests import MapResult
 from app.state.state import State
@@ -60,7 +59,7 @@ def page(name: str) -> tuple[str, ...]:
         plan_changes.show_results(state, replace(climb)),
     ]
     texts = [function(each) for function in functions() for each in shown]
-    return (*texts, prints_html(names, [the_map.map.feasible[0]] * 2))
+    return tuple(texts)
 
 
 class Tags(HTMLParser):

@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from app.html.map import COLUMNS, h_axis, legend_html, map_html, prints_html, sample_columns
+from app.html.map import COLUMNS, h_axis, map_html, sample_columns
 from app.render.marks import Mark
 from app.render.palette import OVERLAP, PRINTS, REASONS, faded, rgb, to_linear
 from app.render.prints import on_surface, shown_prints
@@ -76,17 +76,6 @@ def test_an_old_map_looks_old():
     assert not (faded(REASONS) == REASONS).all(axis=1).any()
 
 
-@pytest.mark.parametrize("roll", RollChoice)
-def test_the_legend_counts_every_cell_once(roll):
-    state = opened()
-    html = legend_html(state.map, roll)
-    counts = [int(n) for n in re.findall(r"<small>(\d+) ·", html)]
-    assert sum(counts) == roll.reason(state.map).size
-    names = re.findall(r"<span>([^<]+)</span>", html)
-    assert names[0] == "feasible"
-    assert len(names) == len(np.unique(roll.reason(state.map)))
-
-
 def test_marks_stand_where_their_grasp_is():
     state = opened()
     html = map_html(state.map, state.map_view.roll, [Mark(0.15, np.pi / 2, "<b>")])
@@ -126,7 +115,6 @@ def test_each_hand_has_its_colour_their_overlap_a_third_and_the_rest_is_clear():
         assert np.array_equal(image[..., 3] > 0, a | b)
         for cells, color in ((a & ~b, PRINTS[1]), (b & ~a, PRINTS[2]), (a & b, PRINTS[OVERLAP])):
             assert (image[cells][:, :3] == color).all()
-        assert ("both hands" in prints_html(["left", "right"], [left, other])) == bool((a & b).any())
 
 
 def test_prints_on_the_surface_stay_under_the_hand_when_the_object_turns():

@@ -1,11 +1,10 @@
-"""The profile beside the map, what fits where, and the symmetry error."""
+"""What fits where, and the symmetry error."""
 
 # An object may have no measurement in general, but not where these tests look.
 # pyright: reportOptionalMemberAccess=false, reportArgumentType=false
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -13,16 +12,11 @@ import pytest
 import trimesh
 
 from app.choices.object_choice import ObjectChoice, from_mesh
-from app.html.profile import (
-    holds_html,
-    profile_html,
-    symmetry_html,
-)
+from app.html.profile import holds_html, symmetry_html
 from app.render.deviation import NO_SURFACE, deviation_cells, deviation_colors
 from app.render.palette import DIVERGING
 from app.state import changes
 from app.state.state import State
-from symgrasp.feasibility.fit import fit
 from symgrasp.object.library import load_object
 from symgrasp.object.manifold import Manifold
 from symgrasp.robot.hand import HANDS
@@ -49,41 +43,6 @@ def oval_stl() -> bytes:
 @pytest.fixture(scope="module")
 def oval() -> ObjectChoice:
     return from_mesh("oval.stl", oval_stl(), 1.0)
-
-
-def test_the_outline_lies_on_the_heights_of_the_map():
-    state = State.of(load_small("bottle_on_table"), "")
-    profile = state.scene.profile
-    (path,) = re.findall(r'd="M([^"]+)Z"', profile_html(state))
-    x, y = np.array([[float(c) for c in point.split()] for point in path.split("L")]).T
-    h = profile.h_min + (100 - y) / 100 * (profile.h_max - profile.h_min)
-    assert np.allclose(np.column_stack([h, x / 100 * profile.r_max])[1:-1], profile.points, atol=1e-4)
-    assert (x[0], x[-1]) == (0, 0)
-    assert ">37.5</span>" in profile_html(state)
-
-
-@pytest.mark.parametrize("name", ["bottle_on_table", "log_iiwa_and_panda"])
-def test_bars_stand_where_a_hand_fits(name):
-    state = State.of(load_small(name), "")
-    profile = state.scene.profile
-    arms = [state.scene.arm(arm) for arm in state.scene.task().arms]
-    bars = re.findall(r"right:(\d+)px;width:\d+px;bottom:([\d.]+)%;height:([\d.]+)%", profile_html(state))
-    sides = sorted({side for side, _, _ in bars}, key=int)
-    assert len(sides) == len({arm.hand.name for arm in arms})
-    hands = [arm.hand for arm in arms]
-    found = {}
-    for side in sides:
-        spans = [(float(low), float(low) + float(size)) for at, low, size in bars if at == side]
-        shares = np.linspace(0.7, 99.3, 60)
-        shares = shares[[min(abs(s - end) for span in spans for end in span) > 0.5 for s in shares]]
-        inside = [any(low < s < high for low, high in spans) for s in shares]
-        found[side] = (shares, inside)
-    for hand in hands:
-        matches = []
-        for shares, inside in found.values():
-            heights = profile.h_min + shares / 100 * (profile.h_max - profile.h_min)
-            matches.append(inside == [fit(hand, profile, float(h)) is None for h in heights])
-        assert any(matches)
 
 
 def test_what_a_hand_is_called_is_escaped(tmp_path, content):

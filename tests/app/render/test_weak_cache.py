@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.html.map import legend_html, map_html
+from app.html.map import map_html
 from app.html.stack import shared_columns, stack_html
 from app.render.cell_colors import cell_colors
 from app.render.prints import shown_prints
 from app.render.weak_cache import cached_with_first
+from app.shell.map_parts import map_parts
 from app.state import plan_changes
 from app.state.map_view_state import RollChoice
 from app.state.plan_results import PlanResults
@@ -64,7 +65,7 @@ def drawn() -> list[weakref.ref[object]]:
     for slide in (0.5, 1.0):
         stack_html(replace(state, plan_results=replace(state.plan_results, slide=slide)))
     map_html(state.map, RollChoice.EITHER)
-    legend_html(state.map, RollChoice.EITHER)
+    map_parts(state)
     cell_colors(state, state.map)
     assert len(shown_prints(state)) == 1
     maps = [result.map for result in state.plan_results.maps.values()]

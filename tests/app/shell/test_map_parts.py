@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from app.html.map import sample_columns
 from app.render.cell_colors import colored_map
 from app.render.palette import faded
+from app.render.prints import shown_prints
 from app.shell.map_parts import UNKNOWN, map_parts
 from app.state import changes
 from app.state.map_view_state import RollChoice
@@ -70,7 +71,9 @@ def test_a_map_of_an_earlier_pose_is_faded_and_said_to_be_one():
     assert "of an earlier pose" in page.title
     fresh = shown(opened()).picture()
     assert fresh is not None
-    assert np.array_equal(page.picture(), faded(fresh))
+    stale = page.picture()
+    assert stale is not None
+    assert np.array_equal(stale, faded(fresh))
 
 
 def test_there_is_no_picture_before_the_first_map():
@@ -93,3 +96,39 @@ def test_the_hands_of_a_plan_are_named():
     page = shown(with_plan("log_two_robots", "bimanual"))
     assert page.has_prints
     assert page.legend[-2:] == ["hand of left", "hand of right"]
+
+
+@pytest.mark.parametrize("roll", RollChoice)
+def test_the_legend_counts_every_place_once(roll):
+    state = opened()
+    look = shown(replace(state, map_view=replace(state.map_view, roll=roll))).look
+    assert state.map
+    reason = roll.reason(state.map)
+    assert sum(cells for _, _, cells in look["legend"]) == reason.size
+    assert look["legend"][0][1] == "feasible"
+    assert len(look["legend"]) == len(np.unique(reason))
+    assert look["counted"].startswith(f"{reason.size} places on the object, each with ")
+
+
+def test_the_legend_of_values_is_a_scale_in_their_unit():
+    state = opened()
+    look = shown(replace(state, map_view=replace(state.map_view, color_by=ColorBy.CLEARANCE))).look
+    label, high, _ = look["scale"]
+    assert label == "clearance (mm)"
+    assert state.map
+    assert high >= 1e3 * np.nanmax(state.map.clearance)
+    assert "scale" not in shown(state).look
+
+
+@pytest.mark.parametrize("color_by", ColorBy)
+def test_turning_the_object_leaves_the_legend(color_by):
+    state = opened()
+    state = replace(state, map_view=replace(state.map_view, color_by=color_by))
+    assert shown(changes.turn(state, 0.7)).look["legend"] == shown(state).look["legend"]
+
+
+def test_both_hands_are_in_the_legend_where_their_prints_overlap(monkeypatch):
+    state = with_plan("log_two_robots", "bimanual")
+    left, _ = shown_prints(state)
+    monkeypatch.setattr("app.shell.map_parts.shown_prints", lambda _: [left, np.roll(left, 1, axis=1)])
+    assert shown(state).legend[-1] == "both hands"

@@ -18,9 +18,8 @@ from trimesh import transform_points
 
 from app.compute.map_service import MapService
 from app.html.candidates import candidate_html, candidate_text, candidates_html, reason_grid
-from app.html.map import legend_html
 from app.html.readout import comparison_html, grasp_html
-from app.render.cell_colors import cell_colors, colored_map
+from app.render.cell_colors import cell_colors
 from app.render.drawn_poses import drawn_joint_values
 from app.render.map_picture import map_picture, picture_name
 from app.render.prints import shown_prints
@@ -82,19 +81,6 @@ def test_turning_the_object_only_rolls_any_colours(color_by):
     turned = changes.turn(state, 3 * grid.dtheta)
     assert np.array_equal(cell_colors(turned, turned.map), np.roll(before, -3, axis=1))
     assert np.array_equal(cell_colors(turned, turned.result.map), before)  # the surface stays where it is
-    assert legend_html(turned.map, turned.map_view.roll, color_by) == legend_html(
-        state.map, state.map_view.roll, color_by
-    )
-
-
-def test_the_legend_of_values_is_a_scale_in_their_unit():
-    state = opened()
-    html = legend_html(state.map, state.map_view.roll, ColorBy.CLEARANCE)
-    high = colored_map(state.map, state.map_view.roll, ColorBy.CLEARANCE).scale.high
-    assert "clearance (mm)" in html
-    assert f"<span>{high:g}</span>" in html
-    assert high >= 1e3 * np.nanmax(state.map.clearance)
-    assert "scale" not in legend_html(state.map, state.map_view.roll, ColorBy.REASON)
 
 
 def test_the_print_of_the_picked_grasp_lies_around_it():
