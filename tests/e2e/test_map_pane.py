@@ -124,9 +124,6 @@ def test_dragging_the_map_turns_the_object(open_page, bottle_map, degrees):
     row, column = cell_with(shifted, Reason.FEASIBLE)
     mouse.click(*at(page, shifted, row, column))  # the map on the canvas is that one
     expect(page.text("panda holds it: feasible")).to_be_visible()
-    page.button("Undo").click()
-    page.button("Undo").click()  # the drag is one step
-    expect(box).to_have_value("0")
     assert page.complaints == []
 
 
@@ -158,7 +155,7 @@ def test_arrow_keys_move_the_picked_cell(open_page, bottle_map):
     grid = bottle_map.manifold
     theta = np.rad2deg(grid.theta[(column + 1) % grid.angles])
     expect(page.text(f"h = {round(100 * grid.h[row], 2):g} cm, θ = {round(theta, 2):g}°")).to_be_visible()
-    expect(page.page.get_by_role("status")).to_contain_text(f"θ {theta:.1f}°")
+    expect(page.page.locator("#spoken")).to_contain_text(f"θ {theta:.1f}°")
     page.page.keyboard.press("Shift+ArrowRight")
     expect(page.slider_box("Rotation (°)")).to_have_value("-1")
     page.page.keyboard.press("l")  # a key of the view
