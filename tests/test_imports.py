@@ -18,8 +18,8 @@ ROOMS = [
     "symgrasp.feasibility",
     "symgrasp.plan", "symgrasp.planners", "symgrasp.motion", "symgrasp.survey", "symgrasp.bench",
     "symgrasp.cli", "symgrasp.__main__",
-    "app.choices", "app.state", "app.files", "app.render", "app.html", "app.scene3d", "app.compute",
-    "app.shell", "app.panels", "app.server", "app.__main__",
+    "app.choices", "app.state", "app.files", "app.render", "app.html", "app.shell", "app.scene3d",
+    "app.compute", "app.panels", "app.server", "app.__main__",
 ]  # fmt: skip
 """Folders, and modules that stand beside them, from the ground up."""
 
