@@ -103,6 +103,7 @@ def _look(state: State) -> dict[str, Any]:
         "title": f"{state.scene.name} · {state.task} · {state.arm}",
         "busy": not state.is_current or state.busy is not None,
         "stale": not state.is_fresh,
+        "age": _age(state),
         "delta": state.delta,
         "dark": state.display.dark,
         "object": state.scene.file.object.name,
@@ -119,6 +120,13 @@ def _look(state: State) -> dict[str, Any]:
             scale = colored.scale
             look["scale"] = [scale.label, scale.high, [_hex(c) for c in scale.colors[::36]]]
     return look
+
+
+def _age(state: State) -> str:
+    """Say what keeps the map that is shown from being that of the pose; nothing where it is."""
+    if state.is_preliminary:
+        return "coarse and preliminary"
+    return "of an earlier pose" if state.result and not state.is_fresh else ""
 
 
 def _counted(m: FeasibilityMap, roll: RollChoice) -> str:

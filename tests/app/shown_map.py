@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from app.html.map import COLUMNS
+from app.shell.map_parts import map_parts
+from app.state.state import State
 
 GREY = np.array([236, 238, 241])
 """What cells of an old map are blended with."""
@@ -49,7 +51,7 @@ class ShownMap:
     @property
     def title(self) -> str:
         """As the page writes it."""
-        return self.look["title"] + (" — of an earlier pose" if self.look.get("stale") else "")
+        return " — ".join(filter(None, (self.look["title"], self.look.get("age"))))
 
     @property
     def legend(self) -> list[str]:
@@ -85,3 +87,11 @@ class ShownMap:
             colors = np.round(0.3 * colors + 0.7 * GREY)
         columns = np.floor(share * head["angles"]).astype(int) % head["angles"]
         return colors.astype(np.uint8)[index[::-1, columns]]
+
+
+def shown(state: State) -> ShownMap:
+    """Return what a page shows of a state."""
+    page = ShownMap()
+    for message in map_parts(state).values():
+        page.take(message)
+    return page

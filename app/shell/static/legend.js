@@ -2,7 +2,7 @@
 export function describe(element, pane) {
   const { look, prints } = pane;
   const title = element("title");
-  title.textContent = look.title + (look.stale && pane.hasMap ? " — of an earlier pose" : "");
+  title.textContent = look.title + (look.age ? ` — ${look.age}` : "");
   title.setAttribute("aria-busy", String(look.busy));
   const all = look.legend.reduce((sum, [, , cells]) => sum + cells, 0);
   const rows = look.legend.map(([color, label, cells]) => row(color, label, `${cells} · ${share(cells, all)} %`));

@@ -452,9 +452,9 @@ def test_the_page_shows_a_coarse_map_and_says_so_until_the_exact_one_is_compiled
         assert "preliminary" not in visitor.wait_for(ready)
         visitor.set("x (cm)", 50.0)
         visitor.wait_for("this map is coarse")
-        visitor.wait_for("coarse and preliminary")
+        visitor.wait_for(lambda _: "coarse and preliminary" in visitor.map.title)
         visitor.trigger("Put the object back")  # where its map is known
-        visitor.wait_for(lambda html: "Ready." in html and "preliminary" not in html)
+        visitor.wait_for(lambda html: "Ready." in html and "preliminary" not in visitor.map.title)
 
 
 CHOICES = {

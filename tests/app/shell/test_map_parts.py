@@ -19,15 +19,8 @@ from app.state.map_view_state import RollChoice
 from app.state.state import State
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.reason import Reason
-from tests.app.shown_map import ShownMap
+from tests.app.shown_map import shown
 from tests.app.state.test_state import load_small, opened, with_plan
-
-
-def shown(state: State) -> ShownMap:
-    page = ShownMap()
-    for message in map_parts(state).values():
-        page.take(message)
-    return page
 
 
 @settings(deadline=None)

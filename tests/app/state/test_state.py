@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from app.choices.object_choice import OWN, from_library, from_mesh
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest, PlanService
-from app.html.readout import grasp_html, status_html, title_html
+from app.html.readout import grasp_html, status_html
 from app.panels.keyboard import next_arm
 from app.render.drawn_poses import drawn_joint_values
 from app.render.map_picture import map_picture
@@ -33,6 +33,7 @@ from symgrasp.feasibility.create import create_map
 from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.poses import pose_error, rotation_about, rotation_z
 from symgrasp.reason import Reason
+from tests.app.shown_map import shown as as_shown
 from tests.conftest import load_small
 from tests.strategies import poses
 
@@ -115,8 +116,8 @@ def test_a_coarse_map_is_shown_and_the_exact_one_still_awaited():
     assert not shown.is_fresh
     assert shown.missing_request == request
     assert shown.next_request is None  # it is being computed
-    assert "coarse and preliminary" in title_html(shown)
-    assert 'aria-busy="true"' in title_html(shown)
+    assert as_shown(shown).title.endswith("coarse and preliminary")
+    assert as_shown(shown).look["busy"]
     assert "this map is coarse" in status_html(job_changes.compiling(shown, 1))
     with pytest.raises(SymgraspError, match="computed map"):
         map_picture(shown, "PNG")
@@ -128,7 +129,7 @@ def test_a_coarse_map_is_shown_and_the_exact_one_still_awaited():
 
     replaced = job_changes.map_arrived(shown, 1, exact.result)
     assert replaced.is_current
-    assert "preliminary" not in title_html(replaced)
+    assert "preliminary" not in as_shown(replaced).title
     assert job_changes.preliminary_arrived(replaced, coarse) is replaced
     moved = changes.moved(started, x=0.52)
     assert job_changes.preliminary_arrived(moved, coarse) is moved
