@@ -10,7 +10,7 @@ passes; those that become websockets are read at a limited rate. The door refuse
 * more browsers at once than were allowed, and connections that do not say in time what they want.
 
 The page that is served is the project's own; it shows viser's in a frame, whose address has the setting
-`VIEW`: a token that the page has made up. A websocket alone serves an empty view: a browser gets a session
+`PAGE`: a token that the page has made up. A websocket alone serves an empty view: a browser gets a session
 after the view has loaded a picture with a secret token in its path, from a page of the same origin. The
 ``Referer`` of that request is the address that was opened. The page's own websocket, for the map, has
 its token in its path.
@@ -35,7 +35,7 @@ from ..shell.files import PageFile, page_file
 from .browser_connection import PART_LIMIT, BrowserConnection, handled_by
 from .origins import (
     FRAMES,
-    VIEW,
+    PAGE,
     add_headers,
     headers_of,
     is_foreign,
@@ -190,7 +190,8 @@ class FrontDoor:
                 f"This server is in use by {self._max_browsers} browsers, which is all it takes at a time "
                 "(symgrasp app --max-sessions). Close one of them, or load this page again later.\n",
             )
-        if path == "/" and not is_view(request) and "upgrade" not in headers:
+        alone = headers.get("sec-fetch-dest") == "document"  # no link may choose the token
+        if path == "/" and (alone or not is_view(request)) and "upgrade" not in headers:
             return _found(connection, page_file("index.html"))
         return None
 
@@ -206,8 +207,9 @@ class FrontDoor:
         opened = urlsplit(headers.get("referer", "/"))
         address = urlunsplit((opened.scheme, opened.netloc, opened.path, "", ""))
         settings = opened.query.split("&")
-        query = "&".join(s for s in settings if s.partition("=")[0] != VIEW)
-        page = next((s.partition("=")[2] for s in settings if s.startswith(f"{VIEW}=")), "")
+        query = "&".join(s for s in settings if s.partition("=")[0] != PAGE)
+        # The page adds its own behind those of the address that was opened.
+        page = next((s.partition("=")[2] for s in reversed(settings) if s.startswith(f"{PAGE}=")), "")
         visit = Visit(token, query, address, page if TOKEN.fullmatch(page) else "")
         if not is_own_picture(headers) or not self._on_visit(visit):
             return connection.respond(HTTPStatus.NOT_FOUND, "")

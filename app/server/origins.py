@@ -12,7 +12,7 @@ from websockets.http11 import Request, Response
 
 __all__ = [
     "FRAMES",
-    "VIEW",
+    "PAGE",
     "add_headers",
     "headers_of",
     "is_foreign",
@@ -22,7 +22,7 @@ __all__ = [
     "is_view",
 ]
 
-VIEW = "view"
+PAGE = "page"
 """The setting in the address of viser's page that has the token of the page around it."""
 
 # The page loads its own files alone.
@@ -106,7 +106,7 @@ def is_loopback(name: str) -> bool:
 def is_view(request: Request) -> bool:
     """Return whether a request is for viser's page, which the page around it shows in a frame."""
     path, _, query = request.path.partition("?")
-    return path == "/" and any(setting.partition("=")[0] == VIEW for setting in query.split("&"))
+    return path == "/" and any(setting.partition("=")[0] == PAGE for setting in query.split("&"))
 
 
 def headers_of(request: Request) -> dict[str, str]:

@@ -20,7 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from app.server.front_door import HELLO, MAP
-from app.server.origins import VIEW
+from app.server.origins import PAGE
 from tests.app.shown_map import ShownMap
 
 WAIT = 60.0
@@ -153,7 +153,7 @@ class Wire:
                 self.greet(found[1])
 
     def greet(self, path: str) -> None:
-        settings = [setting for setting in (self.query, f"{VIEW}={self.token}") if setting]
+        settings = [setting for setting in (self.query, f"{PAGE}={self.token}") if setting]
         page = f"http://127.0.0.1:{self.port}/?{'&'.join(settings)}"
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT)
         connection.request("GET", path, headers={"Referer": page})

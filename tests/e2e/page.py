@@ -121,7 +121,7 @@ class GraspPage:
     def wait_for_picture(self, right: Callable[[np.ndarray], bool]) -> np.ndarray:
         """Wait until the map's picture is right."""
         deadline = time.monotonic() + WAIT / 1000
-        while not right(picture := self.picture()):
+        while (picture := self.shown_map.picture()) is None or not right(picture):
             assert time.monotonic() < deadline, "the map never became right"
             self.next_frame()
         return picture

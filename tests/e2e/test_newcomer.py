@@ -130,9 +130,9 @@ class Newcomer:
         return True
 
     def _point(self) -> tuple[float, float]:
-        """A pixel of the 3D view between the panels."""
-        x, y = self.chance.uniform(490, 950), self.chance.uniform(200, 700)
-        return self.box["x"] + x, self.box["y"] + y
+        """A pixel of the 3D view."""
+        x, y = self.chance.uniform(0.05, 0.95), self.chance.uniform(0.2, 0.95)
+        return self.box["x"] + x * self.box["width"], self.box["y"] + y * self.box["height"]
 
 
 @pytest.mark.random_walk

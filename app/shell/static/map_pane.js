@@ -20,7 +20,7 @@ export class MapPane {
     this.frame = new Frame();
     this.pointers = new Map();
     this.arrived = [];
-    this.cells = this.prints = this.look = this.own = this.hovered = null;
+    this.cells = this.prints = this.look = this.own = this.hovered = this.awaited = null;
     new ResizeObserver(() => this.redraw()).observe(canvas);
     matchMedia("(resolution: 1dppx)").addEventListener("change", () => this.redraw());
     const listen = (name, act) => canvas.addEventListener(name, act.bind(this));
@@ -63,6 +63,7 @@ export class MapPane {
         reason: new Uint8Array(data, 3 * size, size),
         roll: new Uint8Array(data, 4 * size, size),
       } : null;
+      this.awaited = null;
       if (this.cells) this.picture = texture(this.cells, this.cells.index, this.cells.colors);
     } else if (head.kind === "prints") {
       this.prints = size ? { ...head, index: new Uint8Array(data, 0, size) } : null;
@@ -72,7 +73,10 @@ export class MapPane {
       if (!this.drag && this.own !== null && Math.abs(wrap(head.delta - this.own)) < 1e-6) this.own = null;
       this.on.turned(`turned by ${degrees(this.delta).toFixed(2)}°`);
       this.canvas.setAttribute("aria-label", `Unwrapped map: ${head.title}`);
-      if (this.asked) this.speak();
+      if (this.awaited && String(head.picked) === String(this.awaited)) {
+        this.awaited = null;
+        if (this.cells) this.on.speak(this.text(head.picked));
+      }
     }
   }
 
@@ -117,11 +121,6 @@ export class MapPane {
     const clear = clearance[at] === UNKNOWN ? "" : `, clearance ${(clearance[at] / 10).toFixed(1)} mm`;
     const held = reason[at] === feasible ? `, roll ${180 * roll[at]}°${clear}` : "";
     return `h ${(100 * h).toFixed(1)} cm · θ ${degrees(theta).toFixed(1)}° · ${reasons[reason[at]]}${held}`;
-  }
-
-  speak() {
-    this.asked = false;
-    if (this.look.picked && this.cells) this.on.speak(this.text(this.look.picked));
   }
 
   // -- pointers -------------------------------------------------------------------------------
@@ -245,12 +244,9 @@ export class MapPane {
 
   step(along, around) {
     const { heights, angles } = this.cells;
-    const [row, column] = this.at ?? this.look?.picked ?? [Math.floor(heights / 2), Math.floor(angles / 2)];
+    const [row, column] = this.awaited ?? this.look?.picked ?? [Math.floor(heights / 2), Math.floor(angles / 2)];
     const cell = [Math.min(heights - 1, Math.max(0, row + along)), mod(column + around, angles)];
-    this.at = cell; // faster keys than answers
-    clearTimeout(this.soon);
-    this.soon = setTimeout(() => { this.at = null; }, 600);
-    this.asked = true;
+    this.awaited = cell; // keys may be faster than answers
     this.pick(cell);
   }
 }

@@ -10,7 +10,7 @@ const view = element("view"), canvas = element("map");
 const token = btoa(String.fromCharCode(...crypto.getRandomValues(new Uint8Array(24))))
   .replaceAll("+", "-").replaceAll("/", "_");
 const opened = location.search.slice(1);
-view.src = `/?${opened ? `${opened}&` : ""}view=${token}`;
+view.src = `/?${opened ? `${opened}&` : ""}page=${token}`;
 // viser connects again only while its own document has the focus.
 view.addEventListener("load", () => view.contentWindow.focus());
 

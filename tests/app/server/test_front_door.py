@@ -13,9 +13,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
+from app.files.links import Link
 from app.server import browser_connection
 from app.server.front_door import HELLO, FrontDoor, Visit
-from app.server.origins import is_foreign
+from app.server.origins import PAGE, is_foreign
 from app.server.viser_server import any_port, quiet_server
 from tests.app.wire import CAMERA, Wire
 
@@ -121,9 +122,9 @@ def test_every_answer_keeps_other_pages_from_using_it(port, path, headers, statu
 def test_the_view_is_shown_inside_the_page_alone(port):
     for inside, site, status in (
         ("iframe", "same-origin", 200), ("iframe", "same-site", 403), ("iframe", "cross-site", 403),
-        ("embed", "same-origin", 403), ("document", "none", 200),
+        ("embed", "same-origin", 403), ("empty", "same-origin", 200),
     ):  # fmt: skip
-        answer = ask(port, "/?scene=soda_can&view=x", Sec_Fetch_Dest=inside, Sec_Fetch_Site=site)
+        answer = ask(port, "/?scene=soda_can&page=x", Sec_Fetch_Dest=inside, Sec_Fetch_Site=site)
         assert answer.startswith(f"HTTP/1.1 {status} ".encode())
         head = answer.partition(b"\r\n\r\n")[0].decode().lower()
         assert "x-frame-options: sameorigin" in head
@@ -132,9 +133,18 @@ def test_the_view_is_shown_inside_the_page_alone(port):
         assert "'unsafe-eval'" not in head
 
 
+def test_a_link_opens_the_page_whatever_its_settings(port):
+    """A link may choose what the view shows, but not the token that ties map and view together."""
+    assert PAGE not in Link.model_fields
+    for query in ("view=clearance", f"scene=soda_can&{PAGE}={'a' * 32}"):
+        answer = ask(port, f"/?{query}", Sec_Fetch_Dest="document", Sec_Fetch_Site="none")
+        assert answer.partition(b"\r\n\r\n")[2] == ask(port, "/").partition(b"\r\n\r\n")[2]
+        assert b'<iframe id="view"' in answer
+
+
 def test_the_token_of_the_page_is_no_part_of_the_address_that_was_opened(port, visits):
     token, address = "a" * 32, f"http://127.0.0.1:{port}/"
-    page = f"{address}?scene=soda_can&view={token}&turn=30"
+    page = f"{address}?scene=soda_can&page=guess&page={token}&turn=30"
     ask(port, f"{HELLO}known", Referer=page, Sec_Fetch_Site="same-origin")
     assert visits == [Visit("known", "scene=soda_can&turn=30", address, token)]
 
