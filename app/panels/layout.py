@@ -18,6 +18,7 @@ from .map_panel import MapPanel
 from .object_panel import ObjectPanel
 from .panel import Panel
 from .plan_panel import PlanFilePanel, PlanPanel
+from .pose_panel import PosePanel
 from .robot_panel import RobotPanel
 from .scene_panel import ScenePanel
 from .sequence_panel import SequencePanel, TasksPanel
@@ -96,6 +97,7 @@ class Layout:
             grasps.dock_below(gui.main_panel)
         main = [
             StatusPanel(gui, actions),
+            PosePanel(gui, actions),
             ScenePanel(gui, actions, scenes),
             RobotPanel(gui, actions),
             ObjectPanel(gui, actions),

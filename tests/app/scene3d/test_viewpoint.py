@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from app.panels.object_panel import position_range
+from app.panels.pose_panel import position_range
 from app.scene3d.flat_map import MIN_FACING
 from app.scene3d.scene_view import SceneView
 from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint

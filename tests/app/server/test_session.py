@@ -27,7 +27,7 @@ from app.compute import compute_process, process_pool
 from app.compute.cache import SharedCache
 from app.compute.job_queue import Job, JobQueue
 from app.compute.warm_up import compute_first_map
-from app.panels.object_panel import ObjectPanel
+from app.panels.pose_panel import PosePanel
 from app.panels.status_panel import StatusPanel
 from app.scene3d.scene_view import SceneView
 from app.server.actions import Actions
@@ -418,13 +418,13 @@ def test_inputs_that_a_broken_picture_left_unwritten_are_written_with_the_next(s
 
 def test_what_a_person_enters_is_never_overwritten_before_it_is_read(server, monkeypatch):
     """viser stores an entered value and reads it in one step of its event loop; inputs are written there."""
-    write, loops = ObjectPanel.write_inputs, []
+    write, loops = PosePanel.write_inputs, []
 
     def recorded(panel, state):
         loops.append(asyncio.get_running_loop())  # raises on any other thread
         write(panel, state)
 
-    monkeypatch.setattr(ObjectPanel, "write_inputs", recorded)
+    monkeypatch.setattr(PosePanel, "write_inputs", recorded)
     with server.visit() as visitor:
         visitor.wait_for(ready)
         visitor.trigger("Put the object back")
