@@ -34,7 +34,7 @@ figures: $(VENV)/dev.stamp  ## make the pictures of the README and docs/ again
 schemas: $(VENV)/dev.stamp  ## write the JSON Schemas of the file formats again
 	$(BIN)/python -m docs.schemas
 
-bench: $(VENV)/dev.stamp  ## measure, and write the README's table of times (minutes)
+bench: $(VENV)/dev.stamp  ## measure, and write the times of the README and docs/speed.md (minutes)
 	$(BIN)/symgrasp bench --out docs/bench.json
 	$(BIN)/python -m docs.speed
 

@@ -1,4 +1,4 @@
-"""Writes the README's table of times from what the benchmark measured: ``make bench``."""
+"""Writes the tables of times of the README and of their own page: ``make bench``."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ import numpy as np
 from docs.pages import put_between
 from symgrasp.bench.figures import Figure, keyed
 
-__all__ = ["BEGIN", "BENCH", "END", "ROWS", "table", "write"]
+__all__ = ["BEGIN", "BENCH", "END", "PAGE", "ROWS", "full_table", "table", "write"]
 
 ROOT = Path(__file__).parent.parent
 
 BENCH = ROOT / "docs" / "bench.json"
 """What ``symgrasp bench --out`` wrote when the table was made."""
 
+PAGE = ROOT / "docs" / "speed.md"
+"""The page of the full table, with a row for every arm."""
+
 BEGIN, END = "<!-- measured: make bench -->", "<!-- end -->"
 
 ARMS = "every arm: "
-"""How the figures of all arms begin, which are rows too."""
+"""How the figures of all arms begin: one row a number of arms in the README, one an arm on the page."""
 
 NEXT = "## Security"
 """The section that the table's own stands before."""
@@ -58,32 +61,72 @@ A figure that belongs to another one is named ``that one: it``.
 
 
 def table(content: Mapping[str, Any]) -> str:
-    """Return the table as Markdown; what the run did not measure is left out."""
-    figures = keyed(map(Figure.from_dict, content["figures"]))
-    machine = content["machine"]
+    """Return the README's table as Markdown; what the run did not measure is left out.
+
+    Scenes with as many mapped arms share a row, whose spread is that of all runs of all their arms.
+    """
+    figures = _figures(content)
+    scenes: dict[str, list[Figure]] = {}
+    for arm in _arms(figures):
+        scenes.setdefault(arm.name.removeprefix(ARMS).split(", ")[0], []).append(arm)
+    kinds: dict[int, list[Figure]] = {}
+    for arms in scenes.values():
+        kinds.setdefault(len(arms), []).extend(arms)
+    rows = [
+        _row(f"map of an arm, scenes with {count} arm{'s' * (count > 1)} mapped", kinds[count])
+        for count in sorted(kinds)
+    ]
+    return _markdown(content["machine"], [*_rows(figures), *rows])
+
+
+def full_table(content: Mapping[str, Any]) -> str:
+    """Return the table of the page as Markdown, with a row for every arm."""
+    figures = _figures(content)
+    arms = [_row(f"map of {f.name.removeprefix(ARMS)}", [f]) for f in _arms(figures)]
+    return _markdown(content["machine"], [*_rows(figures), *arms])
+
+
+def write(rows: str, page: Path) -> None:
+    """Put the table between the markers of a page; without any, in a section of its own."""
+    text = page.read_text(encoding="utf-8")
+    if BEGIN not in text:
+        place = text.index(NEXT)
+        page.write_text(f"{text[:place]}## How fast\n\n{BEGIN}\n{END}\n\n{text[place:]}", encoding="utf-8")
+    put_between(page, BEGIN, END, rows)
+
+
+def _figures(content: Mapping[str, Any]) -> Mapping[str, Figure]:
+    return keyed(map(Figure.from_dict, content["figures"]))
+
+
+def _arms(figures: Mapping[str, Figure]) -> list[Figure]:
+    return [f for name, f in figures.items() if name.startswith(ARMS)]
+
+
+def _rows(figures: Mapping[str, Figure]) -> list[str]:
+    return [_row(words, [figures[name]]) for name, words in ROWS.items() if name in figures]
+
+
+def _row(words: str, figures: list[Figure]) -> str:
+    """Return the row of all runs of figures of one unit."""
+    unit = figures[0].unit
+    values = np.concatenate([f.values for f in figures])
+    low, middle, high = (_short(v) for v in np.quantile(values, [0.0, 0.5, 1.0]))
+    cpu = [value for f in figures for value in f.cpu or ()]
+    last = f"{_short(float(np.median(cpu)))} {unit}" if cpu else ""
+    return f"| {words} | {middle} {unit} | {low} | {high} | {last} |"
+
+
+def _markdown(machine: Mapping[str, Any], rows: list[str]) -> str:
     lines = [
         f"Median and spread, measured by `symgrasp bench` on {machine['cpus']} cores ({machine['machine']}), "
         f"Python {machine['python']}. CPU time is that of all threads together, and what ratios compare.",
         "",
         "| what | median | from | to | CPU |",
         "|---|---:|---:|---:|---:|",
+        *rows,
     ]
-    arms = [f for name, f in figures.items() if name.startswith(ARMS)]
-    rows = [(words, figures[name]) for name, words in ROWS.items() if name in figures]
-    for words, figure in [*rows, *((f"map of {f.name.removeprefix(ARMS)}", f) for f in arms)]:
-        low, middle, high = (_short(v) for v in np.quantile(figure.values, [0.0, 0.5, 1.0]))
-        cpu = f"{_short(float(np.median(figure.cpu)))} {figure.unit}" if figure.cpu else ""
-        lines.append(f"| {words} | {middle} {figure.unit} | {low} | {high} | {cpu} |")
     return "\n".join(lines) + "\n"
-
-
-def write(content: Mapping[str, Any], page: Path) -> None:
-    """Put the table between the markers of a page; without any, in a section of its own."""
-    text = page.read_text(encoding="utf-8")
-    if BEGIN not in text:
-        place = text.index(NEXT)
-        page.write_text(f"{text[:place]}## How fast\n\n{BEGIN}\n{END}\n\n{text[place:]}", encoding="utf-8")
-    put_between(page, BEGIN, END, table(content))
 
 
 def _short(value: float) -> str:
@@ -92,4 +135,6 @@ def _short(value: float) -> str:
 
 
 if __name__ == "__main__":
-    write(json.loads(BENCH.read_text(encoding="utf-8")), ROOT / "README.md")
+    measured = json.loads(BENCH.read_text(encoding="utf-8"))
+    write(table(measured), ROOT / "README.md")
+    write(full_table(measured), PAGE)
