@@ -23,6 +23,7 @@ class MovingJoints:
         state: where everything is now.
         arms: the arms that move.
         hands: the arms whose hands open or close.
+        still: arms that stand still: what they share with those that move, as a torso, keeps its values.
 
     Raises:
         NoPlanError: another joint follows one that moves.
@@ -37,7 +38,9 @@ class MovingJoints:
         limits: (2, J) lower and upper limits.
     """
 
-    def __init__(self, state: State, arms: Sequence[Arm], hands: Sequence[Arm]) -> None:
+    def __init__(
+        self, state: State, arms: Sequence[Arm], hands: Sequence[Arm], still: Sequence[Arm] = ()
+    ) -> None:
         self.joints = _joints(arms, hands)
         self.robots = {robot.name: robot for robot, _ in self.joints}
         self._check_followers()
@@ -58,7 +61,13 @@ class MovingJoints:
         self.origin = pose_rows(origin)
         self.axis = np.array([joint.axis for _, joint in self.joints]).reshape(-1, 3)
         self.slides = np.array([joint.kind == "prismatic" for _, joint in self.joints], dtype=bool)
-        limits = [(joint.lower, joint.upper) for _, joint in self.joints]
+        kept = {(arm.robot.name, name) for arm in still for name in arm.joint_names}
+        limits = [
+            (state.values[robot.name][joint.source],) * 2
+            if (robot.name, joint.name) in kept
+            else (joint.lower, joint.upper)
+            for robot, joint in self.joints
+        ]
         self.limits = np.array(limits, dtype=float).reshape(-1, 2).T.copy()
         self._span = np.where(self.slides, np.abs(self.limits).max(axis=0), 0.0)
 

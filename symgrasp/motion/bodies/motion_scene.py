@@ -101,12 +101,14 @@ class MotionScene:
             arms: the arms that move.
             hands: the arms whose hands open or close; their joints have no columns.
             held_by: the arms that hold the object; if they move it moves with them, fixed to the first one.
-            touching: the arms whose fingers may touch the object besides them.
+            touching: the arms whose fingers may touch the object besides them. Those of both that do not move
+                stand still: a torso that carries them, too, keeps its value.
             without: arms whose links are left out, because they move too and are looked at later.
             rest: what the object rests on, and may be inside of a little.
             tilt: largest angle (rad) of the axis of the object from the vertical, while it is moved.
         """
-        moving = MovingJoints(state, arms, hands)
+        still = [arm for arm in (*held_by, *touching) if arm not in (*arms, *hands, *without)]
+        moving = MovingJoints(state, arms, hands, still)
         carrier = self._carriers(moving)
         pose = self._poses(state)
         holder = -1

@@ -20,7 +20,7 @@ from symgrasp.motion.drafting.carrying import (
 from symgrasp.motion.drafting.course import Course, part_of
 from symgrasp.motion.drafting.ways import Grip, lifted, retreating, straight
 from symgrasp.motion.paths.lines import Leg, LineTree, follow
-from symgrasp.motion.paths.search import connect
+from symgrasp.motion.paths.search import NoMotionError, blockers, connect, prove
 from symgrasp.motion.segments import Motion
 from symgrasp.plan.plan import Grasp, Plan, PlanTask
 from symgrasp.poses import Array, translation
@@ -145,8 +145,36 @@ class MotionDraft:
         # Where maps demand a retreat, a plan's configurations must have one in every task.
         if leaves or self._scene.settings.approach:
             with part_of("its end"):
-                return self._retreats(grip, goal, [], []).ends
-        return grip.configurations(goal.T_world_object)
+                ends = self._retreats(grip, goal, [], []).ends
+        else:
+            ends = grip.configurations(goal.T_world_object)
+        for hold in self._tasks[k].holds:
+            if hold.arm not in self._course.held:
+                ends = self._beside(grip, ends, self._grips[hold.arm, hold.grasp], goal)
+        return ends
+
+    def _beside(self, grip: Grip, ends: Array, other: Grip, goal: State) -> Array:
+        """Return those of some configurations (m, n) of a grasp beside which another arm can take the object.
+
+        Arms of one body then have one torso.
+        """
+        with part_of(f"the approach of {other.arm.name}"):
+            theirs = self._retreats(other, goal, [], [grip.arm]).ends
+        arms = [grip.arm, other.arm]
+        goal = goal.with_arm(grip.arm, ends[0], grip.closed) if len(ends) else goal
+        goal = goal.with_arm(other.arm, theirs[0], other.open)
+        situation = self._bodies.situation(goal, arms, held_by=arms[:1], touching=arms[1:])
+        free, hits = np.zeros(len(ends), dtype=bool), []
+        for k, end in enumerate(ends):
+            both = {grip.arm.name: np.tile(end, (len(theirs), 1)), other.arm.name: theirs}
+            rows = situation.stacked(both)
+            rows = rows[(rows[:, situation.columns[grip.arm.name]] == end).all(axis=1)]
+            proof = prove(situation, rows, rows)
+            free[k] = proof.free.any()
+            hits.append(proof.hits)
+        if not free.any():
+            raise NoMotionError(f"no room for {other.arm.name}: {blockers(situation, np.concatenate(hits))}")
+        return ends[free]
 
     def _carry_together(self, before: PlanTask, task: PlanTask, names: Sequence[str]) -> None:
         """Move the object with several arms along a straight path: up, across to the next task, and down."""
@@ -206,6 +234,7 @@ class MotionDraft:
         poses = retreating(grip, state.T_world_object, self._scene.settings.approach, self._scene.profile)
         # Followed inwards: so every configuration of the grasp that can be reached is kept.
         end = grip.configurations(state.T_world_object)
+        end = end[_with_torso_of(holders, arm, end, state)]
         return follow([Leg(situation, poses[::-1])], grip.fine, end=end)
 
     def _decide_all(self, task: PlanTask) -> None:
@@ -259,9 +288,23 @@ class MotionDraft:
             course.add("retreat", situation, tree.path(int(tree.value.argmax())), task.name)
             situation = self._bodies.situation(course.state, [arm], touching=course.holders())
             with part_of(f"the way home of {name} from {task.name}"):
-                home = arm.robot.home[arm.indices][None]
-                path = connect(situation, course.state.joints(arm)[None], home, self._seed, self._progress)
+                here, home = course.state.joints(arm), arm.robot.home[arm.indices]
+                kept = _shared(course.holders(), arm)
+                home = np.where(kept, here, home)
+                path = connect(situation, here[None], home[None], self._seed, self._progress)
             course.add("home", situation, path, task.name)
+
+
+def _shared(holders: Sequence[Arm], arm: Arm) -> np.ndarray:
+    """Return which joints (dof,) of an arm also carry one of some others: those of a torso."""
+    others = {name for holder in holders if holder.robot is arm.robot for name in holder.joint_names}
+    return np.array([name in others for name in arm.joint_names])
+
+
+def _with_torso_of(holders: Sequence[Arm], arm: Arm, q: Array, state: State) -> np.ndarray:
+    """Return which of some configurations (m, dof) of an arm leave those alone that hold the object."""
+    kept = _shared([holder for holder in holders if holder is not arm], arm)
+    return (q[:, kept] == state.joints(arm)[kept]).all(axis=1)
 
 
 def _kept(before: PlanTask, task: PlanTask) -> list[str]:
