@@ -16,6 +16,7 @@ from symgrasp.motion.times.timing import timed
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
 from symgrasp.planners.planning import (
+    handover_plans,
     plan_bimanual,
     plan_handover,
     plan_sequential,
@@ -99,6 +100,17 @@ def test_handover():
     assert ("left",) in held
     assert held.index(("right",)) > held.index(("left",))
     check(plan, motion)
+
+
+def test_arms_that_share_a_torso_hand_over():
+    """Whoever holds the object is not moved by the torso of the other arm, and plans keep their margins."""
+    scene = load_small("pr2_handover", 12, 24, 8)
+    plan, _ = best_motion(scene, handover_plans(scene))
+    report = verify(plan)
+    assert report, report.failures
+    assert plan.motion
+    holders = {segment.held_by for segment in plan.motion.segments if segment.held_by}
+    assert holders == {("left",), ("right",)}
 
 
 def carried(tilt_deg: float, **more) -> Scene:

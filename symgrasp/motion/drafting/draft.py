@@ -33,6 +33,10 @@ LIFT_TOGETHER = 0.1
 """Height (m) by which several hands that take an object lift it."""
 
 
+TORSO = 1e-6
+"""By how much (rad or m) the torso of a configuration may differ from that of a plan."""
+
+
 class PlannedMotion(NamedTuple):
     """What was found.
 
@@ -138,28 +142,26 @@ class MotionDraft:
 
         If it lets go there, a straight retreat must lead away.
         """
+        task = self._tasks[k]
         if k == len(self._tasks) - 1:
             leaves = self._bodies.rests(goal.T_world_object)
         else:
-            leaves = grip.arm.name not in _kept(self._tasks[k], self._tasks[k + 1])
+            leaves = grip.arm.name not in _kept(task, self._tasks[k + 1])
         # Where maps demand a retreat, a plan's configurations must have one in every task.
         if leaves or self._scene.settings.approach:
             with part_of("its end"):
-                ends = self._retreats(grip, goal, [], []).ends
+                ends = self._retreats(grip, task, goal, [], []).ends
         else:
-            ends = grip.configurations(goal.T_world_object)
-        for hold in self._tasks[k].holds:
+            ends = _configurations(grip, task, goal.T_world_object)
+        for hold in task.holds:
             if hold.arm not in self._course.held:
-                ends = self._beside(grip, ends, self._grips[hold.arm, hold.grasp], goal)
+                ends = self._beside(grip, ends, self._grips[hold.arm, hold.grasp], task, goal)
         return ends
 
-    def _beside(self, grip: Grip, ends: Array, other: Grip, goal: State) -> Array:
-        """Return those of some configurations (m, n) of a grasp beside which another arm can take the object.
-
-        Arms of one body then have one torso.
-        """
+    def _beside(self, grip: Grip, ends: Array, other: Grip, task: PlanTask, goal: State) -> Array:
+        """Return those of some configurations (m, n) of a grasp beside which another arm can take hold."""
         with part_of(f"the approach of {other.arm.name}"):
-            theirs = self._retreats(other, goal, [], [grip.arm]).ends
+            theirs = self._retreats(other, task, goal, [], [grip.arm]).ends
         arms = [grip.arm, other.arm]
         goal = goal.with_arm(grip.arm, ends[0], grip.closed) if len(ends) else goal
         goal = goal.with_arm(other.arm, theirs[0], other.open)
@@ -213,17 +215,20 @@ class MotionDraft:
             grip = self._grips[hold.arm, hold.grasp]
             others = [self._scene.arm(other.arm) for other in arriving if other is not hold]
             with part_of(f"the approach of {hold.arm} in {task.name}"):
-                self._trees[hold.arm] = self._retreats(grip, course.state, holders, others)
+                self._trees[hold.arm] = self._retreats(grip, task, course.state, holders, others)
             course.held[hold.arm], self._since[hold.arm] = grip, self._k
             course.undecided.add(hold.arm)
         if holders:  # the object waits in another hand: nothing else depends on this
             self._decide_all(task)
 
-    def _retreats(self, grip: Grip, state: State, holders: Sequence[Arm], others: Sequence[Arm]) -> LineTree:
+    def _retreats(
+        self, grip: Grip, task: PlanTask, state: State, holders: Sequence[Arm], others: Sequence[Arm]
+    ) -> LineTree:
         """Return the straight retreats from a grasp of the object where it is in a state.
 
         Args:
             grip: the grasp.
+            task: the task.
             state: where everything else is.
             holders: the arms that hold the object.
             others: arms that are left out, because they are not there yet or move too.
@@ -233,8 +238,7 @@ class MotionDraft:
         situation = self._bodies.situation(state, [arm], touching=[arm, *holders], without=others)
         poses = retreating(grip, state.T_world_object, self._scene.settings.approach, self._scene.profile)
         # Followed inwards: so every configuration of the grasp that can be reached is kept.
-        end = grip.configurations(state.T_world_object)
-        end = end[_with_torso_of(holders, arm, end, state)]
+        end = _configurations(grip, task, state.T_world_object)
         return follow([Leg(situation, poses[::-1])], grip.fine, end=end)
 
     def _decide_all(self, task: PlanTask) -> None:
@@ -301,10 +305,17 @@ def _shared(holders: Sequence[Arm], arm: Arm) -> np.ndarray:
     return np.array([name in others for name in arm.joint_names])
 
 
-def _with_torso_of(holders: Sequence[Arm], arm: Arm, q: Array, state: State) -> np.ndarray:
-    """Return which of some configurations (m, dof) of an arm leave those alone that hold the object."""
-    kept = _shared([holder for holder in holders if holder is not arm], arm)
-    return (q[:, kept] == state.joints(arm)[kept]).all(axis=1)
+def _configurations(grip: Grip, task: PlanTask, T_world_object: Array) -> Array:
+    """Return the configurations (m, n) of a grasp in a task, with the object at a pose (4, 4).
+
+    Where several arms of one body hold the object, those with the torso of the plan, as its margins have it.
+    """
+    q, robot = grip.configurations(T_world_object), grip.arm.robot
+    if robot.torso is None or sum(hold.robot == robot.name for hold in task.holds) < 2:
+        return q
+    names = robot.torso.joint_names
+    (stated,) = [[hold.joints[name] for name in names] for hold in task.holds if hold.arm == grip.arm.name]
+    return q[np.isclose(q[:, : len(names)], stated, rtol=0.0, atol=TORSO).all(axis=1)]
 
 
 def _kept(before: PlanTask, task: PlanTask) -> list[str]:

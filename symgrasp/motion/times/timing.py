@@ -76,6 +76,8 @@ def _timed(motion: Motion, index: int, segment: Segment) -> Segment:
     least = _hand_time(scene, segment)
     if len(t) == 1:  # only hands move
         t, joined = np.array([0.0, max(least, STEP)]), rows[[0, -1]]
+    # Rounded corners stay between those of the polyline, but for rounding errors: at limits these count.
+    joined = np.clip(joined, rows.min(axis=0), rows.max(axis=0))
     t *= max(1.0, least / t[-1])
     at = {(arm, j): k for k, (arm, j, *_) in enumerate(columns)}
     joints = {}
