@@ -86,9 +86,9 @@ def test_everything_needed_comes_with_the_wheel_and_nothing_else(contents):
     names = set(contents.namelist())
     assert {f"symgrasp/static_scenes/{name}.yaml" for name in SHIPPED} <= names
     assert {"symgrasp/static_scenes/bowl.obj", "symgrasp/schemas/plan.schema.json"} <= names
-    assert {"symgrasp/py.typed", "symgrasp_app/py.typed"} <= names
+    assert {"symgrasp/py.typed", "symgrasp_app/py.typed", "symgrasp_app/shell/static/index.html"} <= names
     endings = {Path(name).suffix for name in names if ".dist-info/" not in name}
-    assert endings == {".css", ".json", ".obj", ".py", ".srdf", ".typed", ".urdf", ".yaml"}
+    assert endings == {".css", ".html", ".js", ".json", ".obj", ".py", ".srdf", ".typed", ".urdf", ".yaml"}
     assert not any("test" in name for name in names)
 
 
