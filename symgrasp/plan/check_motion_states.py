@@ -26,6 +26,13 @@ each arm follows its own straight line in joint space."""
 FINEST = 5e-4
 """Shortest distance (m) between two states that are checked, where the stated clearance is shorter."""
 
+LARGEST_TURN = 0.1
+"""Largest turn (rad), or shift (m), of a joint between two states from which it is measured how far anything
+moves: arcs are then hardly longer than the straight lines that are measured."""
+
+MOST_STATES = 200_000
+"""Most states of a segment that are checked."""
+
 TILT_TOLERANCE = 1e-3
 """By how much (degrees) the object may tilt beyond its limit: numbers are rounded."""
 
@@ -94,6 +101,24 @@ class SegmentStates:
         off = [[float(error.max()) for error in pose_error(poses[0], other)] for other in poses]
         return poses[0], np.max(off, axis=0)
 
+    def between(self, step: float) -> Array | None:
+        """Return rows (m,), or what is between two, from each of which to the next nothing moves far.
+
+        None if these are more than `MOST_STATES`.
+
+        Args:
+            step: the distance (m).
+        """
+        rows = self.values(self.rows)
+        turned = np.max([np.abs(np.diff(values, axis=0)).max(axis=1) for values in rows.values()], axis=0)
+        parts = np.ceil(turned / LARGEST_TURN)
+        if parts.sum() > MOST_STATES:
+            return None
+        at = _divided(self.rows, parts)
+        values = self.values(at)
+        parts = np.ceil(_largest_steps(self.scene, values, self.objects(values)[0]) / step)
+        return None if parts.sum() > MOST_STATES else _divided(at, parts)
+
 
 def tool_pose(scene: Scene, name: str, values: Mapping[str, Array]) -> Array:
     """Return ``T_world_tool`` (..., 4, 4) of an arm for robot → values (..., N) of its joints."""
@@ -113,17 +138,19 @@ def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Ex
     """
     segment = states.segment
     expect(segment.clearance >= 0, f"{where}: clearance is {segment.clearance} m")
-    rows = states.values(states.rows)
-    moved = _largest_steps(states.scene, rows, states.objects(rows)[0])
-    count = np.ceil(moved / max(FINEST, segment.clearance)).astype(int).clip(1)
-    at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(count))])
+    at = states.between(max(FINEST, segment.clearance))
+    text = f"{where}: more than {MOST_STATES:,} states would have to be checked"
+    if not expect(at is not None, text) or at is None:
+        return
     fine = states.values(at)
     poses, (slip, twist) = states.objects(fine)
     text = f"{where}: the object slips by {1e3 * slip:.2f} mm and {np.rad2deg(twist):.2f}° in the hands"
     expect(slip <= RIGID[0] and twist <= RIGID[1], text)
-    if segment.kind == "carry" and segment.task_from != segment.task_to:
-        tilt = float(np.rad2deg(np.arccos(np.clip(poses[:, 2, 2], -1.0, 1.0)).max()))
-        limit = _largest_tilt(states.scene, segment)
+    if states.in_hand:
+        tilts = np.rad2deg(np.arccos(np.clip(poses[:, 2, 2], -1.0, 1.0)))
+        limit, tilt = _largest_tilt(states.scene, segment), float(tilts.max())
+        if segment.task_from == segment.task_to:  # as the task has it, it may be tilted further
+            limit = max(limit, float(tilts[0]), float(tilts[-1]))
         expect(tilt <= limit + TILT_TOLERANCE, f"{where}: the object tilts by {tilt:.2f}°, not {limit:g}°")
     if not _check_balance(states, fine, poses, where, expect):
         return
@@ -222,6 +249,15 @@ class _NearBodies:
             gap = reach - c.depth
             if gap < (-SUNK if c.b in self._resting else self._clearance) - CLEARANCE_TOLERANCE:
                 yield c, gap
+
+
+def _divided(at: Array, parts: Array) -> Array:
+    """Return rows (n,) with further ones in between, which make so many parts (n - 1,) of each gap."""
+    between = [
+        a + (b - a) * np.arange(1, count + 1) / count
+        for a, b, count in zip(at[:-1], at[1:], parts.astype(int).clip(1), strict=True)
+    ]
+    return np.concatenate([at[:1], *between])
 
 
 def _largest_steps(scene: Scene, values: Mapping[str, Array], objects: Array) -> Array:

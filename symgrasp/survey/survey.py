@@ -175,9 +175,16 @@ class Survey:
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of all that the results depend on: axes, scene, the files of its robots, this version."""
+        """SHA-256 of all that the results depend on: axes, scene, files of robots and hands, this version."""
         plain = {k: v for k, v in self.to_dict().items() if k != "source"}
-        plain |= {"map": self.scene.map_sha256, "version": version("symgrasp")}
+        first = [0] * len(self.axes)
+        hands = [
+            self.scene_at((*first[:k], i, *first[k + 1 :])).map_sha256
+            for k, axis in enumerate(self.axes)
+            if isinstance(axis.file, HandAxis)
+            for i in range(len(axis.values))
+        ]
+        plain |= {"maps": [self.scene.map_sha256, *hands], "version": version("symgrasp")}
         return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
     @property

@@ -14,6 +14,7 @@ from symgrasp.cli.main import main
 from symgrasp.errors import PlanError
 from symgrasp.motion.record import from_plan, to_record
 from symgrasp.plan import check_motion as check_motion_module
+from symgrasp.plan.check_motion_states import SegmentStates
 from symgrasp.plan.motion_record import MotionRecord, SegmentRecord
 from symgrasp.plan.plan import Plan
 from symgrasp.scene.scene import Scene
@@ -219,3 +220,32 @@ def test_a_tilt_beyond_the_limit_of_the_scene_is_told(limit, tasks, holds, conte
     with open_world(limited) as world:
         found = failures(content, world)
     assert any("the object tilts by 110" in failure for failure in found) == (not holds)
+
+
+def test_a_tilt_is_told_whatever_a_segment_is_called(content):
+    changed = copy.deepcopy(content)
+    for segment in changed["segments"]:
+        if segment["kind"] == "carry":
+            segment["kind"] = "lift"
+    limited = Scene.from_content({**recorded_plan().scene.content, "carry": {"tilt_deg": 100.0}})
+    with open_world(limited) as world:
+        assert any("the object tilts by 110" in failure for failure in failures(changed, world))
+
+
+def test_states_are_close_to_each_other_however_far_rows_are_apart(content):
+    """A joint that turns nearly all around in one row comes back close to where it was."""
+    scene = Scene.from_content(recorded_plan().scene.content)
+    arm = scene.arm()
+    rows = np.stack([arm.home, arm.home])
+    rows[:, 0] = arm.lower[0], arm.upper[0]
+    segment = {**content["segments"][1], "times": [0.0, 10.0], "joints": {arm.name: rows.tolist()}}
+    segment["velocities"] = {arm.name: np.zeros_like(rows).tolist()}
+    start = {arm.robot.name: arm.robot.home}
+    states = SegmentStates(scene, SegmentRecord.model_validate(segment), start, np.eye(4), {})
+    at = states.between(0.01)
+    assert at is not None
+    tool = np.array([arm.tool_pose(q[arm.indices])[:2, 3] for q in states.values(at)[arm.robot.name]])
+    apart = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+    assert apart.max() <= 0.01
+    assert apart.sum() == pytest.approx(np.ptp(rows[:, 0]) * np.linalg.norm(tool[0]), rel=0.01)
+    assert states.between(1e-7) is None

@@ -146,3 +146,22 @@ def test_a_plan_of_a_kind_that_the_scene_has_not_is_refused(tmp_path):
         survey_of([X], tmp_path, plan="handover")
     with pytest.raises(SurveyError, match="either task"):
         survey_of([{"name": "t", "of": "task", "values": ["pick"]}], tmp_path, task="pour")
+
+
+def test_the_file_of_a_hand_is_part_of_a_survey(tmp_path):
+    """Results with another gripper than that of before are not mixed with its own."""
+    text = (Path(__file__).parents[2] / "static_scenes/hands/wsg50.urdf").read_text()
+    (tmp_path / "hand.urdf").write_text(text)
+    fingers = ["wsg50_left_finger", "wsg50_right_finger"]
+    hand = {
+        "name": "mine", "urdf": "hand.urdf", "links": ["wsg50_base", *fingers], "touch_links": fingers,
+        "joints": {"wsg50_joint": 0.5}, "min_opening": 0, "max_opening": 0.11, "finger_depth": 0.067,
+        "pad_width": 0.0203, "palm_width": 0.05, "palm_depth": 0.076, "tool": {"link": "wsg50_tool"},
+    }  # fmt: skip
+    axes = [{"name": "hand", "of": "hand", "values": ["wsg50", hand]}]
+    before = survey_of(axes, tmp_path, scene="ur5_bottle").sha256
+    assert survey_of(axes, tmp_path, scene="ur5_bottle").sha256 == before
+    larger = text.replace('scale="0.001 0.001 0.001"', 'scale="0.0012 0.0012 0.0012"')
+    assert larger != text
+    (tmp_path / "hand.urdf").write_text(larger)
+    assert survey_of(axes, tmp_path, scene="ur5_bottle").sha256 != before

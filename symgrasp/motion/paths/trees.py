@@ -65,7 +65,7 @@ def new_trees(starts: Array, goals: Array, pieces: int, seed: int) -> Trees:
         parent=np.full((2, LARGEST_TREE), -1, dtype=np.int64),
         filled=np.array([len(starts), len(goals)], dtype=np.int64),
         meet=np.full(2, -1, dtype=np.int64),
-        random=np.array([seed * 2654435761 + 88172645463325252], dtype=np.uint64),
+        random=np.array([(seed * 2654435761 + 88172645463325252) % 2**64 or 1], dtype=np.uint64),
         met=np.zeros(pieces + 2, dtype=np.int64),
     )
 
