@@ -61,7 +61,7 @@ class Lobby:
         self._waiting: dict[str, _Waiting] = {}
         self._sessions: dict[int, Session] = {}
         self._pages: dict[str, Session] = {}
-        self._awaited: dict[str, asyncio.Event] = {}
+        self._opened = asyncio.Event()
         self._closed = False
         threading.Thread(target=self._pool.prepare, daemon=True).start()
 
@@ -105,14 +105,11 @@ class Lobby:
             token: of the page.
         """
         while (session := self._session_of(token)) is None:
-            opened = self._awaited.setdefault(token, asyncio.Event())
-            gone = connection.wait_closed()
-            waits = [asyncio.ensure_future(wait) for wait in (opened.wait(), gone)]
+            waits = [asyncio.ensure_future(wait) for wait in (self._opened.wait(), connection.wait_closed())]
             await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
             for wait in waits:
                 wait.cancel()
             if connection.state is not State.OPEN:
-                self._awaited.pop(token, None)
                 return
         connection.stay()
         await session.map_pane.serve(connection)
@@ -152,6 +149,8 @@ class Lobby:
             waiting.placeholder.remove()
             session = Session(client, waiting.connection, self._cache, self._pool, visit)
         except Exception as error:
+            if self._closed:
+                return  # so is the event loop
             log.exception("a session could not be opened")
             client.gui.reset()
             why = escape(shown_paths(f"{type(error).__name__}: {error}"))
@@ -160,17 +159,20 @@ class Lobby:
             )
             return
         with self._lock:
-            self._sessions[client.client_id] = session
-            if visit.page:
-                self._pages[visit.page] = session
-        waiting.connection.loop.call_soon_threadsafe(self._tell_page, visit.page)
-        if waiting.connection.state is not State.OPEN:  # it disconnected while its session was opened
+            if not (closed := self._closed):
+                self._sessions[client.client_id] = session
+                if visit.page:
+                    self._pages[visit.page] = session
+                waiting.connection.loop.call_soon_threadsafe(self._tell_maps)
+        if closed:
+            session.close()
+        elif waiting.connection.state is not State.OPEN:  # it disconnected while its session was opened
             self.disconnected(client)
 
-    def _tell_page(self, token: str) -> None:
-        """Wake the websocket that waits for the session of its page; on the event loop."""
-        if opened := self._awaited.pop(token, None):
-            opened.set()
+    def _tell_maps(self) -> None:
+        """Let every websocket that waits for a session look for its own again; on the event loop."""
+        opened, self._opened = self._opened, asyncio.Event()
+        opened.set()
 
 
 @dataclass(frozen=True)

@@ -160,10 +160,12 @@ class MotionDraft:
 
     def _beside(self, grip: Grip, ends: Array, other: Grip, task: PlanTask, goal: State) -> Array:
         """Return those of some configurations (m, n) of a grasp beside which another arm can take hold."""
+        if not len(ends):
+            return ends
         with part_of(f"the approach of {other.arm.name}"):
             theirs = self._retreats(other, task, goal, [], [grip.arm]).ends
         arms = [grip.arm, other.arm]
-        goal = goal.with_arm(grip.arm, ends[0], grip.closed) if len(ends) else goal
+        goal = goal.with_arm(grip.arm, ends[0], grip.closed)
         goal = goal.with_arm(other.arm, theirs[0], other.open)
         situation = self._bodies.situation(goal, arms, held_by=arms[:1], touching=arms[1:])
         free, hits = np.zeros(len(ends), dtype=bool), []

@@ -103,6 +103,14 @@ def test_a_connection_that_was_dropped_comes_back_with_the_map(visitor):
     assert picture(visitor.wait_for(lambda html: bool(picture(html)))) == seen
 
 
+def test_a_connection_that_is_dropped_before_the_page_has_a_session_keeps_no_other_waiting(port, monkeypatch):
+    with Wire(port) as visitor:
+        first, second = visitor.open_map(), visitor.open_map()
+        first.close()
+        monkeypatch.setattr(visitor, "open_map", lambda: second)
+        visitor.wait_for(ready)
+
+
 def test_two_pages_do_not_see_each_other(port, visitor):
     with Wire(port) as other:
         other.wait_for(ready)
