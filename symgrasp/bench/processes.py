@@ -84,9 +84,14 @@ def first_start() -> Iterator[Figure]:
 
 
 def _process(command: Sequence[str], cache: str = "") -> _Process:
-    """Run a command of symgrasp; with an empty folder as the cache of compiled code, all is compiled."""
+    """Run a command of symgrasp; with an empty folder as the cache of compiled code, all is compiled.
+
+    Python keeps the bytecode of what it imports, as it does unless it is told not to.
+    """
     program = [sys.executable, "-c", MEASURE, sys.executable, "-m", "symgrasp", *command]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": cache} if cache else None
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    if cache:
+        environment["NUMBA_CACHE_DIR"] = cache
     done = subprocess.run(program, check=True, stdout=subprocess.PIPE, text=True, env=environment)
     wall, cpu, peak = map(float, done.stdout.split())
     return _Process(Time(wall, cpu), peak)
