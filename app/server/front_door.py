@@ -10,10 +10,10 @@ passes; those that become websockets are read at a limited rate. The door refuse
 * more browsers at once than were allowed, and connections that do not say in time what they want.
 
 The page that is served is the project's own; it shows viser's in a frame, whose address has the setting
-`PAGE`: a token that the page has made up. A websocket alone serves an empty view: a browser gets a session
-after the view has loaded a picture with a secret token in its path, from a page of the same origin. The
-``Referer`` of that request is the address that was opened. The page's own websocket, for the map, has
-its token in its path.
+`PAGE`: a token that the page has made up, and behind a dot that of the page which it continues, if any. A
+websocket alone serves an empty view: a browser gets a session after the view has loaded a picture with a
+secret token in its path, from a page of the same origin. The ``Referer`` of that request is the address that
+was opened. The page's own websocket, for the map, has its token in its path.
 """
 
 from __future__ import annotations
@@ -77,12 +77,14 @@ class Visit:
         query: what stood behind the ``?`` of the address it opened.
         address: the address without that.
         page: the token of the page around the view; empty where there is none.
+        before: that of the page whose session it continues, such as itself before it was loaded again.
     """
 
     token: str
     query: str = ""
     address: str = "/"
     page: str = ""
+    before: str = ""
 
 
 class FrontDoor:
@@ -210,7 +212,8 @@ class FrontDoor:
         query = "&".join(s for s in settings if s.partition("=")[0] != PAGE)
         # The page adds its own behind those of the address that was opened.
         page = next((s.partition("=")[2] for s in reversed(settings) if s.startswith(f"{PAGE}=")), "")
-        visit = Visit(token, query, address, page if TOKEN.fullmatch(page) else "")
+        tokens = [text if TOKEN.fullmatch(text) else "" for text in page.split(".")]
+        visit = Visit(token, query, address, tokens[0], tokens[1] if len(tokens) == 2 else "")
         if not is_own_picture(headers) or not self._on_visit(visit):
             return connection.respond(HTTPStatus.NOT_FOUND, "")
         return _found(connection, PageFile(PICTURE, "image/svg+xml"))

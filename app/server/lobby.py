@@ -19,6 +19,7 @@ from ..compute.process_pool import ProcessPool
 from ..files.shown_paths import shown_paths
 from .browser_connection import BrowserConnection, current_connection
 from .front_door import HELLO, FrontDoor, Visit
+from .left_pages import LeftPage, LeftPages
 from .session import Session
 from .viser_server import quiet_server
 
@@ -62,6 +63,7 @@ class Lobby:
         self._sessions: dict[int, Session] = {}
         self._pages: dict[str, Session] = {}
         self._opened = asyncio.Event()
+        self._left = LeftPages()
         self._closed = False
         threading.Thread(target=self._pool.prepare, daemon=True).start()
 
@@ -122,14 +124,23 @@ class Lobby:
         """Handle a browser that disconnected: close its session."""
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
-            if session and self._pages.get(session.visit.page) is session:
-                del self._pages[session.visit.page]
             self._lock.notify_all()
             self._waiting = {
                 token: waiting for token, waiting in self._waiting.items() if waiting.client is not client
             }
         if session:
             session.close()
+            page = session.visit.page
+            if page and (shown := session.shown):
+                self._left.keep(page, shown)
+            with self._lock:
+                if self._pages.get(page) is session:
+                    del self._pages[page]
+
+    def _shown_on(self, token: str) -> LeftPage | None:
+        """Return what a page shows, if the server has not noticed yet that it has gone, or showed."""
+        session = self._session_of(token)
+        return session.shown if session else self._left.find(token)
 
     def close(self) -> None:
         """Close all sessions and the pool of processes; a second call does nothing."""
@@ -147,7 +158,8 @@ class Lobby:
         client = waiting.client
         try:
             waiting.placeholder.remove()
-            session = Session(client, waiting.connection, self._cache, self._pool, visit)
+            left = self._shown_on(visit.page) or self._shown_on(visit.before)
+            session = Session(client, waiting.connection, self._cache, self._pool, visit, left)
         except Exception as error:
             if self._closed:
                 return  # so is the event loop

@@ -29,11 +29,13 @@ from ..state.page_link import Camera
 from ..state.plan_changes import change_plan_results
 from ..state.plan_results import PlanResults
 from ..state.requests import CompareRequest, ExplainRequest, MapRequest, Request
+from ..state.resumed import resumed
 from ..state.state import State
 from ..state.undo import remember
 from .actions import Actions, camera_of
 from .browser_connection import BrowserConnection
 from .front_door import Visit
+from .left_pages import LeftPage
 from .map_pane import MapPane
 from .playback_clock import PlaybackClock
 from .survey_actions import SurveyActions
@@ -62,6 +64,7 @@ class Session:
         cache: what all sessions share.
         pool: starts the process that computes.
         visit: the address it opened, which may say what to show first.
+        left: what it showed before, which then is shown again.
 
     Attributes:
         state: what is shown; None before the first scene is loaded.
@@ -75,9 +78,11 @@ class Session:
         cache: SharedCache,
         pool: ProcessPool,
         visit: Visit,
+        left: LeftPage | None = None,
     ) -> None:
         self.client, self.cache, self.visit, self._connection = client, cache, visit, connection
         self.state: State | None = None
+        self._camera: Camera | None = None
         self._job_ids = itertools.count(1)
         self._changed = threading.Condition(threading.Lock())
         self._drawn: State | None = None
@@ -96,13 +101,13 @@ class Session:
         self.jobs = JobQueue(f"jobs {client.client_id}", self.process.close)
         self.surveys = SurveyActions(self, pool, client.client_id)
         try:
-            self._build_page()
+            self._build_page(left)
         except BaseException:
             self.close()
             raise
 
-    def _build_page(self) -> None:
-        """Add everything to the page, start the drawing thread, and open the first scene."""
+    def _build_page(self, left: LeftPage | None) -> None:
+        """Add everything to the page, start the drawing thread, and open what was left or the first scene."""
         client = self.client
         buttons = self._connection.upload_buttons
         self.actions = Actions(
@@ -122,12 +127,23 @@ class Session:
 
         @client.camera.on_update
         async def _(_: viser.CameraHandle) -> None:
-            self.scene_view.camera_moved(camera_of(client))
+            self._camera = camera_of(client)
+            self.scene_view.camera_moved(self._camera)
             self.change(lambda s: changes.seen_from(s, camera_of(client)))
 
         name = f"draw {client.client_id}"
         threading.Thread(target=self._draw_until_closed, name=name, daemon=True).start()
-        self._open_first()
+        if left is None:
+            self._open_first()
+            return
+        self.scene_view.camera = self._camera = left.camera
+        with self._changed:
+            self._commit(resumed(left.state))
+
+    @property
+    def shown(self) -> LeftPage | None:
+        """What is shown, for a session that continues this one; None before the first scene is loaded."""
+        return LeftPage(self.state, self._camera) if self.state else None
 
     def close(self) -> None:
         """End all threads and processes; a second call does nothing."""

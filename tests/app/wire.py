@@ -44,15 +44,16 @@ class Wire:
         socket: the connection.
         map: what it is shown of the map.
         map_socket: the connection for that; None before it has its session.
-        token: of its page.
+        token: of its page; a new one unless it is given.
+        before: that of the page that it continues.
     """
 
-    def __init__(self, port: int, query: str = "") -> None:
-        self.port, self.query = port, query
+    def __init__(self, port: int, query: str = "", token: str = "", before: str = "") -> None:
+        self.port, self.query, self.before = port, query, before
         self.widgets: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, str] = {}
         self.map, self.map_socket = ShownMap(), None
-        self.token = secrets.token_urlsafe(24)
+        self.token = token or secrets.token_urlsafe(24)
         self.socket = connect(
             f"ws://127.0.0.1:{port}",
             origin=Origin(f"http://127.0.0.1:{port}"),
@@ -153,7 +154,8 @@ class Wire:
                 self.greet(found[1])
 
     def greet(self, path: str) -> None:
-        settings = [setting for setting in (self.query, f"{PAGE}={self.token}") if setting]
+        tokens = f"{self.token}.{self.before}" if self.before else self.token
+        settings = [setting for setting in (self.query, f"{PAGE}={tokens}") if setting]
         page = f"http://127.0.0.1:{self.port}/?{'&'.join(settings)}"
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT)
         connection.request("GET", path, headers={"Referer": page})

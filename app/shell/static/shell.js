@@ -2,15 +2,15 @@
 import { Link } from "./link.js";
 import { MapPane } from "./map_pane.js";
 import { describe } from "./legend.js";
+import { Visit } from "./visit.js";
 import { split } from "./splitter.js";
 
 const element = (id) => document.getElementById(id);
 const view = element("view"), canvas = element("map");
 
-const token = btoa(String.fromCharCode(...crypto.getRandomValues(new Uint8Array(24))))
-  .replaceAll("+", "-").replaceAll("/", "_");
+const visit = new Visit();
 const opened = location.search.slice(1);
-view.src = `/?${opened ? `${opened}&` : ""}page=${token}`;
+view.src = `/?${opened ? `${opened}&` : ""}page=${visit.tokens}`;
 // viser connects again only while its own document has the focus.
 view.addEventListener("load", () => view.contentWindow.focus());
 
@@ -20,8 +20,9 @@ const pane = new MapPane(canvas, {
   speak: (text) => { element("spoken").textContent = text; },
   turned: (text) => { element("turn").textContent = text; },
 });
-const link = new Link(`/map/${token}`, {
+const link = new Link(`/map/${visit.token}`, {
   message: (head, data) => {
+    visit.remember();
     if (!pane.take(head, data)) return;
     element("nothing").hidden = pane.hasMap;
     document.documentElement.dataset.theme = head.dark ? "dark" : "light";

@@ -149,6 +149,26 @@ def test_the_token_of_the_page_is_no_part_of_the_address_that_was_opened(port, v
     assert visits == [Visit("known", "scene=soda_can&turn=30", address, token)]
 
 
+@pytest.mark.parametrize(
+    ("tokens", "page", "before"),
+    [
+        ("{a}", "{a}", ""),
+        ("{a}.{b}", "{a}", "{b}"),
+        ("{a}.short", "{a}", ""),
+        ("short.{b}", "", "{b}"),
+        ("{a}.{b}.{b}", "{a}", ""),
+        ("", "", ""),
+    ],
+)
+def test_a_page_says_which_it_continues(port, visits, tokens, page, before):
+    known = {"a": "a" * 32, "b": "b" * 32}
+    address = f"http://127.0.0.1:{port}/?page={tokens.format(**known)}"
+    ask(port, f"{HELLO}known", Referer=address, Sec_Fetch_Site="same-origin")
+    assert [(visit.page, visit.before) for visit in visits] == [
+        (page.format(**known), before.format(**known))
+    ]
+
+
 def test_a_host_that_is_none_does_not_get_into_the_policy(port):
     answer = ask(port, "/", Host="x;script-src *")
     assert answer.startswith(b"HTTP/1.1 403 ")
