@@ -11,7 +11,7 @@ from symgrasp.errors import InputError, SymgraspError
 from symgrasp.hands.measure import measure_hand
 from symgrasp.hands.structure import find_hand_structure, jaw_candidates, palm_candidates
 from symgrasp.references import resolve
-from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, revolute_joints
+from symgrasp.robot.arm_joints import guess_arm_joints, joints_between, joints_outwards, revolute_joints
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot
 from symgrasp.robot.groups import ArmGroup, arm_groups, group_links
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
@@ -78,6 +78,7 @@ def find_arms(model: RobotModel) -> list[FoundArm]:
         _arms_of_groups(model)
         or _with_hands(model, palm_candidates(model))
         or _with_hands(model, jaw_candidates(model))
+        or _with_other_hands(model)
         or [_arm(model, link, mounted=True) for link in _ends(model)]
     )
     name = model.name if re.fullmatch(r"\w{1,50}", model.name) else "arm"
@@ -124,6 +125,17 @@ def _with_hands(model: RobotModel, palms: Iterable[str]) -> list[FoundArm]:
         if len(revolute_joints(model, link)) >= LEAST_JOINTS and not _is_leg(model, link)
     ]
     return [arm for arm in arms if arm.hand is not None]
+
+
+def _with_other_hands(model: RobotModel) -> list[FoundArm]:
+    """Return the arms that end at a palm whose fingers are no arms: with hands that cannot be measured."""
+    longest = dict(zip(model.link_names, joints_outwards(model), strict=True))
+    return [
+        _arm(model, link)
+        for link in palm_candidates(model)
+        if len(revolute_joints(model, link)) >= LEAST_JOINTS > longest[find_hand_structure(model, link).base]
+        and not _is_leg(model, link)
+    ]
 
 
 def _renamed(arm: FoundArm, name: str) -> FoundArm:
@@ -178,18 +190,21 @@ def _arm(model: RobotModel, link: str, mounted: bool = False) -> FoundArm:
 def _ends(model: RobotModel) -> Iterator[str]:
     """Yield the link at the end of every chain that is long enough to be an arm."""
     parents = {joint.parent for joint in model.joints if joint.source >= 0}
-    for joint in model.joints:
+    first = list(range(len(model.link_names)))  # link → the first of those that move with it
+    rigid: dict[int, list[int]] = {}  # such a link → all that move with it
+    for joint in model.joints:  # parents before children
         if joint.source < 0:
+            first[joint.child] = first[joint.parent]
+        rigid.setdefault(first[joint.child], []).append(joint.child)
+    for joint in model.joints:
+        if joint.source < 0 or not parents.isdisjoint(rigid[joint.child]):
             continue
         child = model.link_names[joint.child]
-        rigid = [
-            link for link in model.link_names
-            if [j for j in model.chain(link) if j.source >= 0][-1:] == [joint]
-        ]  # fmt: skip
-        if any(model.link_index(link) in parents for link in rigid) or _is_leg(model, child):
+        if _is_leg(model, child):
             continue
         if len(revolute_joints(model, child)) >= LEAST_JOINTS:
-            flange = [link for word in FLANGES for link in rigid if word in link.lower()]
+            names = [model.link_names[k] for k in rigid[joint.child]]
+            flange = [link for word in FLANGES for link in names if word in link.lower()]
             yield flange[0] if flange else child
 
 

@@ -15,7 +15,7 @@ from symgrasp.descriptions.xacro_file import is_xacro
 from symgrasp.descriptions.xml_file import read_xml
 from symgrasp.errors import UrdfError
 
-__all__ = ["EndEffector", "Group", "Srdf", "find_srdf", "read_srdf", "srdf_text"]
+__all__ = ["EndEffector", "Group", "Srdf", "find_srdf", "misnamed_srdf", "read_srdf", "srdf_text"]
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,47 @@ class Srdf:
 def find_srdf(urdf: Path) -> Path | None:
     """Return the SRDF that belongs to a URDF.
 
-    It is the one of the same stem in the URDF's folder or in ``../srdf``, or else the only one there.
+    It is the one of the same stem in the URDF's folder or in ``../srdf``, or else the only one there, unless
+    that names another robot: see `misnamed_srdf`.
     """
+    path = _beside(urdf)
+    return None if path is None or (not _same_stem(path, urdf) and _other_name(path, urdf)) else path
+
+
+def misnamed_srdf(urdf: Path) -> str:
+    """Return in words how the SRDF beside a URDF names another robot than it; nothing where it does not.
+
+    Names are compared as they stand in the files, but for case. What a xacro file leaves open fits any.
+    """
+    path = _beside(urdf)
+    names = None if path is None else _other_name(path, urdf)
+    if path is None or names is None:
+        return ""
+    differ = f"it describes robot {names[0]!r}, and {urdf.name} is robot {names[1]!r}"
+    return f"{differ}; srdf: {path.name} in the scene reads it" if not _same_stem(path, urdf) else differ
+
+
+def _same_stem(srdf: Path, urdf: Path) -> bool:
+    return srdf.stem == urdf.stem.removesuffix(".urdf")  # also of .urdf.xacro
+
+
+def _other_name(srdf: Path, urdf: Path) -> tuple[str, str] | None:
+    """Return the names of the robots of an SRDF and of a URDF where they differ."""
+    names = _robot_name(srdf, "name"), _robot_name(urdf, "name") or _robot_name(urdf, "model")
+    stated = [name.casefold() for name in names if name and "$" not in name]
+    return (names[0], names[1]) if len(set(stated)) == 2 else None
+
+
+def _robot_name(path: Path, attribute: str) -> str:
+    """Return the name of the robot of a file; nothing where none can be read."""
+    try:
+        return read_xml(path, "URDF").get(attribute, "")
+    except UrdfError:
+        return ""
+
+
+def _beside(urdf: Path) -> Path | None:
+    """Return the SRDF of the same stem as a URDF, or else the only one beside it."""
     folders = (urdf.parent, urdf.parent.parent / "srdf")
     for folder in folders:
         if (path := folder / f"{urdf.stem.removesuffix('.urdf')}.srdf").is_file():  # also of .urdf.xacro

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
 from scipy.spatial import ConvexHull
@@ -53,27 +53,28 @@ def find_hand_structure(model: RobotModel, tool: str | None) -> HandStructure:
     Raises:
         UrdfError: there is no such palm, or several.
     """
-    movers, group = _movers(model)
+    parts = _parts(model)
     if tool is not None:
-        mover = group[model.link_names[model.link_index(tool)]]
-        if mover not in _innermost(movers, group) and len(movers.get(mover, ())) < 2:
+        mover = parts.group[model.link_index(tool)]
+        if len(parts.firsts.get(mover, ())) < 2 and mover not in _innermost(parts, parts.firsts):
             raise UrdfError(model.path, "tool", tool, "a link of a palm that fingers or a jaw hang on")
     else:
-        inner = _innermost(_hands(movers), group)
+        inner = _innermost(parts, _hands(parts))
         if len(inner) != 1:
-            palms = [link for link in model.link_names if group[link] in inner]
+            palms = [link for link, own in zip(model.link_names, parts.group, strict=True) if own in inner]
             expected = f"--tool, {one_of(palms)}" if palms else "two or more fingers, or --tool for one jaw"
             raise UrdfError(model.path, "hand", f"{len(inner)} hands", expected)
         mover = inner[0]
-    together = [link for link in model.link_names if group[link] == mover]
-    parents = [model.chain(finger[0])[:-1] for finger in movers[mover]]
-    shared = [j for j in parents[0] if all(j in chain for chain in parents)]
-    base = model.link_names[shared[-1].child] if shared else model.root
+    together = [link for link, own in zip(model.link_names, parts.group, strict=True) if own == mover]
+    fingers = [[model.link_names[k] for k in parts.below(first)] for first in parts.firsts[mover]]
+    chains = [[joint.child for joint in model.chain(finger[0])[:-1]] for finger in fingers]
+    shared = [link for link in chains[0] if all(link in chain for chain in map(set, chains[1:]))]
+    base = shared[-1] if shared else 0
     # On a robot the last link of the arm moves with the palm, but is not part of the hand.
-    own = [link for link in together if model.chain(link)[: len(shared)] == shared]
-    palm = together if mover is None else own
-    beside = [link for link in together if link not in palm]
-    return HandStructure(base, palm, movers[mover], mover is None, beside)
+    own = {model.link_names[k] for k in parts.below(base)}
+    palm = [link for link in together if mover is None or link in own]
+    beside = [link for link in together if not (mover is None or link in own)]
+    return HandStructure(model.link_names[base], palm, fingers, mover is None, beside)
 
 
 def palm_candidates(model: RobotModel) -> list[str]:
@@ -81,8 +82,8 @@ def palm_candidates(model: RobotModel) -> list[str]:
 
     Palms are among them, and so may be the body of a robot whose arms and legs carry no hands.
     """
-    movers, group = _movers(model)
-    return _firsts(model, _innermost(_hands(movers), group), group)
+    parts = _parts(model)
+    return _first_links(model, parts, _innermost(parts, _hands(parts)))
 
 
 def jaw_candidates(model: RobotModel) -> list[str]:
@@ -90,58 +91,70 @@ def jaw_candidates(model: RobotModel) -> list[str]:
 
     Those that carry a jaw are among them, and so is the link before the last of any arm.
     """
-    movers, group = _movers(model)
-    single = [mover for mover in _innermost(movers, group) if len(movers[mover]) == 1]
-    return _firsts(model, single, group)
+    parts = _parts(model)
+    single = [mover for mover in _innermost(parts, parts.firsts) if len(parts.firsts[mover]) == 1]
+    return _first_links(model, parts, single)
 
 
-def _firsts(model: RobotModel, movers: Iterable[str | None], group: Mapping[str, str | None]) -> list[str]:
-    return [next(link for link in model.link_names if group[link] == mover) for mover in movers]
-
-
-def _hands(movers: Mapping[str | None, list[list[str]]]) -> dict[str | None, list[list[str]]]:
-    return {mover: parts for mover, parts in movers.items() if len(parts) > 1}
-
-
-def _movers(model: RobotModel) -> tuple[dict[str | None, list[list[str]]], dict[str, str | None]]:
-    """Return the parts that hang on groups of links, and the group that each link belongs to.
+class _Parts(NamedTuple):
+    """The links of a URDF that move as one, by index.
 
     Links that only fixed joints connect move as one rigid group. A group is named by the last joint that
     moves it, None where no joint does.
+
+    Attributes:
+        group: of each link, the group that it belongs to.
+        children: of each link, the links that hang on it.
+        firsts: group → the first link of each part with a shape that moves on it.
     """
+
+    group: list[str | None]
+    children: list[list[int]]
+    firsts: dict[str | None, list[int]]
+
+    def below(self, first: int) -> list[int]:
+        """Return a link and all that hang on it, in order."""
+        found = [first]
+        for link in found:
+            found += self.children[link]
+        return sorted(found)
+
+
+def _parts(model: RobotModel) -> _Parts:
+    """Return which links move as one, and what moves on them."""
     names = model.link_names
-    mover: list[str | None] = [None] * len(names)
+    group: list[str | None] = [None] * len(names)
     children: list[list[int]] = [[] for _ in names]
     for joint in model.joints:  # parents before children
-        mover[joint.child] = joint.name if joint.source >= 0 else mover[joint.parent]
+        group[joint.child] = joint.name if joint.source >= 0 else group[joint.parent]
         children[joint.parent].append(joint.child)
     shaped = [model.has_shape(name) for name in names]
     for joint in reversed(model.joints):
         shaped[joint.parent] |= shaped[joint.child]
-    first_of: dict[str | None, list[int]] = {}
+    firsts: dict[str | None, list[int]] = {}
     for joint in model.joints:
         if joint.source >= 0 and shaped[joint.child]:
-            first_of.setdefault(mover[joint.parent], []).append(joint.child)
-    movers = {
-        group: [[names[k] for k in _subtree(children, first)] for first in firsts]
-        for group, firsts in first_of.items()
-    }
-    return movers, dict(zip(names, mover, strict=True))
+            firsts.setdefault(group[joint.parent], []).append(joint.child)
+    return _Parts(group, children, firsts)
 
 
-def _subtree(children: Sequence[Sequence[int]], first: int) -> list[int]:
-    """Return a link of a tree and all that hang on it, in order."""
-    found = [first]
-    for link in found:
-        found += children[link]
-    return sorted(found)
+def _hands(parts: _Parts) -> list[str | None]:
+    """Return the groups that two or more parts move on."""
+    return [mover for mover, firsts in parts.firsts.items() if len(firsts) > 1]
 
 
-def _innermost(
-    hands: Mapping[str | None, list[list[str]]], group: Mapping[str, str | None]
-) -> list[str | None]:
+def _first_links(model: RobotModel, parts: _Parts, movers: Iterable[str | None]) -> list[str]:
+    """Return the first link of each of some groups."""
+    return [model.link_names[parts.group.index(mover)] for mover in movers]
+
+
+def _innermost(parts: _Parts, hands: Collection[str | None]) -> list[str | None]:
     """Return the groups without those whose "fingers" carry fingers themselves: the torso is no palm."""
-    return [m for m, fs in hands.items() if not any(group[link] in hands for f in fs for link in f)]
+    among = set(hands)
+    carries = [mover in among for mover in parts.group]
+    for link in reversed(range(len(carries))):  # children after their parents
+        carries[link] |= any(carries[child] for child in parts.children[link])
+    return [mover for mover in hands if not any(carries[first] for first in parts.firsts[mover])]
 
 
 def check_fingers(model: RobotModel, structure: HandStructure) -> None:

@@ -13,8 +13,14 @@ from symgrasp.robot.joint import Joint
 from symgrasp.robot.model import RobotModel
 
 __all__ = [
-    "BRANCH", "MOST_JOINTS", "guess_arm_joints", "joints_between", "joints_outwards", "revolute_joints",
-]  # fmt: skip
+    "BRANCH",
+    "MOST_JOINTS",
+    "guess_arm_joints",
+    "joints_between",
+    "joints_outwards",
+    "revolute_joints",
+    "turns",
+]
 
 MOST_JOINTS = 7
 """Most joints of an arm."""
@@ -29,7 +35,7 @@ def revolute_joints(model: RobotModel, tool: str) -> list[str]:
     Raises:
         UrdfError: there is no such link.
     """
-    return [joint.name for joint in model.chain(tool) if _turns(model, joint)]
+    return [joint.name for joint in model.chain(tool) if turns(model, joint)]
 
 
 def guess_arm_joints(model: RobotModel, tool: str, others: frozenset[str] = frozenset()) -> list[str]:
@@ -81,11 +87,11 @@ def joints_outwards(model: RobotModel) -> list[int]:
     """Return for each link the most joints that turn on the way from it to the end of a branch."""
     longest = [0] * len(model.link_names)
     for joint in reversed(model.joints):  # children before their parents
-        longest[joint.parent] = max(longest[joint.parent], longest[joint.child] + _turns(model, joint))
+        longest[joint.parent] = max(longest[joint.parent], longest[joint.child] + turns(model, joint))
     return longest
 
 
-def _turns(model: RobotModel, joint: Joint) -> bool:
+def turns(model: RobotModel, joint: Joint) -> bool:
     """Whether a joint turns and takes a value of its own."""
     return joint.kind in ("revolute", "continuous") and model.joint_names[joint.source] == joint.name
 
@@ -94,17 +100,17 @@ def _before_last_fork(model: RobotModel, tool: str) -> set[str]:
     """Return the joints of a chain before the last fork into two branches of `BRANCH` joints or more."""
     longest = joints_outwards(model)
     chain = model.chain(tool)
+    branches: dict[int, list[tuple[int, Joint]]] = {joint.parent: [] for joint in chain}
+    for joint in model.joints:
+        if joint.parent in branches:
+            branches[joint.parent].append((longest[joint.child] + turns(model, joint), joint))
     left = len(revolute_joints(model, tool))
     before: list[str] = []
     result: set[str] = set()
     for joint in chain:
-        branches = [
-            longest[other.child] + _turns(model, other)
-            for other in model.joints
-            if other.parent == joint.parent and other is not joint
-        ]
-        if left >= BRANCH and max(branches, default=0) >= BRANCH:
+        others = [length for length, other in branches[joint.parent] if other is not joint]
+        if left >= BRANCH and max(others, default=0) >= BRANCH:
             result = set(before)
         before.append(joint.name)
-        left -= _turns(model, joint)
+        left -= turns(model, joint)
     return result

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from symgrasp.descriptions.srdf import EndEffector, Group
-from symgrasp.robot.arm_joints import MOST_JOINTS, revolute_joints
+from symgrasp.robot.arm_joints import MOST_JOINTS, revolute_joints, turns
 from symgrasp.robot.model import RobotModel
 
 __all__ = ["ArmGroup", "arm_group", "arm_groups", "group_links"]
@@ -73,9 +73,8 @@ def _rank(group: ArmGroup) -> tuple[bool, int]:
 def _as_arm(model: RobotModel, name: str) -> ArmGroup | None:
     """Return a group as an arm, None where its joints do not follow each other or are too few or many."""
     joints = _joints(model, name)
-    turning = [link for joint in model.joints if joint.name in joints
-               if (link := model.link_names[joint.child])
-               and revolute_joints(model, link)[-1:] == [joint.name]]  # fmt: skip
+    turning = [model.link_names[joint.child] for joint in model.joints
+               if joint.name in joints and turns(model, joint)]  # fmt: skip
     if not LEAST_JOINTS <= len(turning) <= MOST_JOINTS:
         return None
     names = tuple(revolute_joints(model, turning[-1])[-len(turning) :])
@@ -116,7 +115,8 @@ def _joints(model: RobotModel, name: str) -> set[str]:
 
 def _before(model: RobotModel, links: Iterable[str]) -> list[str]:
     """Return the joints that links hang on."""
-    return [joint.name for joint in model.joints if model.link_names[joint.child] in links]
+    wanted = frozenset(links)
+    return [joint.name for joint in model.joints if model.link_names[joint.child] in wanted]
 
 
 def _with_subgroups(model: RobotModel, name: str) -> list[Group]:

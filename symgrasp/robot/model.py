@@ -91,6 +91,7 @@ class RobotModel:
         self._indices = {name: k for k, name in enumerate(self.joint_names)}
         self._unusable_limits: dict[str, tuple[float, float] | None] = {}  # as the URDF states them
         self.joints, self.link_names = self._build_tree(urdf, root)
+        self._link_indices = {link: k for k, link in enumerate(self.link_names)}
         self._above = {joint.child: joint for joint in self.joints}
         mass, centre = zip(*(inertials[link] for link in self.link_names), strict=True)
         self._masses = np.array(mass), np.array(centre)
@@ -228,9 +229,9 @@ class RobotModel:
         Raises:
             UrdfError: there is no such link.
         """
-        if link not in self.link_names:
+        if link not in self._link_indices:
             raise UrdfError(self.path, "link", link, one_of(self.link_names, link))
-        return self.link_names.index(link)
+        return self._link_indices[link]
 
     def default_values(self) -> Array:
         """Return joint values (n,): zero, or the nearest limit where zero is outside."""

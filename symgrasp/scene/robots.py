@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.descriptions.srdf import find_srdf
+from symgrasp.descriptions.srdf import find_srdf, misnamed_srdf
 from symgrasp.errors import InputError, SceneError, UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.references import resolve
@@ -91,9 +91,13 @@ class RobotBuilder:
         if srdf and not entry.srdf:
             entry = entry.model_copy(update={"srdf": _beside(entry.urdf, urdf, srdf)})
             allowed = len(model.allowed_pairs())
-            notes.append(f"{entry.name}: srdf: {srdf.name}, which lets {allowed} pairs of links touch")
+            touch = f"{srdf.name}, which lets {allowed} pairs of links touch"
+            misnamed = misnamed_srdf(urdf)
+            notes.append(f"{entry.name}: srdf: {touch}" + (f"; {misnamed}" if misnamed else ""))
         elif srdf is None and (allowed := len(model.allowed_pairs())):
             notes.append(f"{entry.name}: {urdf.name} lets {allowed} pairs of links touch")
+        if srdf is None and (misnamed := misnamed_srdf(urdf)):
+            notes.append(f"{entry.name}: srdf: not the one beside it: {misnamed}")
         for k, (f, a, hand) in enumerate(zip(fields, files, hands, strict=True)):
             joints.append(self._joints(f, a, tools[k], model, shared, hand))
             resting = [n for n in chains[k] if n not in (*joints[k], *shared, *hand.joints)]

@@ -41,6 +41,34 @@ def test_which_srdf_belongs_to_a_urdf(tmp_path):
     assert find_srdf(urdf) == tmp_path / "urdf/arm.srdf"
 
 
+def test_the_only_srdf_of_a_folder_is_not_another_robots(content, tmp_path):
+    """One of the same stem is; it is said of both that names differ, and names of any case fit."""
+    urdf = resolve("package://pybullet_data/franka_panda/panda.urdf", tmp_path)
+    assert urdf is not None
+    shutil.copytree(urdf.parent, tmp_path / "panda")
+    urdf, other = tmp_path / "panda/panda.urdf", tmp_path / "panda/other.srdf"
+    robot = {"name": "arm", "urdf": str(urdf), "tool": "panda_grasptarget", "hand": "franka"}
+    content["robots"] = [robot]
+    names = "it describes robot 'other', and panda.urdf is robot 'panda'"
+    other.write_text(STATE.replace('name="panda"', 'name="other"', 1))
+    assert find_srdf(urdf) is None
+    scene = Scene.from_content(content)
+    assert f"arm: srdf: not the one beside it: {names}; srdf: other.srdf in the scene reads it" in scene.notes
+    assert scene.robots["arm"].model.srdf is None
+    read = Scene.from_content({**content, "robots": [{**robot, "srdf": str(other)}]})
+    assert read.robots["arm"].model.srdf is not None
+
+    other.write_text(STATE.replace('name="panda"', 'name="Panda"', 1))
+    assert find_srdf(urdf) == other
+    assert "arm: srdf: other.srdf, which lets 1 pairs of links touch" in Scene.from_content(content).notes
+
+    other.rename(own := other.with_name("panda.srdf"))
+    own.write_text(STATE.replace('name="panda"', 'name="other"', 1))
+    assert find_srdf(urdf) == own
+    said = f"arm: srdf: panda.srdf, which lets 1 pairs of links touch; {names}"
+    assert said in Scene.from_content(content).notes
+
+
 def test_what_it_says(tmp_path):
     path = tmp_path / "a.srdf"
     path.write_text(STATE)
