@@ -148,6 +148,7 @@ def _legend(state: State, places: Places, high: float) -> str:
     blocked = {
         PointState.OBJECT_BLOCKED: "the object would be inside something",
         PointState.ROBOT_BLOCKED: "the robot would stand in something",
+        PointState.UNUSABLE: "the scene cannot be built",
     }
     for state_, text in blocked.items():
         count = int((places.state == state_).sum())

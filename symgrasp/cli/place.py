@@ -124,6 +124,8 @@ def _region(args: argparse.Namespace, scene: Scene, robot: str) -> Region:
         given = getattr(args, option)
         if given is not None and given[0] > given[1]:
             raise InputError("command line", f"--{option}", given, "LOW HIGH, the lower one first")
+        if option == "yaw" and given is not None and given[1] - given[0] > 360:
+            raise InputError("command line", "--yaw", given, "LOW HIGH, a full turn apart at most")
         if given is not None:
             changes[name] = tuple(given)
     outs = []

@@ -116,13 +116,15 @@ def add_out(
     command.add_argument(option, metavar="FILE", type=Path, required=required, help=text)
 
 
-def whole(lowest: int) -> Callable[[str], int]:
-    """Return the type of an option that takes a whole number, from the lowest on."""
+def whole(lowest: int, highest: int | None = None) -> Callable[[str], int]:
+    """Return the type of an option that takes a whole number from the lowest on, to the highest if any."""
+    to = "on" if highest is None else f"to {highest:,}"
 
     def read(text: str) -> int:
-        if not text.isdecimal() or int(text) < lowest:
-            raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from {lowest} on")
-        return int(text)
+        value = int(text) if text.isdecimal() and len(text) <= 20 else -1
+        if value < lowest or (highest is not None and value > highest):
+            raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from {lowest} {to}")
+        return value
 
     return read
 

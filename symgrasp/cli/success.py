@@ -46,7 +46,7 @@ def add_parser(commands: Commands) -> None:
     text = "all tasks are off alike, as by an error of calibration; otherwise each on its own"
     command.add_argument("--shared", action="store_true", help=text)
     text = "number of draws (default: %(default)s)"
-    command.add_argument("--samples", metavar="N", type=whole(1), default=100, help=text)
+    command.add_argument("--samples", metavar="N", type=whole(1, 100_000), default=100, help=text)
     command.add_argument("--seed", metavar="N", type=whole(0), default=0, help="(default: %(default)s)")
     add_out(command, "write a picture of the probability of every cell: .png or .svg")
     text = "write the sequential plan that is feasible with the largest probability: .json"

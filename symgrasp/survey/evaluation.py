@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.errors import NoPlanError, SceneError
+from symgrasp.errors import Cancelled, InputError, NoPlanError, SceneError, SymgraspError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.profile import Profile
@@ -44,6 +44,8 @@ class State(IntEnum):
     """a robot collides whatever its arms do, or its base is moved into something"""
     KEPT_OUT = 4
     """the base stands where it may not"""
+    UNUSABLE = 5
+    """the values of its axes do not go together; `PointResult.problem` says why"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,7 @@ class PointResult:
         plan: whether the plan exists.
         plan_margin: the smallest margin (m) of any hold of the best plan, 0 where there is none.
         feasible: (R, H, A) which cells are feasible.
+        problem: why its values do not go together, in one line; empty unless it is `State.UNUSABLE`.
     """
 
     state: State
@@ -69,6 +72,7 @@ class PointResult:
     plan: bool = False
     plan_margin: float = np.nan
     feasible: np.ndarray | None = None
+    problem: str = ""
 
 
 class _Stage(NamedTuple):
@@ -111,6 +115,16 @@ class Evaluator:
         """Compute a point, given as indices along each axis."""
         if self._kept_out(point):
             return PointResult(State.KEPT_OUT)
+        try:
+            return self._computed(point)
+        except Cancelled:
+            raise
+        except SymgraspError as error:  # values that are fine on their own, and are not together
+            text = error.without_source if isinstance(error, InputError) else str(error)
+            return PointResult(State.UNUSABLE, problem=text)
+
+    def _computed(self, point: tuple[int, ...]) -> PointResult:
+        """Compute a point whose base stands where it may."""
         stage = self._stage_of(point)
         if stage.world is None or stage.maker is None:
             return PointResult(State.ROBOT_BLOCKED)

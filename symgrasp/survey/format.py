@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -12,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, StrictBool, Ta
 from symgrasp.scene.format import WHOLE, HandFile, MapSettings, ObjectFile
 
 __all__ = [
-    "BASE", "POSITION", "AxisFile", "HandAxis", "KeepOut", "NumberAxis", "ObjectAxis", "PlanKind",
-    "PositionAxis", "SurveyFile", "TaskAxis", "survey_schema",
+    "BASE", "MOST_VALUES", "POSITION", "AxisFile", "HandAxis", "KeepOut", "NumberAxis", "ObjectAxis",
+    "PlanKind", "PositionAxis", "SurveyFile", "TaskAxis", "survey_schema",
 ]  # fmt: skip
 
 LARGEST = 1e4
@@ -32,8 +31,8 @@ BASE = ("base.x", "base.y", "base.z", "base.yaw_deg")
 """Axes that move a robot: x, y, z (m) of its base, and its turn about the vertical."""
 
 RESERVED = {
-    "angle", "best", "byte", "cell", "cells", "feasible", "margin", "plan", "plan_margin", "reason", "roll",
-    "row", "share", "state",
+    "angle", "best", "byte", "cell", "cells", "feasible", "letter", "margin", "plan", "plan_margin",
+    "problem", "reason", "roll", "row", "share", "state",
 }  # fmt: skip
 """Names of what a store holds besides the axes."""
 
@@ -188,10 +187,6 @@ class SurveyFile(_Strict):
         names = [axis.name for axis in self.axes]
         if len(set(names)) < len(names):
             raise ValueError(f"axes: names that differ, not {names}")
-        varied = [_varied(axis) for axis in self.axes]
-        twice = [a for a, b in pairwise(sorted(varied)) if a == b or b.startswith(a + ".")]
-        if twice:
-            raise ValueError(f"axes: {twice[0]} on one axis only")
         kinds = [axis.of for axis in self.axes]
         if "direction_deg" in kinds and "tilt_deg" not in kinds:
             raise ValueError("axes: tilt_deg along with direction_deg")
@@ -212,15 +207,6 @@ class SurveyFile(_Strict):
 def lengths(file: SurveyFile) -> tuple[int, ...]:
     """Return the number of values of each axis."""
     return tuple(len(a.numbers() if isinstance(a, NumberAxis) else a.values) for a in file.axes)
-
-
-def _varied(axis: AxisFile) -> str:
-    """Return what an axis varies, such that what begins alike is a part of it."""
-    if isinstance(axis, HandAxis):
-        return f"hand.{axis.arm}"
-    if isinstance(axis, NumberAxis) and axis.of in BASE:
-        return f"{axis.of}.{axis.robot}"
-    return axis.of
 
 
 def survey_schema() -> dict[str, Any]:

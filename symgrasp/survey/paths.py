@@ -6,7 +6,7 @@ from typing import Any
 
 from symgrasp.errors import one_of
 
-__all__ = ["with_number"]
+__all__ = ["keys_of", "with_number"]
 
 
 def with_number(content: dict[str, Any], path: str, value: float) -> dict[str, Any]:
@@ -23,19 +23,39 @@ def with_number(content: dict[str, Any], path: str, value: float) -> dict[str, A
     return _with(content, path.split("."), [], value)
 
 
+def keys_of(content: dict[str, Any], path: str) -> tuple[str | int, ...]:
+    """Return the keys of a path, entries of lists by their numbers: the same however the path is written.
+
+    Args:
+        content: plain data that has something there.
+        path: see `with_number`.
+    """
+    at: Any = content
+    found: list[str | int] = []
+    for step in path.split("."):
+        keys = _keys(at)
+        found.append(keys[step])
+        at = at[keys[step]]
+    return tuple(found)
+
+
+def _keys(at: Any) -> dict[str, Any]:
+    """Return the keys of plain data by what paths call them."""
+    if isinstance(at, dict):
+        return {str(key): key for key in at}
+    if isinstance(at, list | tuple):
+        keys: dict[str, Any] = {str(k): k for k in range(len(at))}
+        return keys | {e["name"]: k for k, e in enumerate(at) if isinstance(e, dict) and "name" in e}
+    return {}
+
+
 def _with(at: Any, steps: list[str], before: list[str], value: float) -> Any:
     if not steps:
         if isinstance(at, bool) or not isinstance(at, int | float):
             raise ValueError(f"the path of a number, which {'.'.join(before)} is not")
         return value
     step, *rest = steps
-    if isinstance(at, dict):
-        keys = {str(key): key for key in at}
-    elif isinstance(at, list | tuple):
-        keys = {str(k): k for k in range(len(at))}
-        keys |= {e["name"]: k for k, e in enumerate(at) if isinstance(e, dict) and "name" in e}
-    else:
-        keys = {}
+    keys = _keys(at)
     if step not in keys:
         where = ".".join(before) or "the scene"
         raise ValueError(f"in {where}, {one_of(keys, step)}" if keys else f"nothing in {where}, a number")

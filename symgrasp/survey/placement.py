@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from symgrasp.errors import NoPlanError, SceneError
+from symgrasp.errors import InputError, NoPlanError, SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
@@ -22,7 +22,7 @@ from symgrasp.scene.format import MapSettings
 from symgrasp.scene.replacing import with_base
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.evaluation import plan_margin, planned
-from symgrasp.survey.format import KeepOut, NumberAxis, PlanKind, SurveyFile
+from symgrasp.survey.format import MOST_VALUES, KeepOut, NumberAxis, PlanKind, SurveyFile
 from symgrasp.survey.regions import length_of_arm
 from symgrasp.survey.survey import Survey
 from symgrasp.world import open_world
@@ -31,6 +31,9 @@ __all__ = ["Base", "Placement", "Proposal", "Region", "Surveyed", "kind_of_plan"
 
 SEEDS, ROUNDS = 3, 2
 """How many of the best bases are refined, and how often the step is halved."""
+
+MOST_BASES = 1_000_000
+"""Most bases that are surveyed at first."""
 
 TURN = 90.0
 """Step (°) of the turn about the vertical at first."""
@@ -160,7 +163,9 @@ def place_base(
 
     Raises:
         NoPlanError: none of the bases that were surveyed serves all tasks.
+        InputError: the region has too many bases.
     """
+    _check_size(robot, region)
     kind, margins = kind_of_plan(scene), dict[Base, float]()
 
     def survey(name: str, axes: Sequence[NumberAxis]) -> None:
@@ -194,6 +199,17 @@ def place_base(
     if not found:
         raise NoPlanError(f"none of {len(margins)} bases of {robot} serves all tasks")
     return Placement(tuple(sorted(found, key=lambda p: -p.margin)), margins)
+
+
+def _check_size(robot: str, region: Region) -> None:
+    """Raise InputError where a region has too many bases; the numbers of each axis are not made for that."""
+    counts = [
+        1 + math.ceil((high - low) / region.step - 1e-9) for low, high in (region.x, region.y, region.z)
+    ]
+    count = math.prod(counts) * (1 + math.ceil((region.yaw_deg[1] - region.yaw_deg[0]) / TURN))
+    if max(counts) > MOST_VALUES or count > MOST_BASES:
+        expected = f"at most {MOST_BASES:,}, {MOST_VALUES:,} along a side: a longer step or a smaller region"
+        raise InputError("region", f"bases of {robot}", count, expected)
 
 
 def _axes(robot: str, region: Region) -> Iterator[NumberAxis]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,13 +13,17 @@ from symgrasp.object.manifold import Manifold
 from symgrasp.survey.evaluation import State
 from symgrasp.survey.survey import Survey
 
-__all__ = ["feasible_cells", "in_words", "values_of", "workspace"]
+__all__ = ["feasible_cells", "in_words", "problems", "values_of", "workspace"]
+
+MOST_PROBLEMS = 3
+"""Most reasons that are told why values do not go together."""
 
 STATES = {
     State.MISSING: "not computed yet",
     State.OBJECT_BLOCKED: "with the object inside another body",
     State.ROBOT_BLOCKED: "with a robot that stands in something, or collides whatever its arms do",
     State.KEPT_OUT: "where the base may not stand",
+    State.UNUSABLE: "whose values do not go together",
 }
 
 LABELS = {
@@ -95,6 +100,15 @@ def workspace(survey: Survey, results: xr.Dataset, h: float, roll: int) -> xr.Da
     return found.assign_attrs(label=label)
 
 
+def problems(results: xr.Dataset) -> Iterator[str]:
+    """Yield for every point whose values do not go together why, as far as the store says."""
+    if "problem" not in results:
+        return
+    letters = results["problem"].values[results["state"].values == State.UNUSABLE]
+    for text in letters:
+        yield bytes(text).rstrip(b"\0").decode()
+
+
 def in_words(survey: Survey, results: xr.Dataset) -> Iterator[str]:
     """Yield lines that say what a survey found."""
     axes = " × ".join(f"{len(axis.values)} {axis.name}" for axis in survey.axes)
@@ -104,6 +118,9 @@ def in_words(survey: Survey, results: xr.Dataset) -> Iterator[str]:
         count = int((state == value).sum())
         if count:
             yield f"  {count} {text}"
+        if count and value == State.UNUSABLE:
+            for reason, points in Counter(problems(results)).most_common(MOST_PROBLEMS):
+                yield f"    {points}: {reason}"
     computed = state == State.COMPUTED
     if not computed.any():
         return

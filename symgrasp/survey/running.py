@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError
@@ -30,6 +31,8 @@ AHEAD = 3
 
 HOST = "127.0.0.1"
 """Where the processes of a local cluster listen: nobody else's machine can reach them."""
+
+ADDRESS = re.compile(r"(?P<protocol>tcp|tls)://([\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
 
 FAILURES = 3
 """A batch that so many workers died of is given up."""
@@ -167,6 +170,7 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     }
     with config.set(settings), _quiet():
         if scheduler is not None:
+            _check_address(scheduler)
             try:
                 client = Client(scheduler, timeout=10, set_as_default=False)
             except (OSError, ValueError) as error:
@@ -191,6 +195,21 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
             yield client
 
 
+def _check_address(scheduler: str) -> None:
+    """Check that something can be an address, before a client is made: one that fails waits when it ends.
+
+    Raises:
+        SurveyError: it cannot.
+    """
+    found = ADDRESS.fullmatch(scheduler)
+    if not found or not 0 < int(found["port"]) < 2**16:
+        text = "the address of a running Dask scheduler, such as tcp://10.0.0.1:8786"
+        raise SurveyError("command line", "--scheduler", scheduler, text)
+    if found["protocol"] == "tls" and Security().get_connection_args("client").get("ssl_context") is None:
+        text = "an address tcp://…, or the certificates of Dask in its configuration, distributed.comm.tls"
+        raise SurveyError("command line", "--scheduler", scheduler, text)
+
+
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep what Dask logs of connections that were lost out of what people read: an error says it."""
@@ -212,7 +231,7 @@ def run_batch(shared: tuple[Mapping[str, Any], str], batch: int) -> int:
     """Compute a batch and write it, on a worker; return its number.
 
     Worlds and engines stay between the batches of a thread. Maps are computed on one core: the others belong
-    to other workers.
+    to other workers. A worker whose files or program are others than those of the store writes nothing.
 
     Args:
         shared: the survey as plain data, and the folder of the store.
@@ -224,8 +243,8 @@ def run_batch(shared: tuple[Mapping[str, Any], str], batch: int) -> int:
         if hasattr(_own, "evaluator"):
             _own.evaluator.close()
         survey = Survey.from_dict(shared[0])
-        _own.key, _own.shared = key, shared  # held, so that no other has its id
         _own.evaluator, _own.store = Evaluator(survey), SurveyStore(shared[1], survey)
+        _own.key, _own.shared = key, shared  # held, so that no other has its id
     evaluator: Evaluator = _own.evaluator
     _own.store.write(batch, {point: evaluator.point(point) for point in evaluator.survey.points_of(batch)})
     return batch

@@ -20,7 +20,7 @@ import xarray as xr
 import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
-from symgrasp.errors import SurveyError
+from symgrasp.errors import SurveyError, printable
 from symgrasp.object.manifold import ROLLS
 from symgrasp.reason import Reason
 from symgrasp.survey.evaluation import PointResult, State
@@ -28,10 +28,16 @@ from symgrasp.survey.survey import Survey
 
 __all__ = ["SurveyStore", "create_store", "open_results"]
 
-STATE = "state"
+STATE, PROBLEM = "state", "problem"
 
 FORMAT = "symgrasp survey"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""Version 2 has the variable ``problem``; one without it is read, and gone on with, as it is."""
+
+VERSIONS = (1, FORMAT_VERSION)
+
+LONGEST_PROBLEM = 240
+"""Bytes of a text that says why the values of a point do not go together, at most."""
 
 
 class SurveyStore:
@@ -40,14 +46,23 @@ class SurveyStore:
     Args:
         path: its folder; `create_store` has made it.
         survey: the survey.
+
+    Raises:
+        SurveyError: the store is that of another survey, or of one with other files of robots and hands.
     """
 
     def __init__(self, path: str | Path, survey: Survey) -> None:
         self.survey = survey
         self._path = Path(path)
+        attributes = _attributes(self._path)
+        if attributes["sha256"] != survey.sha256:
+            known = json.loads(attributes["survey"])["file"]["name"]
+            expected = f"the same {survey.file.name}, scene, robots and program as now, or another folder"
+            raise SurveyError(path, "survey", known, expected)
         group: Any = zarr.open_group(str(path), mode="r+", use_consolidated=False)
         every = {"write_empty_chunks": True}  # a chunk that is not there is missing
-        self._arrays = {name: group[name].with_config(every) for name in variables(survey)}
+        self._kinds = {name: own for name, own in variables(survey).items() if name in group}
+        self._arrays = {name: group[name].with_config(every) for name in self._kinds}
         self._names = [name for name in self._arrays if name != STATE]
 
     def write(self, batch: int, results: Mapping[tuple[int, ...], PointResult]) -> None:
@@ -59,11 +74,15 @@ class SurveyStore:
         """
         region = self.survey.region(batch)
         origin, shape = [s.start for s in region], tuple(s.stop - s.start for s in region)
-        kinds = variables(self.survey)
-        blocks = {name: np.full((*shape, *own.sizes), own.fill, own.kind) for name, own in kinds.items()}
+        blocks = {
+            name: np.full((*shape, *own.sizes), own.fill, own.kind) for name, own in self._kinds.items()
+        }
         for point, result in results.items():
             where = tuple(k - o for k, o in zip(point, origin, strict=True))
             blocks[STATE][where] = result.state
+            if result.problem and PROBLEM in blocks:
+                text = np.frombuffer(_cut(result.problem), dtype=np.uint8)
+                blocks[PROBLEM][where][: len(text)] = text
             if result.state != State.COMPUTED:
                 continue
             assert result.cells is not None and result.feasible is not None
@@ -76,7 +95,7 @@ class SurveyStore:
                 "plan_margin": result.plan_margin,
                 "feasible": np.packbits(result.feasible, axis=-1),
             }
-            for name in self._names:
+            for name in values.keys() & blocks.keys():
                 blocks[name][where] = values[name]
         for name in (*self._names, STATE):
             array: Any = self._arrays[name]
@@ -90,7 +109,7 @@ class SurveyStore:
         """Whether every chunk of a batch is there, as it was written."""
         region, where = self.survey.region(batch), np.unravel_index(batch, self.survey.batch_grid)
         with suppress(Exception):  # zarr, its codecs and the disk each raise their own
-            for name, own in variables(self.survey).items():
+            for name, own in self._kinds.items():
                 chunk = [*(str(k) for k in where), *("0" for _ in own.sizes)]
                 self._path.joinpath(name, "c", *chunk).stat()
                 array: Any = self._arrays[name]
@@ -99,6 +118,11 @@ class SurveyStore:
                 array[region]
             return True
         return False
+
+
+def _cut(text: str) -> bytes:
+    """Return a text in UTF-8, cut between two characters if it is too long."""
+    return printable(text).encode()[:LONGEST_PROBLEM].decode(errors="ignore").encode()
 
 
 class _Variable(NamedTuple):
@@ -128,6 +152,8 @@ def variables(survey: Survey) -> dict[str, _Variable]:
             np.int32, 0, (len(Reason),), ("reason",), {"long_name": "number of cells by reason"}
         ),
     }
+    of = {"long_name": "why the values of the point do not go together, in UTF-8, ended by zeros"}
+    found[PROBLEM] = _Variable(np.uint8, 0, (LONGEST_PROBLEM,), ("letter",), of)
     if survey.file.plan:
         found["plan"] = _Variable(
             np.bool_, False, (), (), {"long_name": f"whether a {survey.file.plan} plan exists"}
@@ -148,14 +174,8 @@ def create_store(path: Path, survey: Survey) -> SurveyStore:
         SurveyError: the folder holds something else, or the results of another survey.
         OSError: it cannot be written.
     """
-    if path.exists() and not _is_empty(path):
-        attributes = _attributes(path)
-        if attributes["sha256"] != survey.sha256:
-            known = json.loads(attributes["survey"])["file"]["name"]
-            expected = f"the same {survey.file.name}, scene, robots and program as now, or another folder"
-            raise SurveyError(path, "survey", known, expected)
-        return SurveyStore(path, survey)
-    _make(path, survey)
+    if not path.exists() or _is_empty(path):
+        _make(path, survey)
     return SurveyStore(path, survey)
 
 
@@ -208,8 +228,9 @@ def _attributes(path: Path) -> dict[str, Any]:
         ) from error
     if attributes.get("format") != FORMAT:
         raise SurveyError(path, "format", attributes.get("format"), FORMAT)
-    if attributes.get("version") != FORMAT_VERSION:
-        raise SurveyError(path, "version", attributes.get("version"), str(FORMAT_VERSION))
+    if attributes.get("version") not in VERSIONS:
+        expected = " or ".join(str(known) for known in VERSIONS)
+        raise SurveyError(path, "version", attributes.get("version"), expected)
     return attributes
 
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from symgrasp.errors import NoPlanError
+from symgrasp.errors import InputError, NoPlanError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan
@@ -24,6 +24,9 @@ from symgrasp.progress import Progress, part_of
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
+
+MOST_CELLS = 1_000_000_000
+"""Most cells of the maps of all draws together, each a byte."""
 
 __all__ = ["PoseNoise", "ProbablePlan", "SuccessMap", "best_columns", "plan_for_success", "success_map"]
 
@@ -101,8 +104,16 @@ def success_map(
         count: number of draws.
         seed: of the draws; equal seeds give equal draws, whatever the task.
         progress: called with the finished share; may raise `Cancelled`.
+
+    Raises:
+        InputError: the maps of so many draws are too large.
     """
     nominal = maker.map(arm, task)
+    most = MOST_CELLS // nominal.feasible.size
+    if count > most:
+        raise InputError(
+            "success", "draws", count, f"at most {most:,} for maps of {nominal.feasible.size:,} cells"
+        )
     found = []
     for k, draw in enumerate(noise.draws(count, seed)):
         own = Task(task.name, task.arms, moved(task.T_world_object, draw), task.supported)

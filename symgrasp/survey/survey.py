@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ from symgrasp.survey.format import (
     TaskAxis,
     lengths,
 )
-from symgrasp.survey.paths import with_number
+from symgrasp.survey.paths import keys_of, with_number
 from symgrasp.survey.shipped import shipped_surveys
 
 __all__ = ["Axis", "Survey"]
@@ -146,6 +147,10 @@ class Survey:
         axes = [
             _resolved(f"axes[{i}]", axis, file, scene, source, folder) for i, axis in enumerate(file.axes)
         ]
+        for (i, one), (j, other) in combinations(enumerate(file.axes), 2):
+            if _overlap(scene, file, one, other):
+                expected = f"what no other axis varies, such as axes[{i}] ({one.name})"
+                raise SurveyError(source, f"axes[{j}].of ({other.name})", other.of, expected)
         return Survey(source, file, scene, tuple(axes))
 
     def to_dict(self) -> dict[str, Any]:
@@ -341,6 +346,47 @@ def _changed(
             raise ValueError("a robot: " + one_of(scene.robots, name))
         return _moved_base(content, name, axis.of, value)
     return with_number(content, axis.of, value)
+
+
+def _overlap(scene: Scene, file: SurveyFile, one: AxisFile, other: AxisFile) -> bool:
+    """Return whether two axes vary the same number, or one varies a part of what the other does."""
+    return any(
+        a[: len(b)] == b[: len(a)] for a in _varied(scene, file, one) for b in _varied(scene, file, other)
+    )
+
+
+def _varied(scene: Scene, file: SurveyFile, axis: AxisFile) -> Iterator[tuple[str | int, ...]]:
+    """Yield the keys of what an axis varies in the content of a scene; what begins alike is a part of it."""
+    content = scene.content
+    robots = {entry["name"]: k for k, entry in enumerate(content["robots"])}
+    if isinstance(axis, HandAxis):
+        arm = _arm_of(axis, file, scene)
+        index = robots[scene.arms[arm].robot.name]
+        arms = [entry["name"] for entry in content["robots"][index].get("arms", ())]
+        yield ("robots", index, *(("arms", arms.index(arm)) if arms else ()), "hand")
+    elif isinstance(axis, ObjectAxis):
+        yield ("object",)
+    elif isinstance(axis, TaskAxis):
+        yield ("task",)  # a choice of what is there
+    elif isinstance(axis, PositionAxis) or axis.of in (*POSITION, *LEAN):
+        step: tuple[str | int, ...] = ("lean", axis.of)
+        if axis.of not in LEAN:
+            step = ("position", *(() if axis.of == "position" else ("xyz".index(axis.of[-1]),)))
+        names = [file.task or next(iter(scene.tasks))]
+        for own in file.axes:
+            if isinstance(own, TaskAxis):
+                names = list(own.values)
+        for k, entry in enumerate(content["tasks"]):
+            if entry["name"] in names:
+                yield ("tasks", k, "pose", *step)
+    elif axis.of in BASE:
+        base = ("robots", robots[axis.robot or next(iter(robots))], "base")
+        if axis.of == "base.yaw_deg":
+            yield from ((*base, name) for name in ("rpy_deg", "quat_wxyz"))
+        else:
+            yield (*base, "position", "xyz".index(axis.of[-1]))
+    else:
+        yield keys_of(content, axis.of)
 
 
 def _arm_entry(content: Mapping[str, Any], arm: str) -> dict[str, Any]:

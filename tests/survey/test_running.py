@@ -25,7 +25,7 @@ from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.evaluation import Evaluator, State
 from symgrasp.survey.results import feasible_cells, workspace
-from symgrasp.survey.running import Done, run_survey
+from symgrasp.survey.running import Done, run_batch, run_survey
 from symgrasp.survey.store import SurveyStore, create_store, open_results
 from symgrasp.survey.survey import Survey
 
@@ -41,6 +41,9 @@ axes:
   - {name: y, of: position.y, values: [-0.1, 0.2]}
   - {name: tilt, of: tilt_deg, values: [0, 60]}
 """
+
+THREADS: Any = {"processes": False, "protocol": "tcp", "host": "127.0.0.1", "dashboard_address": ":0"}
+"""Of a cluster whose workers are threads of this process, at an address as those of processes have."""
 
 KILLED = """
 import os, signal, sys
@@ -81,7 +84,7 @@ def one_go(survey, tmp_path_factory) -> Path:
 
 def threads(count: int) -> Any:
     """Return a cluster whose worker is this process."""
-    return LocalCluster(n_workers=1, threads_per_worker=count, processes=False, dashboard_address=":0")
+    return LocalCluster(n_workers=1, threads_per_worker=count, **THREADS)
 
 
 def content(path: Path) -> dict[str, bytes]:
@@ -190,9 +193,7 @@ def test_a_killed_scheduler_leaves_a_good_store(survey, file, one_go, tmp_path, 
 
 @pytest.mark.parametrize("workers", [1, 2, 8])
 def test_any_number_of_workers_writes_the_same(survey, one_go, tmp_path, workers):
-    cluster: Any = LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=False, dashboard_address=":0"
-    )
+    cluster: Any = LocalCluster(n_workers=workers, threads_per_worker=1, **THREADS)
     with cluster:
         run_survey(survey, tmp_path / "b.zarr", scheduler=cluster.scheduler_address)
     assert content(tmp_path / "b.zarr") == content(one_go)
@@ -261,3 +262,15 @@ def test_interrupted(survey, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run_survey(survey, tmp_path / "b.zarr", workers=1, progress=interrupt)
     assert len(SurveyStore(tmp_path / "b.zarr", survey).missing()) == survey.batches
+
+
+def test_a_worker_with_other_files_writes_nothing(survey, tmp_path):
+    """A machine whose robot is described by other files than the store's is told so."""
+    path = tmp_path / "b.zarr"
+    create_store(path, survey)
+    description = path / "zarr.json"
+    description.write_text(description.read_text().replace(survey.sha256, "0" * 64))
+    before = content(path)
+    with pytest.raises(SurveyError, match="robots and program"):
+        run_batch((survey.to_dict(), str(path)), 0)
+    assert content(path) == before

@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+import gc
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from distributed import Client, LocalCluster
 from hypothesis import given
 from hypothesis import strategies as st
 
 from symgrasp.cli.main import main
-from symgrasp.errors import SurveyError, SymgraspError
+from symgrasp.errors import InputError, SurveyError, SymgraspError
+from symgrasp.feasibility.create import MapMaker
 from symgrasp.poses import from_position_rpy
+from symgrasp.scene.scene import Scene
 from symgrasp.survey.evaluation import Evaluator, State
 from symgrasp.survey.format import NumberAxis, SurveyFile
+from symgrasp.survey.results import problems
+from symgrasp.survey.running import run_on
 from symgrasp.survey.shipped import list_surveys, shipped_surveys
+from symgrasp.survey.store import create_store, open_results
+from symgrasp.survey.success import PoseNoise, success_map
 from symgrasp.survey.survey import Axis, Survey
+from symgrasp.world import open_world
+from tests.conftest import load_small
 
 X = {"name": "x", "of": "position.x", "from": 0.4, "to": 0.6, "count": 3}
 SMALL = {"schema_version": 1, "name": "small", "scene": "pick_pour_place"}
@@ -76,6 +88,38 @@ def test_the_command_line_says_what_is_wrong(tmp_path, capsys):
     assert main(["survey", "show", str(tmp_path)]) == 2
     assert "a store written by symgrasp survey run" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (["place", "soda_can", "--step", "0.001"], "at most 1,000,000, 10,000 along a side"),
+        (["place", "soda_can", "--z", "0", "9999"], "at most 1,000,000, 10,000 along a side"),
+        (["place", "soda_can", "--yaw", "-360", "360"], "a full turn apart at most"),
+        (["success", "soda_can", "--samples", "99999999999"], "a whole number from 1 to 100,000"),
+        *(
+            (["place", "soda_can", "--scheduler", address], "address")
+            for address in ("foo", "", "tcp://", "tcp://a:b", "tcp://127.0.0.1:99999", "tls://127.0.0.1:1")
+        ),
+    ],
+)
+def test_what_would_never_end_or_begin_is_refused_in_one_line(command, message, capfd):
+    try:
+        status = main(command)
+    except SystemExit as ended:
+        status = ended.code
+    gc.collect()  # a client that was never connected complains when it is thrown away
+    assert status == 2
+    assert message in capfd.readouterr().err.replace("\n", " ")
+
+
+def test_maps_of_too_many_draws_are_refused():
+    scene = load_small("bottle_on_table", 2, 4, 1)
+    with (
+        open_world(scene) as world,
+        pytest.raises(InputError, match="at most 62,500,000 for maps of 16 cells"),
+    ):
+        success_map(MapMaker(world), "panda", scene.task(), PoseNoise(0.01), count=10**8)
 
 
 def test_axes_change_what_they_say(tmp_path):
@@ -139,6 +183,84 @@ def test_batches_cover_all_points_once(sizes):
     points = [point for batch in range(survey.batches) for point in survey.points_of(batch)]
     assert sorted(points) == list(np.ndindex(survey.shape))
     assert max(len(list(survey.points_of(batch))) for batch in range(survey.batches)) <= 64
+
+
+TABLE = "obstacles.table.pose.position.2"
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (TABLE, TABLE),
+        (TABLE, "obstacles.{table}.pose.position.2"),
+        ("base.x", "robots.panda.base.position.0"),
+        ("base.x", "robots.0.base.position.0"),
+        ("position.y", "tasks.pick.pose.position.1"),
+        ("position.y", "tasks.0.pose.position.1"),
+        ("object", "object.profile.0.0"),
+        ("position", "position.z"),
+        ({"of": "base.x", "robot": "panda"}, "base.x"),
+        ({"of": "hand", "arm": "panda"}, "hand"),
+    ],
+)
+def test_one_number_is_on_one_axis(one, other, tmp_path):
+    scene = Scene.load(SMALL["scene"])
+    index = [o.name for o in scene.obstacles].index("table")
+    values = {
+        "object": ["wine_bottle"],
+        "hand": ["franka"],
+        "position": [[0.5, 0, 0]],
+        "object.profile.0.0": [0],
+    }
+    axes = []
+    for k, axis in enumerate((one, other)):
+        own = axis if isinstance(axis, dict) else {"of": axis.format(table=index)}
+        axes.append({"name": f"a{k}", "values": values.get(own["of"], [0.1]), **own})
+    with pytest.raises(SurveyError, match=r"axes\[1\].of .*no other axis varies, such as axes\[0\]"):
+        survey_of(axes, tmp_path)
+
+
+def test_values_that_do_not_go_together_are_recorded(tmp_path, capsys):
+    """Each number is fine, both together are not: that point says why, and the others are computed."""
+    axes = [
+        {"name": "low", "of": "object.profile.0.0", "values": [0.0, 0.1]},
+        {"name": "high", "of": "object.profile.1.0", "values": [0.05, 0.15]},
+    ]
+    small = {"heights": 2, "angles": 4, "redundancy": 1}
+    survey = survey_of(axes, tmp_path, scene="bottle_on_table", map=small)
+    out = tmp_path / "a.zarr"
+    cluster: Any = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
+    with cluster, Client(cluster, set_as_default=False) as client:
+        run_on(client, survey, out)
+    _, results = open_results(out)
+    states = [[State.COMPUTED, State.COMPUTED], [State.UNUSABLE, State.COMPUTED]]
+    assert results.state.values.tolist() == states
+    (told,) = problems(results)
+    assert "a height above the one before it" in told
+    assert main(["survey", "show", str(out), "--out", str(tmp_path / "a.png")]) == 0
+    shown = capsys.readouterr().out
+    assert "1 whose values do not go together" in shown
+    assert told in shown
+    assert create_store(out, survey).missing() == []
+
+
+def test_a_store_of_version_1_is_gone_on_with(tmp_path):
+    """It has no reasons why values do not go together; the rest is as in version 2."""
+    survey = survey_of([X], tmp_path, map={"heights": 2, "angles": 4, "redundancy": 1}, task="pick")
+    out = tmp_path / "a.zarr"
+    create_store(out, survey)
+    shutil.rmtree(out / "problem")
+    path = out / "zarr.json"
+    path.write_text(path.read_text().replace('"version": 2', '"version": 1'))
+    store = create_store(out, survey)
+    with Evaluator(survey) as evaluator:
+        for batch in store.missing():
+            store.write(batch, {p: evaluator.point(p) for p in survey.points_of(batch)})
+    assert store.missing() == []
+    assert list(problems(open_results(out)[1])) == []
+    path.write_text(path.read_text().replace('"version": 1', '"version": 3'))
+    with pytest.raises(SurveyError, match="expected 1 or 2"):
+        open_results(out)
 
 
 def test_a_plan_of_a_kind_that_the_scene_has_not_is_refused(tmp_path):
