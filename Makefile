@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench surveys robots grids cells
+.PHONY: app test figures schemas bench surveys robots opening grids cells
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -45,6 +45,9 @@ surveys: $(VENV)/dev.stamp  ## measure what surveys cost, and write it to docs/s
 robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write the table of docs/robots.md (minutes)
 	$(BIN)/symgrasp bench robots --out docs/robots.json
 	$(BIN)/python -m docs.robots
+
+opening: $(VENV)/dev.stamp  ## print how long the page takes to show robots, in Chromium (ARGS="pr2 talos": only these)
+	$(BIN)/python -m docs.opening $(ARGS)
 
 grids: $(VENV)/dev.stamp  ## measure coarse and fine grids of every shipped scene, and write docs/grids.md (minutes)
 	$(BIN)/python -m docs.grids

@@ -20,7 +20,7 @@ from symgrasp.files import write_atomically
 from tests.e2e.conftest import FLAGS, HOW_TO_GET_IT
 from tests.e2e.page import WAIT, GraspPage
 
-__all__ = ["page", "page_plays", "page_two_robots"]
+__all__ = ["SIZE", "open_server", "page", "page_plays", "page_two_robots"]
 
 SIZE: ViewportSize = {"width": 1440, "height": 900}
 
@@ -109,7 +109,7 @@ def _open(scene: str) -> Iterator[GraspPage]:
     chromium = shutil.which("chromium")
     if chromium is None:
         raise RuntimeError(HOW_TO_GET_IT)
-    with _server(scene) as address, sync_playwright() as playwright:
+    with open_server(scene) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         it = GraspPage(browser.new_page(viewport=SIZE, device_scale_factor=1), address)
         notice = it.frame.locator(".mantine-Notification-closeButton")
@@ -120,7 +120,7 @@ def _open(scene: str) -> Iterator[GraspPage]:
 
 
 @contextmanager
-def _server(scene: str) -> Iterator[str]:
+def open_server(scene: str) -> Iterator[str]:
     """Run the page on a free port; gives its address."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

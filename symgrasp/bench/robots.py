@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
+from multiprocessing import get_context
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -133,9 +136,13 @@ class RobotRow:
 
 
 def run(poses: int) -> Iterator[RobotRow]:
-    """Measure the first arm of every robot of the catalogue; recall with that many random configurations."""
-    for robot in CATALOGUE:
-        yield measure(robot, poses)
+    """Measure the first arm of every robot of the catalogue; recall with that many random configurations.
+
+    As many robots as there are cores are measured at once, each in a process of its own, so that the CPU time
+    that a process has used is that of one robot.
+    """
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        yield from pool.map(measure, CATALOGUE, repeat(poses))
 
 
 def measure(robot: CatalogueRobot, poses: int) -> RobotRow:

