@@ -1,38 +1,33 @@
 """Motions: how long whole ones take to plan, and free ones against what people do today.
 
-Free motions are measured on random problems: an arm between random boxes, from one random configuration to
-another. The others search the same ones: RRT-Connect of OMPL, which asks PyBullet or the checks of this
-project about every state, and roboplan.
+Free motions are measured on random problems, see `symgrasp.bench.free_problems`. The others search the
+same ones: RRT-Connect of OMPL, which asks PyBullet or the checks of this project about every state, and
+roboplan.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from importlib import import_module
-from itertools import islice, pairwise
+from itertools import combinations, islice
 from time import process_time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symgrasp.bench.figures import Figure
-from symgrasp.bench.rrt_connect import rrt_connect
+from symgrasp.bench.free_problems import PROBLEMS, Problem, touches
+from symgrasp.bench.rrt_connect import Found, rrt_connect
 from symgrasp.bench.timing import Time, ratios, time_of, times
-from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import MapMaker
-from symgrasp.motion.bodies.motion_scene import MotionScene
-from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.choosing import best_motion
 from symgrasp.motion.moveit import srdf_of
-from symgrasp.motion.paths.search import NoMotionError, connect, prove
-from symgrasp.motion.times.reach import joint_reach
+from symgrasp.motion.paths.search import NoMotionError
 from symgrasp.planners.planning import bimanual_plans, handover_plans, sequential_plans
-from symgrasp.poses import Array
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld, check_homes, open_world
+from symgrasp.world import open_world
 
-__all__ = ["Problem", "free_motions", "problems", "proofs", "run", "touches", "whole_motions"]
+__all__ = ["free_motions", "proofs", "run", "whole_motions"]
 
 WHOLE: dict[str, Callable[..., Any]] = {
     "pick_pour_place": lambda scene, maps: sequential_plans(scene, maps=maps),
@@ -42,61 +37,11 @@ WHOLE: dict[str, Callable[..., Any]] = {
 }
 """Shipped scene → what lists its plans from the maps of its tasks."""
 
-BOXES = 8
-"""Random boxes around the arm."""
-
-EACH_SCENE = 10
-"""Problems with the same boxes."""
-
-LOOK = 0.05
-"""Distances up to it (m) are asked of PyBullet."""
-
-BODY_STEP = 5e-4
-"""Distance (m) that nothing moves further between two states which PyBullet looks at."""
-
-INSIDE = 1e-5
-"""How deep (m) bodies may be in each other for PyBullet, which reads URDFs in single precision."""
-
 LONGER = 10
-"""How many times as long as this project OMPL may search."""
+"""How many times as long as this project OMPL may search, in CPU time."""
 
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """A free motion to find.
-
-    Attributes:
-        world: the bodies.
-        situation: what moves and stands.
-        limits: (2, n) of the joints.
-        start: (n,) joint values.
-        goal: (n,) joint values.
-        number: seed of the random numbers.
-    """
-
-    world: BulletWorld
-    situation: Situation
-    limits: Array
-    start: Array
-    goal: Array
-    number: int
-
-    def solve(self) -> Array | None:
-        """Return a path (m, n), as this project finds it, None if it finds none."""
-        try:
-            return connect(self.situation, self.start[None], self.goal[None], self.number)
-        except NoMotionError:
-            return None
-
-    def free(self, q: Array) -> bool:
-        """Whether the arm is free at joint values (n,), by the checks of this project."""
-        return bool(prove(self.situation, q[None], q[None]).free[0])
-
-    def free_in_bullet(self, q: Array) -> bool:
-        """Whether the arm is free at joint values (n,), by PyBullet."""
-        arm = self.world.scene.arm()
-        self.world.set_robot(arm.robot.name, arm.robot_values(q))
-        return self.world.first_collision(arm) is None
+PATIENCE = 10.0
+"""CPU time (s) after which the others give up: what they took then is less than what they would need."""
 
 
 def run(quick: bool = False) -> Iterator[Figure]:
@@ -106,8 +51,10 @@ def run(quick: bool = False) -> Iterator[Figure]:
         quick: with few runs of each.
     """
     yield from whole_motions(seeds=2 if quick else 20)
-    yield from free_motions(count=4 if quick else 20)
-    yield from proofs(count=10 if quick else 300)
+    for kind in PROBLEMS:
+        yield from free_motions(kind, count=2 if quick else 20)
+    for kind in PROBLEMS:
+        yield from proofs(kind, count=4 if quick else 150)
 
 
 def whole_motions(seeds: int) -> Iterator[Figure]:
@@ -133,115 +80,103 @@ def whole_motions(seeds: int) -> Iterator[Figure]:
         yield Figure("  found", "", (float(np.mean(found)),))
 
 
-def free_motions(count: int) -> Iterator[Figure]:
-    """Time free motions against RRT-Connect with PyBullet, and against roboplan."""
+def free_motions(kind: str, count: int) -> Iterator[Figure]:
+    """Time free motions against RRT-Connect with PyBullet, and against roboplan.
+
+    All three shorten the path that they found; that is timed with and without for the others, but always
+    with for this project. What they do not find within `PATIENCE` counts with the time they took.
+
+    Args:
+        kind: a key of `PROBLEMS`.
+        count: how many that this project solves.
+    """
     own: list[Time] = []
-    bullet: list[tuple[Time, Time]] = []
-    other: list[tuple[Time, Time]] = []
+    others: dict[str, list[_Rival]] = {"RRT-Connect of OMPL with PyBullet": [], "roboplan": []}
     missing = ""
-    for problem in islice(_solvable(), count):
-        mine = time_of(problem.solve)
-        own.append(mine)
-        bullet.append((time_of(lambda p=problem: _with_bullet(p)), mine))
+    for problem in islice((p for p in PROBLEMS[kind](0) if p.solve() is not None), count):
+        own.append(time_of(problem.solve))
+        bullet, other = others.values()
+        bullet.append(_rival(lambda p=problem: _with_bullet(p)))
         try:
-            search = _roboplan(problem)
+            other.append(_rival(_roboplan(problem)))
         except ImportError:
-            missing = ": roboplan is not installed"
-        else:
-            other.append((time_of(search), mine))
-    yield times("free motion between random boxes", "ms", own)
-    yield ratios("  RRT-Connect of OMPL with PyBullet, times as long", bullet)
-    yield ratios("  roboplan, times as long", other) if other else Figure(f"  roboplan{missing}", "×", ())
+            missing = ": not installed"
+    yield times(f"free motion {kind}", "ms", own)
+    for name, runs in others.items():
+        if not runs:
+            yield Figure(f"  {name}{missing}", "×", ())
+            continue
+        whole = [(run.search + run.shortening, mine) for run, mine in zip(runs, own, strict=True)]
+        alone = [(run.search, mine) for run, mine in zip(runs, own, strict=True)]
+        yield ratios(f"  {name}, times as long", whole)
+        yield ratios(f"  {name}, times as long without its shortening", alone)
+        yield Figure(f"  {name}, found", "", (float(np.mean([run.found for run in runs])),))
 
 
-def proofs(count: int) -> Iterator[Figure]:
-    """Look in PyBullet at free motions step by step, and at how many OMPL finds in ten times the time."""
+class _Rival(NamedTuple):
+    """What another planner took to search a path, and to shorten it, and whether it found one."""
+
+    search: Time
+    shortening: Time
+    found: bool
+
+
+def _rival(search: Callable[[], Callable[[], Any] | None]) -> _Rival:
+    """Time another planner.
+
+    Args:
+        search: searches a path; returns what shortens it, None if it finds none.
+    """
+    found: list[Callable[[], Any] | None] = []
+    searched = time_of(lambda: found.append(search()))
+    (shorten,) = found
+    return _Rival(searched, time_of(shorten) if shorten else Time(0.0, 0.0), shorten is not None)
+
+
+def proofs(kind: str, count: int) -> Iterator[Figure]:
+    """Look in PyBullet at free motions step by step, and at how many OMPL finds in ten times the time.
+
+    Args:
+        kind: a key of `PROBLEMS`.
+        count: how many of them.
+    """
     solved: list[float] = []
     others: list[float] = []
     wrong: list[float] = []
-    for problem in islice(problems(), count):
+    for problem in islice(PROBLEMS[kind](1), count):
         start = process_time()
         path = problem.solve()
-        end = process_time() + LONGER * (process_time() - start)
+        taken = process_time() - start
+        theirs = rrt_connect(
+            problem.limits, problem.start, problem.goal, problem.free, _within(LONGER * taken)
+        )
         solved.append(float(path is not None))
+        others.append(float(theirs is not None))
         if path is not None:
             wrong.append(float(touches(problem, path)))
-        theirs = rrt_connect(
-            problem.limits, problem.start, problem.goal, problem.free, lambda end=end: process_time() > end
-        )
-        others.append(float(theirs is not None))
-    yield Figure(f"{count} random free motions: found", "", (float(np.mean(solved)),))
+    yield Figure(f"{count} free motions {kind}: found", "", (float(np.mean(solved)),))
     yield Figure(f"  found by OMPL in {LONGER} times the time", "", (float(np.mean(others)),))
     yield Figure("  share that touches something, by PyBullet", "", (float(np.mean(wrong)),))
 
 
-def problems(seed: int = 0) -> Iterator[Problem]:
-    """Yield random problems; their worlds are closed when the next boxes are drawn."""
-    rng = np.random.default_rng(seed)
-    content = Scene.load("pick_pour_place").content
-    tasks = [{**content["tasks"][0], "supported": False}]
-    number = 0
-    while True:
-        obstacles = [_box(rng, k) for k in range(BOXES)]
-        scene = Scene.from_content({**content, "obstacles": obstacles, "tasks": tasks})
-        try:
-            check_homes(scene)
-        except SceneError:  # a box is where the arm stands
-            continue
-        with open_world(scene) as world:
-            bodies, arm = MotionScene(scene, world), scene.arm()
-            situation = bodies.situation(bodies.home(), [arm])
-            limits = np.stack([arm.lower, arm.upper])
-            q = rng.uniform(arm.lower, arm.upper, (400, arm.dof))
-            free = q[prove(situation, q, q).free]
-            for start, goal in islice(zip(free[::2], free[1::2], strict=False), EACH_SCENE):
-                yield Problem(world, situation, limits, start, goal, number)
-                number += 1
+def _within(seconds: float) -> Callable[[], bool]:
+    """Return what says whether so much CPU time (s) has passed since now."""
+    end = process_time() + seconds
+    return lambda: process_time() > end
 
 
-def touches(problem: Problem, path: Array) -> bool:
-    """Whether PyBullet finds the arm inside of something along a path (m, n).
-
-    Nothing moves further between two states than `BODY_STEP`, or than it is away from everything else.
-    """
-    world, arm = problem.world, problem.world.scene.arm()
-    reach = joint_reach(arm.robot.model)[arm.indices]
-    for a, b in pairwise(path):
-        moved, at = float(np.abs(b - a) @ reach), 0.0
-        while True:
-            share = min(at / moved, 1.0) if moved else 1.0
-            world.set_robot(arm.robot.name, arm.robot_values(a + share * (b - a)))
-            gap = world.clearance(arm, LOOK)
-            if gap < -INSIDE:
-                return True
-            if share == 1.0:
-                break
-            at += max(BODY_STEP, gap)
-    return False
+def _with_checks(problem: Problem, stop: Callable[[], bool]) -> Found | None:
+    return rrt_connect(problem.limits, problem.start, problem.goal, problem.free, stop)
 
 
-def _solvable() -> Iterator[Problem]:
-    """Yield random problems that have a solution."""
-    return (problem for problem in problems() if problem.solve() is not None)
+def _with_bullet(problem: Problem) -> Callable[[], Any] | None:
+    valid, stop = problem.free_in_bullet, _within(PATIENCE)
+    found = rrt_connect(problem.limits, problem.start, problem.goal, valid, stop)
+    return found and found.shorten
 
 
-def _with_bullet(problem: Problem) -> None:
-    path = rrt_connect(problem.limits, problem.start, problem.goal, problem.free_in_bullet, lambda: False)
-    assert path is not None
-
-
-def _box(rng: np.random.Generator, number: int) -> dict[str, Any]:
-    """Return a random box around an arm at the origin, as scenes have it."""
-    angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.35, 0.8)
-    position = [distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.0, 0.9)]
-    turn = [float(part) for part in rng.uniform(-180, 180, 3)]
-    size = [float(part) for part in rng.uniform(0.05, 0.3, 3)]
-    place = {"position": [float(part) for part in position], "rpy_deg": turn}
-    return {"name": f"box {number}", "box": size, "pose": place}
-
-
-def _roboplan(problem: Problem) -> Callable[[], None]:
-    """Return what lets roboplan search a problem, with the same boxes, and a cylinder for the object.
+def _roboplan(problem: Problem) -> Callable[[], Callable[[], Any] | None]:
+    """Return what lets roboplan search a problem, with the same boxes but without the object.
 
     Raises:
         ImportError: roboplan is not installed.
@@ -260,9 +195,21 @@ def _roboplan(problem: Problem) -> Callable[[], None]:
         box = core.Box(*(float(part) for part in shape.size))
         place = obstacle.T_world_obstacle @ shape.pose
         other.addBoxGeometry(obstacle.name, "universe", box, place, np.ones(4))
-    options = rrt.RRTOptions(group_name=arm.name, max_nodes=100_000, rrt_connect=True)
+    names = [obstacle.name for obstacle in scene.obstacles]
+    other.setCollisions(list(combinations(names, 2)), False)  # what stands may touch
+    options = rrt.RRTOptions(
+        group_name=arm.name, max_nodes=100_000, max_planning_time=PATIENCE, rrt_connect=True
+    )
     search = rrt.RRT(other, options)
     search.setRngSeed(problem.number)
     ends = [core.JointConfiguration(list(arm.joint_names), q) for q in (problem.start, problem.goal)]
     shorter = core.PathShortcutter(other, core.PathShortcuttingOptions(group_name=arm.name))
-    return lambda: shorter.shortcut(search.plan(*ends))
+
+    def plan() -> Callable[[], Any] | None:
+        try:
+            path = search.plan(*ends)
+        except RuntimeError:  # it found none
+            return None
+        return lambda: shorter.shortcut(path)
+
+    return plan

@@ -7,22 +7,45 @@ Magazine 19(4), 2012.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from symgrasp.poses import Array
 
-__all__ = ["rrt_connect"]
+__all__ = ["Found", "rrt_connect"]
 
 RESOLUTION = 0.005
 """Share of the extent of the joint space between two states of a line, as MoveIt's assistant sets it."""
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A path that OMPL found.
+
+    Attributes:
+        setup: OMPL's problem with its solution.
+        joints: number n of joints.
+    """
+
+    setup: Any
+    joints: int
+
+    @property
+    def path(self) -> Array:
+        """The path (m, n)."""
+        return np.array([state[0 : self.joints] for state in self.setup.getSolutionPath().getStates()])
+
+    def shorten(self) -> None:
+        """Shorten and smooth the path, as OMPL does by itself."""
+        self.setup.simplifySolution()
+
+
 def rrt_connect(
     limits: Array, start: Array, goal: Array, valid: Callable[[Array], bool], stop: Callable[[], bool]
-) -> Array | None:
-    """Search a path with OMPL, and shorten it. Lines are looked at in steps, as long as MoveIt takes them.
+) -> Found | None:
+    """Search a path with OMPL. Lines are looked at in steps, as long as MoveIt takes them.
 
     Args:
         limits: (2, n) lower and upper limits, finite.
@@ -32,7 +55,7 @@ def rrt_connect(
         stop: asked now and then whether to give up.
 
     Returns:
-        The path (m, n), None where none was found.
+        What was found, None if nothing was.
 
     Raises:
         ImportError: OMPL is not installed.
@@ -62,6 +85,4 @@ def rrt_connect(
     setup.solve(base.PlannerTerminationCondition(lambda: bool(stop())))
     if not setup.haveExactSolutionPath():
         return None
-    setup.simplifySolution()
-    path: list[Any] = setup.getSolutionPath().getStates()
-    return np.array([state[0:n] for state in path])
+    return Found(setup, n)
