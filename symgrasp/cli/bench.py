@@ -30,10 +30,10 @@ def add_parser(commands: Commands) -> None:
     command = add_command(commands, "bench", run, text)
     text = (
         "measure the robots that packages ship instead: their inverse kinematics, or also a map of each, "
-        "which an independent search then tries to refute; what maps miss; what surveys cost; or how fast "
-        "motions are planned"
+        "which an independent search then tries to refute; what maps miss; what surveys cost; how fast "
+        "motions are planned; or how long the plans of all shipped scenes take"
     )
-    kinds = ("ik", "robots", "guarantee", "survey", "motion")
+    kinds = ("ik", "robots", "guarantee", "survey", "motion", "plans")
     command.add_argument("what", metavar="|".join(kinds), nargs="?", choices=kinds, help=text)
     text = "bench motion: with few runs of each"
     command.add_argument("--quick", action="store_true", help=text)
@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
         if args.compare:
             expected = "only times of maps and planners: no other kind of bench"
             raise InputError("command line", "--compare", args.what, expected)
-        measured = {"guarantee": _guarantee, "survey": _surveys, "motion": _motion}.get(args.what, _robots)
-        _write(args.out, measured(args))
+        others = {"guarantee": _guarantee, "survey": _surveys, "motion": _motion, "plans": _plans}
+        _write(args.out, others.get(args.what, _robots)(args))
         return 0
     from symgrasp import bench
 
@@ -108,6 +108,13 @@ def _motion(args: argparse.Namespace) -> dict[str, Any]:
     from symgrasp.bench import motion
 
     return _told(motion.run(args.quick))
+
+
+def _plans(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure how long the plans of shipped scenes take."""
+    from symgrasp.bench import plans
+
+    return _told(plans.run())
 
 
 def _told(measured: Iterable[Figure]) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
     pads = [fit.gripper.pad(side, 0.5, fit.T_base_tool)[:2] for side in (0, 1)]
     idle = links_with_shapes(model, *structure.fingers)
     return Hand(
-        name=model.path.stem,
+        name=model.path.stem.removesuffix(".urdf"),  # also of .urdf.xacro
         links=(*palm, *fingers, *(link for link in idle if link not in fingers)),
         touch_links=(*fingers, *_around(model, structure, fit.T_base_tool)),
         joints=_tables(fit.gripper.motion, values, openings),
@@ -86,7 +86,7 @@ def _jaw_hand(model: RobotModel, structure: HandStructure, tool: str | None) -> 
     fit = fit_jaw(model, structure, tool)
     palm, jaw = links_with_shapes(model, structure.palm), links_with_shapes(model, *structure.fingers)
     return Hand(
-        name=model.path.stem,
+        name=model.path.stem.removesuffix(".urdf"),  # also of .urdf.xacro
         links=(*palm, *jaw),
         touch_links=(*fit.fixed, *jaw),
         joints=_tables(fit.motion, fit.values, fit.openings),

@@ -60,6 +60,13 @@ def wedge(length: float, turn: tuple[float, float, float], reverse: bool, fixed:
     )
 
 
+@pytest.mark.parametrize("file", ["wedge.urdf", "wedge.urdf.xacro"])
+def test_a_hand_is_called_what_its_file_is(tmp_path, file):
+    pytest.importorskip("xacro")
+    (tmp_path / file).write_text(wedge(0.06, (0.0, 0.0, 0.0), False))
+    assert measure_hand(tmp_path / file, "palm").name == "wedge"
+
+
 def measured(folder: Path, urdf: str) -> tuple[RobotModel, Hand]:
     path = folder / "wedge.urdf"
     path.write_text(urdf, encoding="utf-8")
