@@ -10,7 +10,7 @@ import numpy as np
 
 from symgrasp.errors import PlanError
 from symgrasp.plan.plan import Plan
-from symgrasp.poses import Array, quat_wxyz, wxyz_to_xyzw
+from symgrasp.poses import Array, inverse, quat_wxyz, wxyz_to_xyzw
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.scene.scene import Scene
 from symgrasp.world import own_pairs
@@ -21,19 +21,23 @@ __all__ = ["srdf_of", "to_planning_scene", "to_srdf"]
 def to_planning_scene(plan: Plan) -> str:
     """Return the obstacles, and the object in the first task, as MoveIt's text format of planning scenes.
 
-    RViz opens it as ``.scene`` file ("Import From Text" of the tab Scene Objects). Poses are in the frame
-    ``world``; lengths in m, quaternions xyzw.
+    RViz opens it as ``.scene`` file ("Import From Text" of the tab Scene Objects). MoveIt takes poses to be
+    in its planning frame, which is the root link of the robot: so are those of a scene with one robot. With
+    several, of which MoveIt needs one model, they are in the world. Lengths are in m, quaternions xyzw.
 
     Raises:
         MeshError: a mesh of an obstacle cannot be read.
     """
     scene = Scene.from_content(plan.scene.content, "plan: scene.content")
+    bases = [robot.T_world_base for robot in scene.robots.values()]
+    T_frame_world = inverse(bases[0]) if len(bases) == 1 else np.eye(4)
     lines = [" ".join(scene.name.split())]
     for obstacle in scene.obstacles:
         shapes = [shape for _, shape in obstacle.shapes()]
-        lines += _object_lines(obstacle.name, obstacle.T_world_obstacle, shapes)
+        lines += _object_lines(obstacle.name, T_frame_world @ obstacle.T_world_obstacle, shapes)
     mesh = scene.profile.mesh()
-    lines += ["* " + scene.file.object.name, *_pose_lines(plan.tasks[0].object_pose_turned.array()), "1"]
+    T_object = T_frame_world @ plan.tasks[0].object_pose_turned.array()
+    lines += ["* " + scene.file.object.name, *_pose_lines(T_object), "1"]
     lines += [*_mesh_lines(mesh.vertices, mesh.faces), *_pose_lines(np.eye(4)), "0 0 0 0", "0"]
     return "\n".join([*lines, "."]) + "\n"
 

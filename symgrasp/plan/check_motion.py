@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.plan.check_motion_rows import TOLERANCE, Expect, check_rows
-from symgrasp.plan.check_motion_states import RIGID, SegmentStates, check_free, tool_pose
+from symgrasp.plan.check_motion_states import MOST_STATES, RIGID, SegmentStates, check_free, tool_pose
 from symgrasp.plan.motion_record import MotionRecord, SegmentRecord
 from symgrasp.plan.plan import Hold, Plan
 from symgrasp.poses import Array, inverse, pose_error
@@ -72,6 +72,12 @@ class _Walk:
         self._task = 0  # index of the task that the object is in, or was last
         self._raised = False  # whether the object is above its pose in the task
         self._complete = False  # whether all arms of it held the object there
+        self._states = 0  # states that have been checked
+        self._grasps: dict[str, list[Array]] = {}  # arm → T_object_tool of its grasps
+        for task in plan.tasks:
+            for hold in task.holds:
+                grasp = inverse(task.object_pose_turned.array()) @ hold.tool_pose.array()
+                self._grasps.setdefault(hold.arm, []).append(grasp)
 
     def follow(self, segment: SegmentRecord, where: str) -> bool:
         """Check a segment and move to its end; return whether the next one can be checked."""
@@ -80,8 +86,8 @@ class _Walk:
             return False
         if not check_rows(segment, self._values, self._scene, where, self._expect):
             return False
-        states = SegmentStates(self._scene, segment, self._values, self._T, self._in_hand)
-        check_free(states, self._world, where, self._expect)
+        states = SegmentStates(self._scene, segment, self._values, self._T, self._in_hand, self._grasps)
+        self._states += check_free(states, self._world, MOST_STATES - self._states, where, self._expect)
         last = states.values(states.rows[-1:])
         self._T = states.objects(last)[0][0]
         self._values = {name: rows[0] for name, rows in last.items()}
@@ -124,6 +130,9 @@ class _Walk:
         away = f"{1e3 * distance:.3f} mm and {np.rad2deg(angle):.3f}°"
         text = f"{where}: the object ends {away} away from {segment.task_to}"
         above = segment.kind in ("lift", "carry") and self._T[2, 3] > goal[2, 3]
+        for hold in tasks[self._task].holds if not self._raised else ():
+            if hold.arm in self._in_hand:
+                self._check_joints(hold, where)
         return self._expect(distance <= (LIFT if above else RIGID[0]) and angle <= RIGID[1], text)
 
     def _note_holders(self) -> None:
@@ -137,7 +146,7 @@ class _Walk:
             hold = self._hold(name)
             if not self._expect(hold, f"{where}: {name} takes nothing in {segment.task_to}") or not hold:
                 return False
-            ok &= self._check_grasp(name, hold, end, where)
+            ok &= self._check_grasp(name, hold, end, where) & self._check_joints(hold, where)
             self._in_hand[name] = inverse(tool_pose(self._scene, name, self._values)) @ self._T
         for name, (_, end) in segment.gripper.items() if segment.kind != "close" else ():
             known = {hold.opening for task in self._plan.tasks for hold in task.holds if hold.arm == name}
@@ -154,6 +163,19 @@ class _Walk:
         if self._complete and not self._in_hand and k + 1 < len(tasks) and tasks[k + 1].name == tasks[k].name:
             self._task, self._complete = k + 1, False
         return next((hold for hold in tasks[self._task].holds if hold.arm == name), None)
+
+    def _check_joints(self, hold: Hold, where: str) -> bool:
+        """Check that an arm that holds the object in a task has the joint values that its hold states."""
+        arm = self._scene.arms[hold.arm]
+        values = self._values[arm.robot.name][arm.indices]
+        stated = np.array([hold.joints[joint] for joint in arm.joint_names])
+        away = np.abs(values - stated)
+        j = int(away.argmax())
+        task = self._plan.tasks[self._task].name
+        text = (
+            f"{where}: {hold.arm}: {arm.joint_names[j]} is {values[j]:.6f}, not {stated[j]:.6f} as in {task}"
+        )
+        return self._expect(away[j] <= TOLERANCE, text)
 
     def _check_grasp(self, name: str, hold: Hold, closed: float, where: str) -> bool:
         """Check that a hand that has closed has the grasp of the plan."""

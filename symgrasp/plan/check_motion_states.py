@@ -31,7 +31,11 @@ LARGEST_TURN = 0.1
 moves: arcs are then hardly longer than the straight lines that are measured."""
 
 MOST_STATES = 200_000
-"""Most states of a segment that are checked."""
+"""Most states of a motion that are checked."""
+
+OFF_LINE = 2e-3, 0.02
+"""How far (m) and how much (rad) a hand whose fingers may touch the object may be off the line of a grasp:
+between two rows an arm follows a straight line in joint space, whose corners are rounded."""
 
 TILT_TOLERANCE = 1e-3
 """By how much (degrees) the object may tilt beyond its limit: numbers are rounded."""
@@ -54,6 +58,7 @@ class SegmentStates:
         start: robot → values (N,) of all its joints where it starts.
         T_start: pose (4, 4) of the object there.
         in_hand: arm that holds the object → T_tool_object (4, 4).
+        grasps: arm → T_object_tool (4, 4) of its grasps of the plan.
     """
 
     scene: Scene
@@ -61,6 +66,7 @@ class SegmentStates:
     start: Mapping[str, Array]
     T_start: Array
     in_hand: Mapping[str, Array]
+    grasps: Mapping[str, Sequence[Array]]
 
     @property
     def rows(self) -> Array:
@@ -101,23 +107,47 @@ class SegmentStates:
         off = [[float(error.max()) for error in pose_error(poses[0], other)] for other in poses]
         return poses[0], np.max(off, axis=0)
 
-    def between(self, step: float) -> Array | None:
+    def between(self, step: float, most: int) -> Array | None:
         """Return rows (m,), or what is between two, from each of which to the next nothing moves far.
 
-        None if these are more than `MOST_STATES`.
+        None if these are more than so many.
 
         Args:
             step: the distance (m).
+            most: most rows.
         """
         rows = self.values(self.rows)
         turned = np.max([np.abs(np.diff(values, axis=0)).max(axis=1) for values in rows.values()], axis=0)
-        parts = np.ceil(turned / LARGEST_TURN)
-        if parts.sum() > MOST_STATES:
+        parts = np.ceil(turned / LARGEST_TURN).clip(1)
+        if parts.sum() >= most:
             return None
         at = _divided(self.rows, parts)
         values = self.values(at)
-        parts = np.ceil(_largest_steps(self.scene, values, self.objects(values)[0]) / step)
-        return None if parts.sum() > MOST_STATES else _divided(at, parts)
+        parts = np.ceil(_largest_steps(self.scene, values, self.objects(values)[0]) / step).clip(1)
+        return None if parts.sum() >= most else _divided(at, parts)
+
+    def on_line(self, values: Mapping[str, Array], objects: Array) -> dict[str, np.ndarray]:
+        """Return which of some states (m,) have an arm on the line along which it takes one of its grasps.
+
+        The arms are those that move, or move their hands, in an approach or a retreat, or at a grasp.
+
+        Args:
+            values: robot → values (m, N) of its joints.
+            objects: (m, 4, 4) poses of the object.
+        """
+        if self.segment.kind not in ("approach", "close", "open", "retreat"):
+            return {}
+        found = {}
+        for name in self.segment.joints:
+            tools = inverse(objects) @ tool_pose(self.scene, name, values)
+            found[name] = np.zeros(len(objects), dtype=bool)
+            for grasp in self.grasps.get(name, ()):
+                off = inverse(grasp) @ tools
+                angle = np.asarray(pose_error(grasp, tools)[1])
+                aside = np.linalg.norm(off[:, :2, 3], axis=1)
+                near = (aside <= OFF_LINE[0]) & (off[:, 2, 3] <= OFF_LINE[0]) & (angle <= OFF_LINE[1])
+                found[name] |= near
+        return found
 
 
 def tool_pose(scene: Scene, name: str, values: Mapping[str, Array]) -> Array:
@@ -127,21 +157,25 @@ def tool_pose(scene: Scene, name: str, values: Mapping[str, Array]) -> Array:
     return arm.robot.T_world_base @ links[..., arm.robot.model.link_index(arm.tool), :, :]
 
 
-def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Expect) -> None:
+def check_free(states: SegmentStates, world: BulletWorld, most: int, where: str, expect: Expect) -> int:
     """Check that all bodies keep the clearance of a segment, at steps that are shorter than it.
 
     Args:
         states: of the segment.
         world: a world of the scene; it ends at the end of the segment, or where a clearance is not kept.
+        most: most states that may be checked.
         where: what it is called in failures.
         expect: notes a statement, and what is wrong where it does not hold.
+
+    Returns:
+        How many states were checked.
     """
     segment = states.segment
     expect(segment.clearance >= 0, f"{where}: clearance is {segment.clearance} m")
-    at = states.between(max(FINEST, segment.clearance))
-    text = f"{where}: more than {MOST_STATES:,} states would have to be checked"
+    at = states.between(max(FINEST, segment.clearance), most)
+    text = f"{where}: more than {MOST_STATES:,} states of the motion would have to be checked"
     if not expect(at is not None, text) or at is None:
-        return
+        return 0
     fine = states.values(at)
     poses, (slip, twist) = states.objects(fine)
     text = f"{where}: the object slips by {1e3 * slip:.2f} mm and {np.rad2deg(twist):.2f}° in the hands"
@@ -153,17 +187,18 @@ def check_free(states: SegmentStates, world: BulletWorld, where: str, expect: Ex
             limit = max(limit, float(tilts[0]), float(tilts[-1]))
         expect(tilt <= limit + TILT_TOLERANCE, f"{where}: the object tilts by {tilt:.2f}°, not {limit:g}°")
     if not _check_balance(states, fine, poses, where, expect):
-        return
+        return len(at)
     near = _NearBodies(states, world, fine, poses)
     for k, pose in enumerate(poses):
         for name, values in fine.items():
             world.set_robot(name, values[k])
         world.set_object(pose)
-        for c, gap in near.too_close():
+        for c, gap in near.too_close(k):
             text = f"{where}: row {at[k]:.2f}: {c.a} and {c.b} keep {1e3 * gap:.3f} mm"
             expect(False, f"{text}, not {1e3 * segment.clearance:.3f} mm beyond the margin")
-            return
+            return len(at)
     expect(True, where)
+    return len(at)
 
 
 def _check_balance(
@@ -215,8 +250,8 @@ class _NearBodies:
     ) -> None:
         self._world, self._clearance = world, states.segment.clearance
         scene, kind = states.scene, states.segment.kind
-        taking = states.segment.joints if kind in ("approach", "close", "open", "retreat") else ()
-        self._touching = [scene.arms[name] for name in {*states.in_hand, *taking}]
+        self._holding = [scene.arms[name] for name in states.in_hand]
+        self._taking = {scene.arms[name]: on for name, on in states.on_line(values, objects).items()}
         moving = {name: np.ptp(rows, axis=0) > 0 for name, rows in values.items()}
         self._group: dict[BodyName, tuple[str, str] | None] = {}  # what stands has none
         for name, robot in scene.robots.items():
@@ -233,14 +268,15 @@ class _NearBodies:
             world.set_object(pose)
             self._resting |= {c.b for c in world.object_contacts(TOUCHING)}
 
-    def too_close(self) -> Iterator[tuple[Collision, float]]:
-        """Yield the pairs that are closer than they may be in the world now, with their distance (m).
+    def too_close(self, k: int) -> Iterator[tuple[Collision, float]]:
+        """Yield the pairs that are closer than they may be in state k, with their distance (m).
 
-        The distance is that beyond the margin.
+        The world is in that state. The distance is that beyond the margin.
         """
         world = self._world
+        touching = [*self._holding, *(arm for arm, on in self._taking.items() if on[k])]
         reach = self._clearance + world.margin
-        for c in world.all_pairs_within(reach, self._touching):
+        for c in world.all_pairs_within(reach, touching):
             gap = reach - c.depth - world.margin_for(c.reason)
             moved = self._group.get(c.a) != self._group.get(c.b)
             if moved and gap < self._clearance - CLEARANCE_TOLERANCE:

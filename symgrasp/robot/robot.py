@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -340,8 +341,12 @@ class Arm:
                 values[self.robot.model.joint_names.index(joint)] = value
         return values
 
-    def hand_hulls(self, opening: float) -> list[Array]:
+    def hand_hulls(self, opening: float, only: Sequence[str] | None = None) -> list[Array]:
         """Return the vertices (n, 3) of the hand's convex hulls in the tool frame at an opening (m).
+
+        Args:
+            opening: the opening (m).
+            only: the links; those of the hand if None.
 
         Raises:
             InputError: no link of the hand has a collision shape.
@@ -350,7 +355,7 @@ class Arm:
         links = model.forward(self.robot_values(self.home, opening))
         T_tool_base = inverse(links[self._tool_index])
         hulls = []
-        for link in self.hand.links:
+        for link in self.hand.links if only is None else only:
             pose = T_tool_base @ links[model.link_index(link)]
             hulls += [points @ pose[:3, :3].T + pose[:3, 3] for points in model.hulls(link)]
         if not hulls:

@@ -10,6 +10,7 @@ import pytest
 from symgrasp.cli.main import main
 from symgrasp.errors import PlanError
 from symgrasp.motion.moveit import to_planning_scene, to_srdf
+from symgrasp.plan.plan import Plan
 from symgrasp.poses import Array, from_position_quat, xyzw_to_wxyz
 from symgrasp.scene.scene import Scene
 from symgrasp.world import own_pairs
@@ -68,6 +69,20 @@ def test_the_planning_scene_has_the_bodies_where_they_are():
     ((_, vertices, T),) = found[scene.file.object.name]
     np.testing.assert_allclose(T, recorded_motion().poses["pick"], atol=1e-12)
     assert np.hypot(*vertices[:, :2].T).max() == pytest.approx(scene.profile.points[:, 1].max())
+
+
+def test_the_planning_scene_is_in_the_frame_of_the_robot_s_root():
+    """MoveIt's planning frame; with the base moved, what stands in the world is elsewhere in it."""
+    content = recorded_plan().model_dump(mode="json")
+    moved = from_position_quat([0.3, -0.2, 0.1], [np.cos(0.4), 0.0, 0.0, np.sin(0.4)])
+    scene = content["scene"]["content"]
+    assert scene["robots"][0]["base"] == {"position": [0.0, 0.0, 0.0]}
+    scene["robots"][0]["base"] = {"position": [0.3, -0.2, 0.1], "rpy_deg": [0, 0, float(np.rad2deg(0.8))]}
+    found, before = read_scene(to_planning_scene(Plan.model_validate(content))), recorded_plan()
+    for name, shapes in read_scene(to_planning_scene(before)).items():
+        for (kind, _, T), (same, _, now) in zip(shapes, found[name], strict=True):
+            assert kind == same
+            np.testing.assert_allclose(moved @ now, T, atol=1e-9)
 
 
 def test_pinocchio_reads_the_srdf(tmp_path):

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from symgrasp.errors import Cancelled, NoPlanError, SceneError
+from symgrasp.ik import solver_for
 from symgrasp.motion.bodies.motion_scene import RESTING
 from symgrasp.motion.choosing import Failure, best_motion, failures_in_words
+from symgrasp.motion.drafting.ways import Grip, retreating
 from symgrasp.motion.planning import plan_motion
 from symgrasp.motion.segments import Motion
 from symgrasp.motion.times.timing import timed
@@ -22,7 +24,7 @@ from symgrasp.planners.planning import (
     plan_sequential,
     sequential_plans,
 )
-from symgrasp.poses import pose_error
+from symgrasp.poses import inverse, pose_error
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
@@ -62,6 +64,26 @@ def check(plan: Plan, motion: Motion) -> None:
 
 def kinds(motion: Motion) -> list[str]:
     return [kind for kind, _ in groupby(segment.kind for segment in motion.segments)]
+
+
+def test_a_retreat_ends_where_all_that_may_touch_the_object_is_clear_of_it():
+    """The safety box around each hand of TIAGo reaches further than its fingers."""
+    scene = Scene.load("tiago_dual_tray")
+    arm, profile = scene.arm("left"), scene.profile
+    radius = float(profile.radius(0.1))
+    tool = arm.hand.tool_pose(np.eye(4), 0.1, 0.0, 0, radius)
+    solver = solver_for(arm, 1)
+    grip = Grip(arm, solver, solver, tool, arm.hand.opening(radius), 2 * radius)
+    end = retreating(grip, np.eye(4), 0.0, profile)[-1]
+    model = arm.robot.model
+    links = model.forward(arm.robot_values(arm.home, grip.open))
+    T_tool_base = inverse(links[model.link_index(arm.tool)])
+    outwards = end[:2, 3] / np.linalg.norm(end[:2, 3])
+    for link in arm.hand.touch_links:
+        pose = end @ T_tool_base @ links[model.link_index(link)]
+        for points in model.hulls(link):
+            placed = points @ pose[:3, :3].T + pose[:3, 3]
+            assert (placed[:, :2] @ outwards).min() > profile.points[:, 1].max(), link
 
 
 def test_pick_pour_place():

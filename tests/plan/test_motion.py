@@ -14,9 +14,10 @@ from symgrasp.cli.main import main
 from symgrasp.errors import PlanError
 from symgrasp.motion.record import from_plan, to_record
 from symgrasp.plan import check_motion as check_motion_module
-from symgrasp.plan.check_motion_states import SegmentStates
+from symgrasp.plan.check_motion_states import SegmentStates, check_free
 from symgrasp.plan.motion_record import MotionRecord, SegmentRecord
 from symgrasp.plan.plan import Plan
+from symgrasp.poses import inverse
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world
 from tests.motion.recorded import recorded_motion, recorded_plan
@@ -115,13 +116,11 @@ def numbers(node: Any, path: tuple = ()) -> Iterator[tuple]:
 def only_changed_states(content, monkeypatch):
     """Look for collisions only in segments that are not as they were, which are known to be free."""
     free = {SegmentRecord.model_validate(segment).model_dump_json() for segment in content["segments"]}
-    original = check_motion_module.check_free
 
-    def check_free(states, *rest):
-        if states.segment.model_dump_json() not in free:
-            original(states, *rest)
+    def check_changed(states, *rest):
+        return 0 if states.segment.model_dump_json() in free else check_free(states, *rest)
 
-    monkeypatch.setattr(check_motion_module, "check_free", check_free)
+    monkeypatch.setattr(check_motion_module, "check_free", check_changed)
 
 
 @pytest.mark.usefixtures("only_changed_states")
@@ -241,11 +240,79 @@ def test_states_are_close_to_each_other_however_far_rows_are_apart(content):
     segment = {**content["segments"][1], "times": [0.0, 10.0], "joints": {arm.name: rows.tolist()}}
     segment["velocities"] = {arm.name: np.zeros_like(rows).tolist()}
     start = {arm.robot.name: arm.robot.home}
-    states = SegmentStates(scene, SegmentRecord.model_validate(segment), start, np.eye(4), {})
-    at = states.between(0.01)
+    states = SegmentStates(scene, SegmentRecord.model_validate(segment), start, np.eye(4), {}, {})
+    at = states.between(0.01, 10_000)
     assert at is not None
     tool = np.array([arm.tool_pose(q[arm.indices])[:2, 3] for q in states.values(at)[arm.robot.name]])
     apart = np.linalg.norm(np.diff(tool, axis=0), axis=1)
     assert apart.max() <= 0.01
     assert apart.sum() == pytest.approx(np.ptp(rows[:, 0]) * np.linalg.norm(tool[0]), rel=0.01)
-    assert states.between(1e-7) is None
+    assert states.between(0.01, len(at)) is not None
+    assert states.between(0.01, len(at) - 1) is None
+
+
+def test_states_are_counted_over_the_whole_motion(content, world, monkeypatch):
+    counts: list[int] = []
+
+    def counted(*args):
+        counts.append(check_free(*args))
+        return counts[-1]
+
+    monkeypatch.setattr(check_motion_module, "check_free", counted)
+    assert failures(content, world) == []
+    total = sum(counts)
+    assert max(counts) < total - 1
+    monkeypatch.setattr(check_motion_module, "MOST_STATES", total)
+    assert failures(content, world) == []
+    monkeypatch.setattr(check_motion_module, "MOST_STATES", total - 1)
+    assert any("states of the motion" in failure for failure in failures(content, world))
+
+
+@pytest.mark.parametrize("kind", ["approach", "retreat"])
+def test_fingers_may_touch_the_object_on_the_line_of_the_grasp_alone(kind, content, world):
+    """A hand that turns around its approach cuts through the bottle between its fingers."""
+    scene, plan = world.scene, recorded_plan()
+    arm = scene.arm()
+    hold, T = plan.tasks[0].holds[0], plan.tasks[0].object_pose_turned.array()
+    q = np.array([hold.joints[name] for name in arm.joint_names])
+    turned = q.copy()
+    turned[-1] += 0.6 if q[-1] + 0.6 < arm.upper[-1] else -0.6
+    start = arm.robot.home.copy()
+    start[arm.indices] = q
+    for joint, value in arm.hand.joint_values(hold.opening).items():
+        start[arm.robot.model.joint_names.index(joint)] = value
+    line = next(s for s in content["segments"] if s["kind"] == "approach")["joints"][arm.name]
+    grasps = {arm.name: [inverse(T) @ hold.tool_pose.array()]}
+    found = []
+    for rows in (line[::-1], [q.tolist(), turned.tolist()]):
+        segment = {
+            **content["segments"][2],
+            **{"kind": kind, "held_by": [], "gripper": {}, "clearance": 0.0},
+            **{"times": np.linspace(0.0, 9.0, len(rows)).tolist(), "joints": {arm.name: rows}},
+            "velocities": {arm.name: np.zeros((len(rows), len(q))).tolist()},
+        }
+        record = SegmentRecord.model_validate(segment)
+        states = SegmentStates(scene, record, {arm.robot.name: start}, T, {}, grasps)
+        told: list[str] = []
+        check_free(
+            states, world, 10_000, "here", lambda ok, text, told=told: bool(ok) or bool(told.append(text))
+        )
+        found.append(told)
+    assert found[0] == []
+    assert len(found[1]) == 1 and "finger" in found[1][0] and "bottle" in found[1][0]
+
+
+@pytest.mark.parametrize("task", ["pick", "pour", "place"])
+def test_joint_values_of_plan_and_motion_are_the_same(task, content, world):
+    changed = recorded_plan().model_dump(mode="json")
+    (hold,) = next(t for t in changed["tasks"] if t["name"] == task)["holds"]
+    hold["joints"]["panda_joint3"] += 1e-4
+    found: list[str] = []
+    check_motion_module.check_motion(
+        Plan.model_validate(changed),
+        MotionRecord.model_validate(content),
+        world,
+        lambda ok, text: bool(ok) or bool(found.append(text)),
+    )
+    assert found
+    assert all("panda_joint3" in text and f"as in {task}" in text for text in found)

@@ -91,8 +91,16 @@ class Course:
             at = to if kind == "carry" else at
         self.state = self.state.with_object(end)
 
-    def move_hand(self, kind: Kind, grip: Grip, end: float, task: str) -> None:
-        """Open or close a hand to an opening (m), from that at which it is."""
+    def move_hand(self, kind: Kind, grip: Grip, end: float, task: str, *, away: bool = False) -> None:
+        """Open or close a hand to an opening (m), from that at which it is.
+
+        Args:
+            kind: ``open`` or ``close``.
+            grip: the grasp.
+            end: the opening (m).
+            task: where the object is.
+            away: the hand is not at its grasp, so that no finger may touch the object.
+        """
         arm = grip.arm
         start = self._opening.get(arm.name)
         if start == end:
@@ -102,7 +110,7 @@ class Course:
         states = [self.state, *(self.state.with_arm(arm, q, opening) for opening in openings[1:])]
         if start is None:
             states.append(self.state.with_arm(arm, q, end))
-        touching = [arm, *self.holders()]
+        touching = self.holders() if away else [arm, *self.holders()]
         situation = self.bodies.situation(self.state, [], hands=[arm], touching=touching)
         rows = np.array([situation.row(state) for state in states])
         verb = "closing" if kind == "close" else "opening"

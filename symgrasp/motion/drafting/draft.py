@@ -261,7 +261,7 @@ class MotionDraft:
         arm = grip.arm
         ends = [k for k in np.argsort(-tree.value) if q is None or np.array_equal(tree.ends[k], q)]
         paths = [tree.path(int(k)) for k in ends]
-        course.move_hand("open", grip, grip.open, task.name)
+        course.move_hand("open", grip, grip.open, task.name, away=True)
         situation = self._bodies.situation(course.state, [arm], touching=course.holders())
         with part_of(f"the reach of {name} to {task.name}"):
             starts = np.array([path[0] for path in paths])

@@ -76,7 +76,9 @@ def retreating(grip: Grip, T_world_object: Array, length: float, profile: Profil
         length: least length (m); more where the tips of the fingers would not be apart from the object.
         profile: of the object.
     """
-    tips = max(float(points[:, 2].max()) for points in grip.arm.hand_hulls(grip.open))
+    hand = grip.arm.hand
+    links = (*hand.links, *hand.touch_links)  # such as a safety box around the fingers, which reaches further
+    tips = max(float(points[:, 2].max()) for points in grip.arm.hand_hulls(grip.open, links))
     standoff = float(np.hypot(*grip.T_object_tool[:2, 3]))
     length = max(length, float(profile.points[:, 1].max()) + APART + tips - standoff)
     tool = grip.tool(T_world_object)
