@@ -19,6 +19,8 @@ from symgrasp.errors import InputError, one_of, printable, shortened
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from symgrasp.plan.plan import Plan
+    from symgrasp.plan.report import Report
     from symgrasp.robot.robot import Arm
     from symgrasp.scene.parts import Task
     from symgrasp.scene.scene import Scene
@@ -36,6 +38,7 @@ __all__ = [
     "chosen",
     "progress_of",
     "say",
+    "verified",
     "warn",
     "whole",
     "write_out",
@@ -161,6 +164,26 @@ def say(text: str) -> None:
 def warn(text: str) -> None:
     """Print a line of at most `LONGEST_LINE` characters about the command itself on stderr."""
     print(shortened(f"symgrasp: {printable(text)}", LONGEST_LINE), file=sys.stderr, flush=True)
+
+
+def verified(plan: Plan, path: Path, scene: Scene | None = None, *, strict: bool = False) -> Report:
+    """Check a plan, and print what does not hold and how much was checked.
+
+    Args:
+        plan: the plan.
+        path: of its file.
+        scene: the scene that it must be for; any if None.
+        strict: let no number be overstated at all.
+    """
+    from symgrasp.plan.verify import verify
+
+    with progress_of(f"verifying {path.name}") as progress:
+        report = verify(plan, progress, scene=scene, strict=strict)
+    for failure in report.failures:
+        say(failure)
+    result = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
+    say(f"{report.checks} statements checked: {result}")
+    return report
 
 
 def write_out(out: Path, content: bytes) -> None:

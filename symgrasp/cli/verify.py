@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from symgrasp.cli.shared import Commands, add_command, add_plan, checked_scene, progress_of, say
+from symgrasp.cli.shared import Commands, add_command, add_plan, checked_scene, verified
 
 __all__ = ["add_parser", "run"]
 
@@ -23,14 +23,7 @@ def add_parser(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print what does not hold; return 0 if everything does, else 1."""
     from symgrasp.plan.plan import Plan
-    from symgrasp.plan.verify import verify
 
     plan = Plan.load(args.plan)
     scene = checked_scene(args.scene) if args.scene else None
-    with progress_of(f"verifying {args.plan.name}") as progress:
-        report = verify(plan, progress, scene=scene, strict=args.strict)
-    for failure in report.failures:
-        say(failure)
-    result = "the plan holds" if report.holds else f"{len(report.failures)} do not hold"
-    say(f"{report.checks} statements checked: {result}")
-    return 0 if report.holds else 1
+    return 0 if verified(plan, args.plan, scene, strict=args.strict).holds else 1

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import errno
 import json
 import os
@@ -10,6 +11,7 @@ import subprocess
 import sys
 from importlib import resources
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import jsonschema
@@ -25,9 +27,11 @@ from symgrasp.motion.exports import MOTION_EXPORTS
 from symgrasp.object.library import load_object
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan, plan_schema
+from symgrasp.planners.planning import plan_sequential
 from symgrasp.scene.scene import Scene
 from tests.conftest import SHIPPED, write_scene
 from tests.hostile import chain_urdf, doubling_yaml
+from tests.motion.recorded import recorded_plan
 
 
 @pytest.fixture
@@ -99,6 +103,43 @@ def test_plan_with_motion(tmp_path, capsys):
     assert ElementTree.parse(tmp_path / "srdf").getroot().tag == "robot"
     assert (tmp_path / "motion-csv").read_text().startswith("time,")
     assert "<html" in (tmp_path / "html").read_text()[:200]
+
+
+@pytest.fixture(scope="module")
+def can_plan() -> dict[str, Any]:
+    """Return the content of a plan of one task."""
+    scene = Scene.load("soda_can").content
+    scene["map"] = {"heights": 6, "angles": 12, "redundancy": 4}
+    return json.loads(plan_sequential(Scene.from_content(scene)).to_json())
+
+
+@pytest.mark.parametrize("kind", ["csv", "trajectory", "tsr"])
+def test_a_plan_that_does_not_hold_is_not_exported(kind, can_plan, tmp_path, capsys):
+    """A turn of one joint is told as `verify` tells it, and a file that was there stays."""
+    path, out = tmp_path / "plan.json", tmp_path / "out"
+    out.write_text("before")
+    bent = copy.deepcopy(can_plan)
+    joints = bent["tasks"][0]["holds"][0]["joints"]
+    joints[next(iter(joints))] += 0.05
+    path.write_text(json.dumps(bent))
+    assert main(["verify", str(path)]) == 1
+    said = capsys.readouterr().out
+    assert main(["export", kind, str(path), "--out", str(out)]) == 1
+    assert capsys.readouterr().out == f"{said}nothing is written to {out}\n"
+    assert out.read_text() == "before"
+    path.write_text(json.dumps(can_plan))
+    assert main(["export", kind, str(path), "--out", str(out)]) == 0
+    assert out.read_text() != "before"
+
+
+def test_a_motion_that_does_not_hold_is_not_exported(tmp_path, capsys):
+    content = json.loads(recorded_plan().to_json())
+    del content["motion"]["segments"][1]
+    path, out = tmp_path / "plan.json", tmp_path / "out"
+    path.write_text(json.dumps(content))
+    assert main(["export", "motion", str(path), "--out", str(out)]) == 1
+    assert "motion.segments[1]" in capsys.readouterr().out
+    assert not out.exists()
 
 
 def test_ctrl_c_while_a_motion_is_planned_leaves_no_file(monkeypatch, tmp_path, capsys):
