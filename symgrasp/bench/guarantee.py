@@ -57,8 +57,13 @@ class Guarantee:
         infeasible: number of cells that it calls infeasible.
         proven: number of those that are proven to be.
         resolution: see `FeasibilityMap`.
-        refuted: number of cells that it calls infeasible, and Pinocchio and Coal find free at a sample.
+        missed_proven: number of cells that it says to be proven infeasible, and some of those samples shows
+            feasible: each is a fault.
+        refuted: number of cells that it calls infeasible, but not proven, and Pinocchio and Coal find free
+            at a sample.
         tried: number of cells for which those were asked; 0 where they are not installed.
+        refuted_proven: the same of cells that it says to be proven infeasible: each is a fault.
+        tried_proven: number of those for which those were asked.
         ratio: processor time of the map, divided by that of one at 32 samples.
     """
 
@@ -73,8 +78,11 @@ class Guarantee:
     infeasible: int
     proven: int
     resolution: float
+    missed_proven: int
     refuted: int
     tried: int
+    refuted_proven: int
+    tried_proven: int
     ratio: float
 
     def line(self) -> str:
@@ -85,7 +93,9 @@ class Guarantee:
             f"feasible at {self.samples} samples "
             f"{self.missed_sampled} missed by {AUTO_SAMPLES} samples, {self.missed} by auto, which finds "
             f"{self.found} more; {share:.0f} % of {self.infeasible} proven, others to "
-            f"{self.resolution:.0e} rad; {self.refuted} of {self.tried} refuted; time × {self.ratio:.2f}"
+            f"{self.resolution:.0e} rad; refuted {self.refuted} of {self.tried} of these, and of the proven "
+            f"{self.refuted_proven} of {self.tried_proven}, {self.missed_proven} by samples; "
+            f"time × {self.ratio:.2f}"
         )
 
 
@@ -128,11 +138,12 @@ def _measured(scene: Scene, task: Task, name: str) -> Guarantee:
     searched, after = _timed(scene.with_settings(redundancy="auto"), task, name)
     truth, samples = _truth(scene, task, name)
     missed = truth & ~searched.feasible
-    refuted, tried = _refuted(scene, task, name, searched)
+    refuted = _refuted(scene, task, name, searched)
     return Guarantee(
         scene.name, task.name, name, samples, int(truth.sum()), int((truth & ~sampled.feasible).sum()),
         int(missed.sum()), int((searched.feasible & ~truth).sum()), int((~searched.feasible).sum()),
-        int(searched.proven.sum()), searched.resolution, refuted, tried, after / before,
+        int(searched.proven.sum()), searched.resolution, int((truth & searched.proven).sum()), *refuted,
+        after / before,
     )  # fmt: skip
 
 
@@ -158,29 +169,33 @@ def _truth(scene: Scene, task: Task, name: str) -> tuple[np.ndarray, int]:
             return MapMaker(world).map(name, task).feasible, samples
 
 
-def _refuted(scene: Scene, task: Task, name: str, m: FeasibilityMap) -> tuple[int, int]:
-    """Return how many infeasible cells Pinocchio and Coal find free at a sample, and how many they tried."""
+def _refuted(scene: Scene, task: Task, name: str, m: FeasibilityMap) -> tuple[int, int, int, int]:
+    """Return how many infeasible cells Pinocchio and Coal find free at a sample, and how many they tried.
+
+    Returns:
+        Both for cells that are not proven infeasible, then for those that are, where the hand fits.
+    """
     try:
         from symgrasp.bench.brute import BruteForce
     except ImportError:
-        return 0, 0
+        return 0, 0, 0, 0
     arm = scene.arm(name)
     if arm.robot.torso is not None or arm.robot.support is not None or scene.settings.margin:
-        return 0, 0
-    open_cells = np.argwhere((m.reason > Reason.UNREACHABLE) & ~m.feasible & ~m.proven)
+        return 0, 0, 0, 0
+    if scene.settings.approach:
+        return 0, 0, 0, 0
     rng = np.random.default_rng(0)
-    cells = rng.permutation(open_cells)[:REFUTED]
-    if not len(cells) or scene.settings.approach:
-        return 0, 0
+    fits = ~m.feasible & (m.reason != Reason.HAND_TOO_SMALL) & (m.reason != Reason.SURFACE_TOO_STEEP)
     tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, task.T_world_object)
-    refuted = 0
+    counts: list[int] = []
     with open_world(scene) as world:
         brute = BruteForce(world, arm, solver_for(arm, MOST_SAMPLES), task.T_world_object)
         brute.keep(HIT_BAND)  # PyBullet, which decides what all but touches, is off by that
-        for index in cells:
-            cell = Cell(*index.tolist())
-            refuted += brute.feasible(tools[cell], float(m.opening[cell.row]))
-    return refuted, len(cells)
+        for which in (fits & (m.reason > Reason.UNREACHABLE) & ~m.proven, fits & m.proven):
+            cells = [Cell(*index) for index in rng.permutation(np.argwhere(which))[:REFUTED].tolist()]
+            counts.append(sum(brute.feasible(tools[c], float(m.opening[c.row])) for c in cells))
+            counts.append(len(cells))
+    return counts[0], counts[1], counts[2], counts[3]
 
 
 def _turn(vector: np.ndarray) -> np.ndarray:

@@ -29,6 +29,7 @@ from symgrasp.engine.cell_paths import follows, motion_of, place_tool, reaches_m
 from symgrasp.engine.cell_types import CellInput, new_work
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND
 from symgrasp.engine.kinematics import MovingPieces, Scratch, compose, place_pieces
+from symgrasp.engine.reach import beyond_reach
 from symgrasp.engine.search_types import Balance
 from symgrasp.engine.threads import core_count, in_parallel
 from symgrasp.poses import Array
@@ -275,23 +276,12 @@ def _refute(moving, pieces, tree, inputs, work, box):
     r = inputs.first[box[1]] + box[2]
     if inputs.rows.misfits[r]:
         return PROVEN
-    T, w, known = work.T, inputs.wrist, NEVER
-    x = T[0] * w[0] + T[1] * w[1] + T[2] * w[2] + T[9]
-    y = T[3] * w[0] + T[4] * w[1] + T[5] * w[2] + T[10]
-    z = T[6] * w[0] + T[7] * w[1] + T[8] * w[2] + T[11]
-    a = inputs.shoulder
-    d0, d1, d2 = x - a[0], y - a[1], z - a[2]
-    along = (
-        d0 * (T[0] * w[3] + T[1] * w[4] + T[2] * w[5])
-        + d1 * (T[3] * w[3] + T[4] * w[4] + T[5] * w[5])
-        + d2 * (T[6] * w[3] + T[7] * w[4] + T[8] * w[5])
-    )
-    across = math.sqrt(max(0.0, d0 * d0 + d1 * d1 + d2 * d2 - along * along)) - w[6]
-    beyond = math.sqrt(along * along + across * across) - inputs.reach
+    known = NEVER
+    beyond, x, y, z = beyond_reach(inputs.reach, work.T)
     if beyond > ROUNDING:
         known = OPEN
         moves, _ = tool_motion(inputs, box, x, y, z)
-        if beyond > moves + 0.5 * inputs.width / (1 << box[1]) * w[6] + ROUNDING:
+        if beyond > moves + 0.5 * inputs.width / (1 << box[1]) * inputs.reach.wrist[6] + ROUNDING:
             return PROVEN
     _place_hand(moving, pieces, inputs, work, r)
     scratch = work.scratch

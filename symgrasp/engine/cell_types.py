@@ -12,6 +12,7 @@ import numpy as np
 
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.engine.kinematics import Scratch
+from symgrasp.engine.reach import Reach
 from symgrasp.poses import Array
 
 __all__ = ["CellInput", "CellWork", "Rows", "new_work"]
@@ -61,11 +62,7 @@ class CellInput(NamedTuple):
         limits: (2, n) limits (rad) of the joints, infinite where there are none.
         margin: distance (m) to keep from static pieces.
         inner: bodies inside the pieces, see `inner_pieces`.
-        shoulder: (3,) a point in the world from which the arm never takes a point of the wrist further away
-            than its reach.
-        wrist: (7,) middle, axis and radius (m) of the circle in the tool frame on which that point is: the
-            last joint turns it.
-        reach: that distance (m).
+        reach: how far the arm reaches, with its shoulder in the world.
     """
 
     object: Array
@@ -78,9 +75,7 @@ class CellInput(NamedTuple):
     limits: Array
     margin: float
     inner: tuple[PackedPieces, ...]
-    shoulder: Array
-    wrist: Array
-    reach: float
+    reach: Reach
 
 
 class CellWork(NamedTuple):

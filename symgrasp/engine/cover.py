@@ -11,7 +11,8 @@ collides, and a pose further away than the arm ever reaches.
 from __future__ import annotations
 
 import math
-from functools import partial
+from collections.abc import Sequence
+from queue import SimpleQueue
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm
-from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult, new_nodes
+from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult, Nodes, new_nodes
 from symgrasp.engine.exclusion import (
     EXCLUDED,
     FALLS,
@@ -34,13 +35,15 @@ from symgrasp.engine.exclusion import (
     copy_pose,
     what_is_known,
 )
-from symgrasp.engine.kinematics import MovingPieces, Scratch, copied, place_arm, place_hand
+from symgrasp.engine.kinematics import MovingPieces, Scratch, place_arm, place_hand
+from symgrasp.engine.reach import beyond_reach
 from symgrasp.engine.retreat_search import arm_retreats, copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
     FEASIBLE,
     RETREAT_UNDECIDED,
     Balance,
+    BranchScratch,
     RowChecks,
     SearchInput,
     new_branches,
@@ -61,6 +64,9 @@ COARSE = 3e-3
 """The same where both ends fail in a way of which no measure is known: balance, the retreat, pieces that
 all but touch."""
 
+CERTAIN = 1e-6
+"""By how much (m) a pose is certain to be out of reach: more than numbers are rounded by."""
+
 MOST_VISITED = 20_000
 """Values of φ of a cell after which the search gives up."""
 
@@ -70,7 +76,7 @@ def cover(
     moving: MovingPieces,
     pieces: PackedPieces,
     tree: Tree,
-    scratch: Scratch,
+    scratches: Sequence[Scratch],
     inputs: SearchInput,
     balance: Balance,
     rows: RowChecks,
@@ -80,7 +86,7 @@ def cover(
     """Search all of φ for free configurations of some cells, on all cores.
 
     Args:
-        chain, moving, pieces, tree, scratch, inputs, balance, joints: see `symgrasp.engine.search.search`.
+        chain, moving, pieces, tree, scratches, inputs, balance, joints: see `symgrasp.engine.search.search`.
         rows: the row checks of that search.
         covered: what to cover.
     """
@@ -98,20 +104,20 @@ def cover(
         undecided_phi=np.empty((c, OPEN_KEPT)),
         undecided_branch=np.empty((c, OPEN_KEPT), dtype=np.int16),
     )
-    own = [
-        (
-            new_nodes(chain, branch_count(chain), joints),
-            copied(scratch),
-            new_branches(chain, joints, len(inputs.retreat), len(moving.frame)),
-        )
-        for _ in range(inputs.parts)
-    ]
+    idle: SimpleQueue[tuple[Nodes, Scratch, BranchScratch]] = SimpleQueue()
+    for scratch in scratches:
+        branches = new_branches(chain, joints, len(inputs.retreat), len(moving.frame))
+        idle.put((new_nodes(chain, branch_count(chain), joints), scratch, branches))
 
     def cover_part(part: int) -> None:
-        _cover_part(*own[part], moving, pieces, tree, inputs, balance, rows, covered, result, part)
+        own = idle.get()
+        try:
+            _cover_part(*own, moving, pieces, tree, inputs, balance, rows, covered, result, part)
+        finally:
+            idle.put(own)
 
-    cover_part(0)
-    in_parallel(partial(cover_part), range(1, inputs.parts))
+    cover_part(0)  # here, where Ctrl-C can interrupt its compiling
+    in_parallel(cover_part, range(1, inputs.parts))
     return result
 
 
@@ -128,7 +134,7 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
     cell = covered.cells[i]
     T, run = inputs.T_base_tool[cell], cell * len(inputs.row) // len(inputs.T_base_tool)
     locked = covered.locked
-    if _out_of_reach(nodes, locked, T):
+    if beyond_reach(covered.reach, covered.tool[i])[0] > CERTAIN or _out_of_reach(nodes, locked, T):
         result.proven[i] = True
         return
     hand = tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, T)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.collision.pieces import PackedPieces
+from symgrasp.engine.reach import Reach
 from symgrasp.ik.at_phi import Locked
 from symgrasp.ik.chain import Chain
 from symgrasp.poses import Array
@@ -25,12 +26,16 @@ class CoverInput(NamedTuple):
 
     Attributes:
         cells: (c,) the cells, as indices into those of the search.
+        tool: (c, 12) their tool poses in the base.
+        reach: how far the arm reaches, with its shoulder in the base.
         locked: the locked joint.
         inner: bodies inside the pieces, see `inner_pieces`.
         first: number of equal parts of the range of φ to begin with.
     """
 
     cells: np.ndarray
+    tool: Array
+    reach: Reach
     locked: Locked
     inner: tuple[PackedPieces, ...]
     first: int

@@ -15,10 +15,7 @@ from symgrasp.poses import Array
 from symgrasp.robot.hand import JointTable
 from symgrasp.robot.robot import Arm
 
-__all__ = ["arm_reach", "new_rows"]
-
-ROUNDS = 100
-"""Rounds of least squares with new weights that make the reach of an arm short."""
+__all__ = ["new_rows"]
 
 
 def new_rows(
@@ -120,30 +117,3 @@ def _sway(arm: Arm, turns: dict[str, Array], rows: int) -> Array:
         (k, link) for k, link in enumerate(model.link_names) if last in {j.name for j in model.chain(link)}
     ]
     return np.max([_play(arm, turns, link, float(away[k]), rows) for k, link in links], axis=0, initial=0.0)
-
-
-def arm_reach(origin: Array, axis: Array) -> tuple[Array, Array, float]:
-    """Return how far an arm takes a point of its last axis from one of its first, whatever its joints.
-
-    Between two axes that a link holds, all points keep their distance. So the length of a polygon with one
-    corner on each axis is a bound; its corners are slid along the axes to make it short.
-
-    Args:
-        origin: (n, 3) points on the axes of the joints at zero.
-        axis: (n, 3) their directions.
-
-    Returns:
-        The first corner (3,), the last one (3,), and the length (m).
-    """
-    n = len(origin)
-    slide, weight = np.zeros(n), np.ones(n - 1)
-    ends = np.eye(n - 1, n, k=1)[:, :, None] * axis - np.eye(n - 1, n)[:, :, None] * axis  # (n - 1, n, 3)
-    offset = np.diff(origin, axis=0)
-    for _ in range(ROUNDS):
-        scaled = np.sqrt(weight)[:, None]
-        rows = (scaled[:, None] * ends).transpose(0, 2, 1).reshape(-1, n)
-        slide = np.linalg.lstsq(rows, -(scaled * offset).ravel(), rcond=None)[0]
-        lengths = np.linalg.norm(offset + np.einsum("kjc,j->kc", ends, slide), axis=1)
-        weight = 1.0 / np.maximum(lengths, 1e-9)
-    corners = origin + slide[:, None] * axis
-    return corners[0], corners[-1], float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum())

@@ -13,8 +13,9 @@ from symgrasp.engine.cell_proof import prove_cells
 from symgrasp.engine.cell_types import CellInput
 from symgrasp.engine.geometry import ArmGeometry
 from symgrasp.engine.kinematics import Scratch
+from symgrasp.engine.reach import reach_of
 from symgrasp.engine.search_types import Balance
-from symgrasp.feasibility.exact.cell_rows import arm_reach, new_rows
+from symgrasp.feasibility.exact.cell_rows import new_rows
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import Solver
 from symgrasp.object.manifold import Manifold
@@ -64,13 +65,8 @@ class CellProver:
         zero = arm.robot.T_world_base @ arm.robot.model.forward(arm.robot_values(np.zeros(arm.dof)))
         frames = np.array([zero[j.child] for j in joints])
         tool = zero[arm.robot.model.link_index(arm.tool)]
-        axes = (frames[:, :3, :3] @ np.array([j.axis for j in joints])[..., None])[..., 0]
-        self._shoulder, wrist, self._reach = arm_reach(frames[:-1, :3, 3], axes[:-1])
-        away, last = wrist - frames[-1, :3, 3], axes[-1]
-        middle = frames[-1, :3, 3] + (away @ last) * last
-        into = inverse(tool)
-        radius = float(np.linalg.norm(wrist - middle))
-        self._wrist = np.array([*(into @ [*middle, 1.0])[:3], *into[:3, :3] @ last, radius])
+        reach, base = reach_of(arm), arm.robot.T_world_base
+        self._reach = reach._replace(shoulder=base[:3, :3] @ reach.shoulder + base[:3, 3])
         self._tool = pose_rows(inverse(frames[-1]) @ tool)
         locked = getattr(ik, "locked", None)
         self._free = np.array([j for j in range(arm.dof) if j != locked], dtype=np.int64)
@@ -103,8 +99,6 @@ class CellProver:
             limits=np.array([self._arm.lower, self._arm.upper]),
             margin=float(settings.margin),
             inner=self._inner,
-            shoulder=self._shoulder,
-            wrist=self._wrist,
             reach=self._reach,
         )
         wanted = ~m.feasible if settings.approach else np.ones_like(found)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -23,6 +24,7 @@ from symgrasp.engine.cover import FINEST, cover
 from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
+from symgrasp.engine.reach import Reach, reach_of
 from symgrasp.engine.threads import core_count
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
 from symgrasp.feasibility.exact.batches import Batch, batches, compiled_parts
@@ -102,6 +104,10 @@ class ExactEngine:
         self._balance = self._geometry.balance
         self._open = OpenCandidates(world, arm, geometry, self._scratch, self._opening)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
+
+    @cached_property
+    def _arm_reach(self) -> Reach:
+        return reach_of(self.arm)
 
     @staticmethod
     def knows(arm: Arm) -> bool:
@@ -337,16 +343,17 @@ class ExactEngine:
         if locked is None or inputs.always_collides:
             return None
         which = np.flatnonzero(found.status != search.FEASIBLE)
+        tools = pose_rows(inputs.T_base_tool[which])
         covered = cover(
             batch.compiled.chain,
             batch.moving,
             self._geometry.pieces,
             self._geometry.tree,
-            self._scratch,
+            self._scratches(),
             inputs,
             self._balance,
             found.rows,
-            CoverInput(which, locked, self._inner, COVER_PARTS),
+            CoverInput(which, tools, self._arm_reach, locked, self._inner, COVER_PARTS),
             self.arm.dof,
         )
         free = which[covered.found]

@@ -13,9 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symgrasp.engine.reach import arm_reach
 from symgrasp.errors import MapError, SceneError
 from symgrasp.feasibility.create import MapMaker, create_map
-from symgrasp.feasibility.exact.cell_rows import arm_reach, new_rows
+from symgrasp.feasibility.exact.cell_rows import new_rows
 from symgrasp.feasibility.fit import fit, fits_all, fits_none
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.margins import way_to_unproven
