@@ -58,7 +58,7 @@ def places_html(state: State) -> str:
     )
     low, far = np.minimum(low, marks.min(axis=0) - 0.05), np.maximum(far, marks.max(axis=0) + 0.05)
     width, height = far - low
-    shapes = [_squares(places, colors)]
+    shapes = [_squares(places, colors), '<g pointer-events="none">']  # clicks are meant for the places
     for robot in state.scene.robots.values():
         shapes.append(_base(Base.of(robot.T_world_base), INK))
     for k, stand in enumerate(survey.stands, start=1):
@@ -67,13 +67,13 @@ def places_html(state: State) -> str:
     radius = max(state.scene.profile.r_max, 0.012)
     shapes.append(
         f'<circle cx="{x:.4f}" cy="{-y:.4f}" r="{radius:.4f}" fill="#ffd24d" stroke="{INK}" '
-        'stroke-width="0.004"><title>the object</title></circle>'
+        'stroke-width="0.004"><title>the object</title></circle></g>'
     )
     what = "places of the object" if survey.kind == "object" else f"bases of {state.robot.name}"
     label = f"heat map of {what} from above"
-    click = "Click a place in the 3D view, and the object goes there."
+    click = "Click a place, here or in the 3D view, and the object goes there."
     if survey.kind == "robot":
-        click = "Click a place or a ghost in the 3D view, and the robot goes there."
+        click = "Click a place, here or in the 3D view, or a ghost, and the robot goes there."
     return (
         f'<svg class="sg-places" role="img" aria-label="{escape(label)}" '
         f'viewBox="{low[0]:.4f} {-far[1]:.4f} {width:.4f} {height:.4f}">{"".join(shapes)}</svg>'
@@ -110,7 +110,7 @@ def _squares(places: Places, colors: np.ndarray) -> str:
         r, g, b = colors[k].tolist()
         parts.append(
             f'<rect x="{x - size / 2:.4f}" y="{-y - size / 2:.4f}" width="{size:.4f}" height="{size:.4f}" '
-            f'fill="#{r:02x}{g:02x}{b:02x}"/>'
+            f'fill="#{r:02x}{g:02x}{b:02x}" data-place="{k}"/>'
         )
     return "".join(parts)
 

@@ -1,4 +1,4 @@
-"""What a person does with the map, as the page sends it: JSON with the name of the deed in ``do``."""
+"""What a person does with the map, or a survey, as the page sends it: JSON with the name of the deed in ``do``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import msgspec
 
 from symgrasp.feasibility.cell import Cell
 
-from ..state import changes
+from ..state import changes, survey_changes
 from ..state.state import State
 
 __all__ = ["LONGEST", "Command", "decode"]
@@ -103,7 +103,17 @@ class Leave(_Deed, frozen=True, tag="leave"):
         return replace(state, map_view=replace(state.map_view, hovered=None))
 
 
-Command = Pick | Turn | Hover | Leave
+class Place(_Deed, frozen=True, tag="place"):
+    """Chooses a place of the survey that is shown, by its index, as a click on it in the 3D view does."""
+
+    index: Index
+
+    def applied(self, state: State) -> State:
+        """Return the state with the object or the robot there; a place that is no longer shown is ignored."""
+        return survey_changes.choose_place(state, self.index)
+
+
+Command = Pick | Turn | Hover | Leave | Place
 
 _decoder = msgspec.json.Decoder(Command)
 

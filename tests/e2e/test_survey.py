@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from playwright.sync_api import expect
 
 from symgrasp.scene.scene import Scene
@@ -30,4 +31,11 @@ def test_a_click_on_a_place_takes_the_object_there(open_page):
     expect(page.slider_box("y (cm)")).to_have_value("20")
     page.expect_title("pick")
     page.page.screenshot(path=SHOTS / "survey_clicked.png")
+    # The picture takes clicks as well.
+    place = page.frame.locator("[data-place='0']")
+    x, y, width = (float(place.get_attribute(name) or "") for name in ("x", "y", "width"))
+    place.click()
+    expect(page.slider_box("x (cm)")).to_have_value(str(round(100 * (x + width / 2))))
+    expect(page.slider_box("y (cm)")).to_have_value(str(round(-100 * (y + width / 2))))
+    assert (x + width / 2, -y - width / 2) != pytest.approx((0.6, 0.2), abs=0.01)
     assert not page.complaints

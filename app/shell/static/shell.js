@@ -2,6 +2,7 @@
 import { Link } from "./link.js";
 import { MapPane } from "./map_pane.js";
 import { describe } from "./legend.js";
+import { watchPlaces } from "./places.js";
 import { Visit } from "./visit.js";
 import { split } from "./splitter.js";
 
@@ -35,6 +36,7 @@ const link = new Link(`/map/${visit.token}`, {
   },
 });
 split(element("splitter"));
+watchPlaces(view, (command) => link.send(command));
 
 /* Keys that mean nothing here are the view's: its commands, and the palette of them. */
 document.addEventListener("keydown", (event) => {

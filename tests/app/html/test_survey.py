@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import pytest
 
 from app.html.survey import places_html, run_html, stands_html
@@ -23,6 +25,20 @@ def test_the_picture_says_what_its_colours_are(value, words):
     assert html.count("<rect") == 2
     assert "the object would be inside something: 1 place<" in html
     assert all(word in html for word in words)
+
+
+def test_every_place_has_its_number_and_marks_let_clicks_through():
+    state = surveyed()
+    assert state.survey.places
+    root = ElementTree.fromstring(places_html(state).partition("</svg>")[0] + "</svg>")
+    places = {int(rect.attrib["data-place"]): rect.attrib for rect in root.findall("rect")}
+    for k, (x, y) in enumerate(state.survey.places.xy):
+        half = float(places[k]["width"]) / 2
+        assert float(places[k]["x"]) + half == pytest.approx(x, abs=1e-3)
+        assert float(places[k]["y"]) + half == pytest.approx(-y, abs=1e-3)
+    (marks,) = root.findall("g")
+    assert marks.attrib["pointer-events"] == "none"
+    assert {child.tag for child in root} == {"rect", "g"}
 
 
 def test_progress_says_rate_and_time_left():

@@ -14,6 +14,7 @@ from app.state.state import State
 from app.state.undo import remember, undo
 from symgrasp.reason import Reason
 from tests.app.state.test_state import opened
+from tests.app.surveyed import BASES, surveyed
 
 
 def done(state: State, **command: object) -> State:
@@ -72,6 +73,15 @@ def test_pointing_at_a_cell_that_fails_shows_nothing():
     assert ghost(done(state, do="hover", row=row, column=column)) is None
 
 
+@pytest.mark.parametrize("kind", ["object", "robot"])
+def test_a_place_of_a_survey_is_chosen_as_in_the_3d_view(kind):
+    state = surveyed(kind)
+    after = done(state, do="place", index=0)
+    T = after.T_world_object if kind == "object" else after.robot.T_world_base
+    assert np.allclose(T[:2, 3], (0.4, 0.2) if kind == "object" else BASES[0][:2])
+    assert done(state, do="place", index=2) is state
+
+
 @pytest.mark.parametrize("deed", ["pick", "hover"])
 def test_a_cell_that_the_map_does_not_have_is_ignored(deed):
     state = opened()
@@ -85,7 +95,7 @@ def test_a_cell_that_the_map_does_not_have_is_ignored(deed):
         "", "[]", "{}", "null", '{"do":"quit"}', '{"do":"turn"}', '{"do":"turn","delta":"1"}',
         '{"do":"turn","delta":1e9}', '{"do":"turn","delta":NaN}', '{"do":"pick","row":-1,"column":0}',
         '{"do":"pick","row":1.5,"column":0}', '{"do":"pick","row":0,"column":0,"more":1}', b"{}",
-        '{"do":"leave"' + " " * LONGEST + "}",
+        '{"do":"leave"' + " " * LONGEST + "}", '{"do":"place","index":-1}',
     ],
 )  # fmt: skip
 def test_anything_else_is_an_error(message):
