@@ -47,3 +47,8 @@ class LeftPages:
         """Return what a page showed; None where it is unknown."""
         with self._lock:
             return self._pages.get(token)
+
+    def all(self) -> dict[str, LeftPage]:
+        """Return what all of them showed, by their tokens."""
+        with self._lock:
+            return dict(self._pages)

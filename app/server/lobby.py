@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 import viser
 from websockets.protocol import State
@@ -21,6 +22,7 @@ from .browser_connection import BrowserConnection, current_connection
 from .front_door import HELLO, FrontDoor, Visit
 from .left_pages import LeftPage, LeftPages
 from .session import Session
+from .stored_pages import StoredFiles, StoredPages
 from .viser_server import quiet_server
 
 __all__ = ["Lobby", "open_lobby"]
@@ -31,13 +33,21 @@ STYLE = "font:13px/1.5 system-ui,sans-serif;margin:12px"
 
 
 @contextmanager
-def open_lobby(cache: SharedCache, host: str, port: int, max_sessions: int = 16) -> Iterator[Lobby]:
+def open_lobby(
+    cache: SharedCache, host: str, port: int, max_sessions: int = 16, folder: Path | None = None
+) -> Iterator[Lobby]:
     """Serve the page on a port while the ``with`` block runs.
+
+    Args:
+        cache: what all sessions share.
+        host, port: the address to listen on.
+        max_sessions: how many browsers may use it at the same time.
+        folder: where what pages show is stored for later servers; nowhere if None.
 
     Raises:
         OSError: the port cannot be listened on.
     """
-    with closing(Lobby(cache)) as lobby:
+    with closing(Lobby(cache, folder)) as lobby:
         server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions, lobby.show_map))
         server.on_client_connect(lobby.connected)
         server.on_client_disconnect(lobby.disconnected)
@@ -53,9 +63,10 @@ class Lobby:
 
     Args:
         cache: what all sessions share.
+        folder: see `open_lobby`.
     """
 
-    def __init__(self, cache: SharedCache) -> None:
+    def __init__(self, cache: SharedCache, folder: Path | None = None) -> None:
         self._cache = cache
         self._pool = ProcessPool(cache.folders)
         self._lock = threading.Condition()
@@ -64,6 +75,7 @@ class Lobby:
         self._pages: dict[str, Session] = {}
         self._opened = asyncio.Event()
         self._left = LeftPages()
+        self._stored = StoredPages(folder, self._shown) if folder else None
         self._closed = False
         threading.Thread(target=self._pool.prepare, daemon=True).start()
 
@@ -137,6 +149,25 @@ class Lobby:
                 if self._pages.get(page) is session:
                     del self._pages[page]
 
+    def _left_by(self, visit: Visit) -> LeftPage | StoredFiles | None:
+        """Return what a page showed before it was loaded again; or on an earlier server."""
+        tokens = [token for token in (visit.page, visit.before) if token]
+        for token in tokens:
+            if left := self._shown_on(token):
+                return left
+        if self._stored:
+            for token in tokens:
+                if stored := self._stored.find(token):
+                    return stored
+        return None
+
+    def _shown(self) -> dict[str, LeftPage]:
+        """Return what all pages show, or showed last, by their tokens."""
+        left = self._left.all()
+        with self._lock:
+            sessions = dict(self._pages)
+        return left | {token: shown for token, session in sessions.items() if (shown := session.shown)}
+
     def _shown_on(self, token: str) -> LeftPage | None:
         """Return what a page shows, if the server has not noticed yet that it has gone, or showed."""
         session = self._session_of(token)
@@ -145,7 +176,10 @@ class Lobby:
     def close(self) -> None:
         """Close all sessions and the pool of processes; a second call does nothing."""
         with self._lock:
-            self._closed = True
+            closed, self._closed = self._closed, True
+        if self._stored and not closed:
+            self._stored.close()
+        with self._lock:
             sessions, self._sessions = list(self._sessions.values()), {}
             self._waiting.clear()
             self._pages.clear()
@@ -158,7 +192,7 @@ class Lobby:
         client = waiting.client
         try:
             waiting.placeholder.remove()
-            left = self._shown_on(visit.page) or self._shown_on(visit.before)
+            left = self._left_by(visit)
             session = Session(client, waiting.connection, self._cache, self._pool, visit, left)
         except Exception as error:
             if self._closed:

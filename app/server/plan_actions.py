@@ -93,9 +93,9 @@ class PlanActions:
         def run(progress: Progress) -> UploadedScene | tuple[OpenedPlan, Maps]:
             kind = self._process.file_kind(name, content, progress) or expected
             if kind == "scene":
-                return self._read_scene(name, content, progress)
+                return self.read_scene(name, content, progress)
             opened = self._process.open(content, name, lambda share: progress(share / 2))
-            return opened, self._maps(opened.maps, lambda share: progress((1 + share) / 2))
+            return opened, self.maps(opened.maps, lambda share: progress((1 + share) / 2))
 
         def show(state: State, result: UploadedScene | tuple[OpenedPlan, Maps]) -> State:
             if isinstance(result, UploadedScene):
@@ -107,7 +107,7 @@ class PlanActions:
 
         self._session.submit(f"{'Verifying' if expected == 'plan' else 'Opening'} {name}", run, show)
 
-    def _read_scene(self, name: str, content: bytes, progress: Progress) -> UploadedScene:
+    def read_scene(self, name: str, content: bytes, progress: Progress) -> UploadedScene:
         """Read an uploaded scene; an archive is unpacked into a folder of its own."""
         if not name.lower().endswith(".zip"):
             return self._process.read_scene(name, content, None, progress)
@@ -115,7 +115,7 @@ class PlanActions:
         uploaded = self._process.read_scene(name, content, folder.path, progress)
         return replace(uploaded, assets=replace(uploaded.assets, folders=(folder,)))
 
-    def _maps(self, requests: Sequence[MapRequest], progress: Progress) -> Maps:
+    def maps(self, requests: Sequence[MapRequest], progress: Progress) -> Maps:
         """Return maps by task and arm, computing those that are not cached."""
         maps: Maps = {}
         for k, request in enumerate(requests):

@@ -13,6 +13,7 @@ from symgrasp.errors import InputError
 from ..compute.cache import SharedCache
 from ..compute.warm_up import compute_first_map
 from .lobby import open_lobby
+from .stored_pages import stored_pages_folder
 
 __all__ = ["serve"]
 
@@ -40,7 +41,7 @@ def serve(scene: str, host: str, port: int, max_sessions: int = 16) -> None:
     # A browser may disconnect while something is drawn for it.
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     try:
-        with open_lobby(cache, host, port, max_sessions):
+        with open_lobby(cache, host, port, max_sessions, stored_pages_folder()):
             shown = f"[{host}]" if ":" in host else host
             print(f"symgrasp: http://{shown}:{port}", flush=True)
             forever = threading.Event()

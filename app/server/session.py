@@ -38,6 +38,8 @@ from .front_door import Visit
 from .left_pages import LeftPage
 from .map_pane import MapPane
 from .playback_clock import PlaybackClock
+from .reopening import reopened
+from .stored_pages import StoredFiles
 from .survey_actions import SurveyActions
 
 __all__ = ["Session"]
@@ -78,7 +80,7 @@ class Session:
         cache: SharedCache,
         pool: ProcessPool,
         visit: Visit,
-        left: LeftPage | None = None,
+        left: LeftPage | StoredFiles | None = None,
     ) -> None:
         self.client, self.cache, self.visit, self._connection = client, cache, visit, connection
         self.state: State | None = None
@@ -106,7 +108,7 @@ class Session:
             self.close()
             raise
 
-    def _build_page(self, left: LeftPage | None) -> None:
+    def _build_page(self, left: LeftPage | StoredFiles | None) -> None:
         """Add everything to the page, start the drawing thread, and open what was left or the first scene."""
         client = self.client
         buttons = self._connection.upload_buttons
@@ -133,8 +135,8 @@ class Session:
 
         name = f"draw {client.client_id}"
         threading.Thread(target=self._draw_until_closed, name=name, daemon=True).start()
-        if left is None:
-            self._open_first()
+        if left is None or isinstance(left, StoredFiles):
+            self._open_first(left)
             return
         self.scene_view.camera = self._camera = left.camera
         with self._changed:
@@ -268,10 +270,15 @@ class Session:
             failed=lambda problem: self._failed(job_id, problem),
         )
 
-    def _open_first(self) -> None:
-        """Open what the address says; if that fails, `_failed` opens the first scene and shows the reason."""
+    def _open_first(self, stored: StoredFiles | None) -> None:
+        """Open what was stored, or what the address says.
+
+        If that fails, `_failed` opens the first scene and shows the reason.
+        """
 
         def run(progress: Progress) -> tuple[State, Camera | None]:
+            if stored:
+                return reopened(stored, self.actions.plans, self.process, self.cache.names, progress)
             link = Link.parse(self.visit.query)
             scene, choice = self.cache.linked(
                 link, lambda scene, arm, hand: self.process.mount(scene, arm, hand, progress).scene
@@ -280,7 +287,8 @@ class Session:
             return link.apply(replace(State.of(scene, name), object_choice=choice)), link.camera
 
         def done(result: tuple[State, Camera | None]) -> None:
-            state, self.scene_view.camera = result
+            state, self._camera = result
+            self.scene_view.camera = self._camera
             with self._changed:
                 self._commit(state)
 

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, ViewportSize, sync_playwright
@@ -49,22 +50,34 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
+def start_app(scene: str, port: int, caches: Path) -> subprocess.Popen[str]:
+    """Start a server, which keeps what its pages show in a folder; it listens on return."""
+    command = [sys.executable, "-m", "app", scene, "--port", str(port)]
+    environment = os.environ | {"XDG_CACHE_HOME": str(caches)}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+    assert process.stdout
+    assert process.stdout.readline() == f"symgrasp: http://127.0.0.1:{port}\n"
+    return process
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
 @pytest.fixture(scope="package")
-def start_server(browser: Browser) -> Iterator[Callable[[str], str]]:
+def start_server(
+    browser: Browser, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[str], str]]:
     """Start servers for scenes, one a scene; gives their addresses."""
     running: dict[str, tuple[subprocess.Popen[str], str]] = {}
+    caches = tmp_path_factory.mktemp("caches")
 
     def start(scene: str) -> str:
         if scene not in running:
-            with socket.socket() as probe:
-                probe.bind(("127.0.0.1", 0))
-                port = probe.getsockname()[1]
-            command = [sys.executable, "-m", "app", scene, "--port", str(port)]
-            process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-            assert process.stdout
-            line = process.stdout.readline()
-            running[scene] = process, line.removeprefix("symgrasp: ").strip()
-            assert line == f"symgrasp: http://127.0.0.1:{port}\n"
+            port = free_port()
+            running[scene] = start_app(scene, port, caches), f"http://127.0.0.1:{port}"
         return running[scene][1]
 
     yield start
