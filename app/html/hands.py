@@ -1,4 +1,4 @@
-"""Several hands on one object: each arm's map with all handprints, their gap, and the hill climbing."""
+"""Several hands on one object: what each holds, the gap of their prints, and the hill climbing."""
 
 from __future__ import annotations
 
@@ -6,73 +6,45 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symgrasp.object.manifold import ROLLS
 from symgrasp.plan.plan import PlanTask
 from symgrasp.planners.bimanual import ClimbStep
 
-from ..render.marks import Mark
 from ..render.palette import PRINTS
-from ..render.prints import hand_color, shown_prints
-from ..state.map_view_state import RollChoice
-from ..state.plan_results import ClimbReplay, PlanResult, PlanResults
+from ..render.prints import apart_text, hand_color
+from ..state.plan_results import ClimbReplay, PlanResult
 from ..state.state import State
 from .escaping import escape
-from .map import map_html
 from .readout import count_text
 from .solutions import worst_margin_texts
 from .stack import margin_texts
 
-__all__ = ["climb_comparison_html", "climb_html", "gap_text", "hands_html"]
-
-TOTAL_HEIGHT = 330
-"""Height (px) that all pictures share."""
+__all__ = ["climb_comparison_html", "climb_html", "hands_html"]
 
 
 def hands_html(state: State) -> str:
-    """Draw the maps of the plan's tasks, each arm's with the handprints of all hands of the task."""
+    """List the hands of the plan's tasks; their maps are in `app.shell.layers`."""
     if state.climb_step:
         return climb_html(state)
     if state.plan is None or state.plan.plan.kind == "sequential":
         return ""
     plan = state.plan
-    count = sum(len(task.holds) for task in plan.plan.tasks)
-    height = int(np.clip(TOTAL_HEIGHT / count - 48, 56, 120))
     blocks = []
     for k, task in enumerate(plan.plan.tasks):
         now = " sg-now" if k == state.step else ""
-        gap = plan.gaps[k]
-        apart = f"<span>{gap_text(gap)}</span>" if gap is not None else ""
+        apart = f"<span>{apart_text(state, k)}</span>"
         turned = f"turned by {np.rad2deg(task.delta) + 0.0:.1f}°"
         name = f"{k + 1} · {escape(task.name)}" if len(plan.plan.tasks) > 1 else escape(task.name)
         blocks.append(f'<div class="sg-task{now}"><b>{name}</b><span>{turned}</span>{apart}</div>')
-        blocks.extend(_task_maps(state.plan_results, plan, k, task, height))
+        blocks.extend(_hands(task))
     return "".join(blocks)
-
-
-def gap_text(gap: float) -> str:
-    """Return text for the smallest gap (m) between two handprints of a task, negative where they overlap."""
-    return "prints overlap: the hands pass each other" if gap < 0 else f"gap {1e3 * gap:.0f} mm"
 
 
 def climb_html(state: State) -> str:
-    """Draw a step of the hill climbing: every arm's map with all handprints, and the shared cells so far."""
+    """Draw the shared cells of the hill climbing, with the step that is shown."""
     climb, step = state.plan_results.climb, state.climb_step
     if climb is None or step is None:
         return ""
-    prints = shown_prints(state)
-    height = int(np.clip(TOTAL_HEIGHT / len(climb.arms) - 48, 56, 120))
-    grid = state.scene.manifold
-    marks = [
-        Mark(float(grid.h[cell.row]), float(grid.theta[cell.column]), name)
-        for name, cell in zip(climb.arms, step.cells, strict=True)
-    ]
-    blocks = [_progress(climb, state.plan_results.frame or 0)]
-    for k, (name, cell) in enumerate(zip(climb.arms, step.cells, strict=True)):
-        m = state.plan_results.maps[climb.task, name].map
-        roll = _roll_choice(cell.roll)
-        blocks.append(f'<div class="sg sg-small">{_swatch(k)}{escape(name)}, roll {roll.value}</div>')
-        blocks.append(map_html(m, roll, marks, prints, height=height, name=f"climb map {name}"))
-    return "".join(blocks)
+    return _progress(climb, state.plan_results.frame or 0)
 
 
 def climb_comparison_html(climb: ClimbReplay) -> str:
@@ -104,21 +76,16 @@ def _result(plan: PlanResult | None) -> list[str]:
     return [apart, *worst_margin_texts(plan)]
 
 
-def _task_maps(results: PlanResults, plan: PlanResult, k: int, task: PlanTask, height: int) -> list[str]:
+def _hands(task: PlanTask) -> list[str]:
+    """Return a line for each hand of a task: its roll, and how much room it has."""
     several = len(task.holds) > 1
-    marks = [Mark(hold.grasp.h, hold.grasp.theta, hold.arm if several else "") for hold in task.holds]
-    prints = list(plan.prints[k].values()) if several else []
-    blocks = []
+    lines = []
     for i, hold in enumerate(task.holds):
-        m = results.maps[task.name, hold.arm].map.shift(task.delta)
-        roll = _roll_choice(ROLLS.index(hold.grasp.roll))
         along, around, clear = margin_texts(hold)
-        title = f"{escape(hold.arm)}, roll {roll.value}: room {along}, {around}; {clear} clear"
-        swatch = _swatch(i) if several else ""
-        blocks.append(f'<div class="sg sg-small">{swatch}{title}</div>')
-        name = f"plan map {task.name} {hold.arm}"
-        blocks.append(map_html(m, roll, marks, prints, height=height, name=name))
-    return blocks
+        roll = np.rad2deg(hold.grasp.roll)
+        title = f"{escape(hold.arm)}, roll {roll:.0f}°: room {along}, {around}; {clear} clear"
+        lines.append(f'<div class="sg sg-small">{_swatch(i) if several else ""}{title}</div>')
+    return lines
 
 
 def _progress(climb: ClimbReplay, frame: int) -> str:
@@ -140,10 +107,6 @@ def _curve(steps: Sequence[ClimbStep], frame: int) -> str:
         'aria-label="cells that the prints share, position by position">'
         f'<line x1="{at:.2f}" x2="{at:.2f}" y1="0" y2="32"/><polyline points="{points}"/></svg>'
     )
-
-
-def _roll_choice(roll: int) -> RollChoice:
-    return (RollChoice.ZERO, RollChoice.HALF_TURN)[roll]
 
 
 def _swatch(k: int) -> str:

@@ -27,6 +27,10 @@ class MapOptionsPanel(Panel):
             "Handprint", False, hint="The cells under the hand of the picked grasp."
         )
         self.on(self.handprint, lambda s, v: replace(s, map_view=replace(s.map_view, handprint=v)))
+        self.rolls_apart = gui.add_checkbox(
+            "Rolls side by side", False, hint="Also show a map of each of the two rolls of the hand."
+        )
+        self.on(self.rolls_apart, lambda s, v: replace(s, map_view=replace(s.map_view, rolls_apart=v)))
         self.compare = gui.add_checkbox(
             "Compare", False,
             hint="Also compute the map of the turned object from scratch, and count the cells that differ.",
@@ -39,4 +43,5 @@ class MapOptionsPanel(Panel):
         """Set the options."""
         self.color_by.value = state.map_view.color_by
         self.handprint.value = state.map_view.handprint
+        self.rolls_apart.value = state.map_view.rolls_apart
         self.compare.value = state.map_view.compare

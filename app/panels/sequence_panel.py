@@ -52,7 +52,7 @@ class SequencePanel(Panel):
         )  # fmt: skip
         self.on(
             self.slide,
-            lambda s, v: plan_changes.change_plan_results(s, lambda results: replace(results, slide=v / 100)),
+            lambda s, v: plan_changes.change_plan_results(s, lambda results: results.slid(v / 100)),
             "inputs",
         )
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from symgrasp.feasibility.cell import Cell
+from symgrasp.plan.plan import PlanTask
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
+from ..state.plan_results import HandsByHand
 from ..state.state import State
 from .playback import motion_state, plan_joint_values
 
@@ -23,6 +26,8 @@ def drawn_joint_values(state: State) -> dict[str, Array]:
     """
     if moment := motion_state(state):
         return dict(moment.values)
+    if state.shown_task and state.plan_results.by_hand:
+        return _values_by_hand(state, state.shown_task, state.plan_results.by_hand)
     if state.shown_task:
         return plan_joint_values(state.scene, state.shown_task)
     values = {robot.name: robot.home.copy() for robot in state.scene.robots.values()}
@@ -48,3 +53,18 @@ def drawn_object_pose(state: State) -> Array:
     """Return the pose (4, 4) that the object is drawn at; in a motion a hand may carry it."""
     moment = motion_state(state)
     return moment.T_world_object if moment else state.T_world_object
+
+
+def _values_by_hand(state: State, task: PlanTask, by_hand: HandsByHand) -> dict[str, Array]:
+    """Return the joint values where a person moved the hands: arms that cannot hold there are at home."""
+    values = {robot.name: robot.home.copy() for robot in state.scene.robots.values()}
+    grid = state.scene.manifold
+    for hold, cell in zip(task.holds, by_hand.cells, strict=True):
+        m = state.plan_results.maps[task.name, hold.arm].map.shift(task.delta)
+        at = m.manifold.cell(float(grid.h[cell.row]), float(grid.theta[cell.column]))
+        if witness := m.witness(Cell(cell.roll, *at)):
+            arm = state.scene.arm(hold.arm)
+            q = arm.robot_values(witness.q, witness.opening)
+            moved = q != arm.robot.home
+            values[arm.robot.name][moved] = q[moved]
+    return values

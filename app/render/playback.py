@@ -26,6 +26,6 @@ def plan_joint_values(scene: Scene, task: PlanTask) -> dict[str, Array]:
 @cached_with_first
 def motion_state(state: State) -> MotionState | None:
     """Return the moment of the plan's motion that a state shows; None where it shows none."""
-    if state.plan is None or state.plan.motion is None or state.step is None:
+    if state.plan is None or state.plan.motion is None or state.step is None or state.plan_results.by_hand:
         return None
     return state.plan.motion.at(state.plan_results.position)

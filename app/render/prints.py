@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 from symgrasp.object.manifold import wrap
+from symgrasp.planners.gaps import print_gap
 from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.scene import Scene
 
@@ -14,7 +16,17 @@ from ..state.state import State
 from .palette import OVERLAP, PRINTS
 from .weak_cache import cached_with_first
 
-__all__ = ["hand_color", "hand_print", "on_surface", "print_index", "print_names", "shown_prints"]
+__all__ = [
+    "apart_text",
+    "hand_color",
+    "hand_print",
+    "on_surface",
+    "print_index",
+    "print_names",
+    "shown_gap",
+    "shown_prints",
+    "task_prints",
+]
 
 
 def print_index(prints: Sequence[np.ndarray]) -> np.ndarray:
@@ -48,7 +60,7 @@ def shown_prints(state: State) -> list[np.ndarray]:
             for arm, cell in zip(state.plan_results.climb.arms, state.climb_step.cells, strict=True)
         ]
     if state.plan and state.step is not None and state.shown_task and len(state.shown_task.holds) > 1:
-        return list(state.plan.prints[state.step].values())
+        return task_prints(state, state.step)
     if state.map_view.handprint and state.pick and state.cell:
         row, column = grid.cell(state.pick.h, state.pick.theta)
         pitch, theta = _pitch_and_angle(state)
@@ -57,6 +69,51 @@ def shown_prints(state: State) -> list[np.ndarray]:
             print_ = hand_print(state.scene, state.arm, row, state.cell.roll, pitch, offset)
             return [print_.on(grid, column)]
     return []
+
+
+def task_prints(state: State, k: int) -> list[np.ndarray]:
+    """Return the handprints (H, A) of the hands of the k-th task of a plan, in the object's frame."""
+    if state.plan is None:
+        return []
+    return [p.on(state.scene.manifold, c) for p, c in _moved_prints(state, k)] or list(
+        state.plan.prints[k].values()
+    )
+
+
+def shown_gap(state: State, k: int) -> float | None:
+    """Return the smallest gap (m) between the prints of the k-th task of a plan; see `PlanResult.gaps`."""
+    if state.plan is None:
+        return None
+    moved = _moved_prints(state, k)
+    if not moved:
+        return state.plan.gaps[k]
+    grid = state.scene.manifold
+    return min((print_gap(a, b, j - i, grid) for (a, i), (b, j) in combinations(moved, 2)), default=None)
+
+
+def apart_text(state: State, k: int) -> str:
+    """Return text for the smallest gap between two handprints of the k-th task of a plan, if it has two."""
+    gap = shown_gap(state, k)
+    if gap is None:
+        return ""
+    if gap >= 0:
+        return f"gap {1e3 * gap:.0f} mm"
+    by_hand = state.plan_results.by_hand
+    if by_hand is None or by_hand.step != k:
+        return "prints overlap: the hands pass each other"
+    shared = int(np.count_nonzero(np.sum(task_prints(state, k), axis=0) > 1))
+    return f"prints share {shared} cell{'s' * (shared != 1)}"
+
+
+def _moved_prints(state: State, k: int) -> list[tuple[Handprint, int]]:
+    """Return the prints at column 0, and their columns, where a person moved hands of the k-th task."""
+    by_hand = state.plan_results.by_hand
+    if state.plan is None or by_hand is None or by_hand.step != k:
+        return []
+    return [
+        (hand_print(state.scene, hold.arm, cell.row, cell.roll, hold.grasp.pitch), cell.column)
+        for hold, cell in zip(state.plan.plan.tasks[k].holds, by_hand.cells, strict=True)
+    ]
 
 
 def _pitch_and_angle(state: State) -> tuple[float, float | None]:

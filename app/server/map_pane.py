@@ -90,8 +90,11 @@ class MapPane:
         finally:
             sending.cancel()
             with self._lock:
-                if self._link is link:
+                ended = self._link is link
+                if ended:
                     self._link = None
+            if ended:  # nobody will tell of the release any more
+                self._change(commands.Release().applied, "")
 
     def close(self) -> None:
         """Close the connection: the page then opens another."""

@@ -1,4 +1,4 @@
-"""What a person does with the map, or a survey, as the page sends it: JSON with the name of the deed in ``do``."""
+"""What a person does with maps or a survey, as the page sends it: JSON with the name of the deed in ``do``."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Annotated
 import msgspec
 
 from symgrasp.feasibility.cell import Cell
+from symgrasp.object.manifold import ROLLS
 
-from ..state import changes, survey_changes
+from ..state import changes, plan_changes, survey_changes
 from ..state.state import State
 
 __all__ = ["LONGEST", "Command", "decode"]
@@ -40,14 +41,18 @@ class _Deed(msgspec.Struct, tag_field="do", forbid_unknown_fields=True, frozen=T
 
 
 class Pick(_Deed, frozen=True, tag="pick"):
-    """Picks a cell (row, column) of the map before it is shifted."""
+    """Picks a cell (row, column) of the map before it is shifted, with a roll or the one that is shown."""
 
     row: Index
     column: Index
+    roll: Annotated[int, msgspec.Meta(ge=0, lt=len(ROLLS))] | None = None
 
     def applied(self, state: State) -> State:
         """Return the state with that grasp; a cell of a map that is no longer shown is ignored."""
-        return changes.choose_surface_cell(state, self.row, self.column) if _has(state, self) else state
+        if not _has(state, self):
+            return state
+        after = changes.choose_surface_cell(state, self.row, self.column)
+        return replace(after, pick=replace(after.pick, roll=self.roll)) if after.pick else after
 
 
 class Turn(_Deed, frozen=True, tag="turn"):
@@ -90,6 +95,96 @@ class Hover(_Deed, frozen=True, tag="hover"):
         return replace(state, map_view=replace(state.map_view, hovered=cell))
 
 
+class Slide(_Deed, frozen=True, tag="slide"):
+    """Slides the map of a task of the stack, by its index (see `app.shell.layers.Layer.step`), to δ (rad)."""
+
+    step: Index
+    delta: Angle
+
+    @property
+    def key(self) -> str | None:
+        """Key of the newest δ of that task."""
+        return f"slide {self.step}"
+
+    @property
+    def origin(self) -> str:
+        """A drag of the map."""
+        return f"map, task {self.step}"
+
+    def applied(self, state: State) -> State:
+        """Return the state with that map slid; one that is no longer shown is ignored."""
+        results = state.plan_results
+        count = len(results.plan.plan.tasks) if results.plan else len(results.maps)
+        if results.kind != "sequential" or self.step >= count:
+            return state
+        return plan_changes.slide_map(state, self.step, self.delta)
+
+
+class Move(_Deed, frozen=True, tag="move"):
+    """Moves a hand of a plan's task, both by their index, to a cell (row, column) in the object's frame."""
+
+    step: Index
+    hand: Index
+    row: Index
+    column: Index
+
+    @property
+    def key(self) -> str | None:
+        """Key of the newest cell of that hand."""
+        return f"move {self.step} {self.hand}"
+
+    @property
+    def origin(self) -> str:
+        """A drag of the map."""
+        return f"map, hand {self.step} {self.hand}"
+
+    def applied(self, state: State) -> State:
+        """Return the state with that hand moved; one that is no longer shown is ignored."""
+        plan, grid = state.plan, state.scene.manifold
+        if plan is None or plan.plan.kind == "sequential" or self.step >= len(plan.plan.tasks):
+            return state
+        known = self.hand < len(plan.plan.tasks[self.step].holds)
+        if not known or self.row >= grid.heights or self.column >= grid.angles:
+            return state
+        return plan_changes.move_hand(state, self.step, self.hand, self.row, self.column)
+
+
+class Show(_Deed, frozen=True, tag="show"):
+    """Shows a task of the plan by its index."""
+
+    step: Index
+
+    def applied(self, state: State) -> State:
+        """Return the state that shows it."""
+        return plan_changes.show_step(state, self.step)
+
+
+class AsPlanned(_Deed, frozen=True, tag="planned"):
+    """Puts maps and hands that were moved back to where the plan has them."""
+
+    def applied(self, state: State) -> State:
+        """Return the state with all of them back."""
+        return plan_changes.as_planned(state)
+
+
+class Press(_Deed, frozen=True, tag="press"):
+    """Presses a pointer anywhere on the page: changes until its release are one drag."""
+
+    number: Annotated[int, msgspec.Meta(ge=1, lt=1 << 32)]
+
+    def applied(self, state: State) -> State:
+        """Return the state during the press."""
+        return replace(state, press=self.number)
+
+
+class Release(_Deed, frozen=True, tag="release"):
+    """Releases it."""
+
+    def applied(self, state: State) -> State:
+        """Return the state after the press."""
+        return replace(state, press=0)
+
+
 class Leave(_Deed, frozen=True, tag="leave"):
     """Points at no cell any more."""
 
@@ -113,7 +208,7 @@ class Place(_Deed, frozen=True, tag="place"):
         return survey_changes.choose_place(state, self.index)
 
 
-Command = Pick | Turn | Hover | Leave | Place
+Command = Pick | Turn | Hover | Slide | Move | Show | AsPlanned | Press | Release | Leave | Place
 
 _decoder = msgspec.json.Decoder(Command)
 

@@ -6,16 +6,19 @@ four bytes, and arrays. Its ``kind`` says what it is about:
 ``cells``
     the map that was computed, before it is shifted by δ. Arrays over its grid (rows from the lowest height):
     clearance in 0.1 mm (uint16, `UNKNOWN` where there is none), then as uint8 the index of the colour, the
-    reason and the roll that is shown.
+    reason and the roll that is shown, and which rolls are feasible (bit r for roll r).
 ``prints``
     the cells under the hands, in the frame of the turned object: the index of the colour (uint8).
 ``look``
     everything else, δ among it: no arrays. It comes last, and what came before it is shown with it.
+
+Cells and prints with a ``layer`` are those of a map of the stack below the main one, see `app.shell.layers`.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,10 +32,11 @@ from ..render.cell_colors import colored_map
 from ..render.holds import hand_holds
 from ..render.marks import marks_of
 from ..render.palette import OVERLAP, PRINTS
-from ..render.prints import hand_color, print_index, print_names, shown_prints
+from ..render.prints import apart_text, hand_color, print_index, print_names, shown_prints
 from ..render.weak_cache import cached_with_first
 from ..state.map_view_state import RollChoice
 from ..state.state import State
+from .layers import Layer, LayerKind, layers_of
 
 __all__ = ["UNKNOWN", "map_parts"]
 
@@ -43,10 +47,18 @@ UNKNOWN = 0xFFFF
 def map_parts(state: State) -> dict[str, bytes]:
     """Return the messages that show the map of a state, by their kind."""
     m, view = state.result and state.result.map, state.map_view
-    return {
+    layers = layers_of(state)
+    parts = {
         "cells": _cells(m, view.roll, view.color_by) if m else _message("cells", {"heights": 0, "angles": 0}),
         "prints": _prints(state),
-        "look": _message("look", _look(state)),
+    }
+    for k, layer in enumerate(layers):
+        parts[f"cells {k}"] = _cells(layer.map, layer.roll, ColorBy.REASON, k)
+        parts[f"prints {k}"] = _layer_prints(layer, k)
+    return parts | {
+        "look": _message(
+            "look", _look(state) | {"layers": [_layer_look(x) for x in layers]} | _apart(state, layers)
+        )
     }
 
 
@@ -57,7 +69,7 @@ def _message(kind: str, head: dict[str, Any], *arrays: np.ndarray) -> bytes:
 
 
 @cached_with_first
-def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy) -> bytes:
+def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | None = None) -> bytes:
     grid, colored = m.manifold, colored_map(m, roll, color_by)
     clearance = roll.of(m, m.clearance)
     known = np.isfinite(clearance)
@@ -73,6 +85,9 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy) -> bytes:
         "feasible": int(Reason.FEASIBLE),
         "profile": grid.profile.points.tolist(),
     }
+    if layer is not None:
+        head["layer"] = layer
+    rolls = np.packbits(m.feasible, axis=0, bitorder="little")[0]
     return _message(
         "cells",
         head,
@@ -80,6 +95,7 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy) -> bytes:
         colored.index.astype(np.uint8),
         roll.reason(m).astype(np.uint8),
         roll.rolls(m).astype(np.uint8),
+        rolls,
     )
 
 
@@ -96,6 +112,49 @@ def _prints(state: State) -> bytes:
     return _message(
         "prints", {"heights": heights, "angles": angles, "colors": colors, "legend": legend}, index
     )
+
+
+def _layer_prints(layer: Layer, k: int) -> bytes:
+    if not layer.prints:
+        return _message("prints", {"layer": k, "heights": 0, "angles": 0})
+    index = print_index(layer.prints).astype(np.uint8)
+    heights, angles = index.shape
+    colors = [_hex(color) for color in PRINTS]
+    return _message("prints", {"layer": k, "heights": heights, "angles": angles, "colors": colors}, index)
+
+
+def _layer_look(layer: Layer) -> dict[str, Any]:
+    """What is said of a map of the stack; ``rolls`` are those that can serve, as bits."""
+    either = layer.roll is RollChoice.EITHER
+    return {
+        "kind": layer.kind,
+        "title": layer.title,
+        "delta": layer.turn,
+        "planned": layer.planned,
+        "marks": [[mark.h, float(wrap(mark.theta)), mark.label] for mark in layer.marks],
+        "step": layer.step,
+        "hand": layer.hand,
+        "group": layer.group,
+        "rolls": 3 if either else 1 << list(RollChoice).index(layer.roll) - 1,
+        "shown": layer.is_shown,
+        "color": _hex(PRINTS[hand_color(layer.hand)]) if layer.prints else None,
+        "picked": None,
+        "holds": [],
+        "stale": False,
+    }
+
+
+def _apart(state: State, layers: Sequence[Layer]) -> dict[str, Any]:
+    """Say how far the prints of the task that is shown are apart, where its hands are in the stack."""
+    moved = state.plan_results.by_hand is not None or bool(state.plan_results.turns)
+    said: dict[str, Any] = {"moved": moved}
+    if any(layer.kind is LayerKind.HAND for layer in layers):
+        if state.climb_step:
+            cells = state.climb_step.collisions
+            said["apart"] = f"prints share {cells} cells" if cells else "prints are apart"
+        else:
+            said["apart"] = apart_text(state, state.plan_results.nearest)
+    return said
 
 
 def _look(state: State) -> dict[str, Any]:

@@ -14,7 +14,7 @@ STEPS_KEPT = 100
 """How many steps can be undone."""
 
 DRAG_PAUSE = 0.8
-"""Changes of the same value less than this time (s) apart belong to one drag."""
+"""Changes of the same value less than this time (s) apart belong to one drag, pressed or not."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,16 @@ class Drag:
     Attributes:
         values: names of the values that it changes.
         time: of its last change (s).
+        press: number of the press of the pointer that it goes on with; 0 where none is known.
     """
 
     values: frozenset[object]
     time: float
+    press: int = 0
 
-    def includes(self, values: frozenset[object], time: float) -> bool:
-        """Return whether a change of these values at a time (s) belongs to it."""
-        return values <= self.values and 0 <= time - self.time < DRAG_PAUSE
+    def includes(self, values: frozenset[object], time: float, press: int) -> bool:
+        """Return whether a change of these values at a time (s) belongs to it, in a press or in none (0)."""
+        return values <= self.values and (0 < press == self.press or 0 <= time - self.time < DRAG_PAUSE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +57,7 @@ class History(Generic[T]):
         time: float,
         *,
         dragged: bool,
+        press: int = 0,
     ) -> History[T]:
         """Return the history after a change: with a new step, unless the change belongs to the present drag.
 
@@ -63,11 +66,12 @@ class History(Generic[T]):
             values: names of the changed values.
             time: when (s) they changed.
             dragged: whether the change may be part of a drag.
+            press: number of the press of the pointer under way; 0 for none.
         """
-        if dragged and self.drag and self.drag.includes(values, time):
-            return replace(self, drag=Drag(self.drag.values, time))
+        if dragged and self.drag and self.drag.includes(values, time, press):
+            return replace(self, drag=Drag(self.drag.values, time, press or self.drag.press))
         past = (*self.past, before())[-STEPS_KEPT:]
-        return History(past, (), Drag(values, time) if dragged else None)
+        return History(past, (), Drag(values, time, press) if dragged else None)
 
     def undone(self, present: T) -> tuple[T, History[T]] | None:
         """Return the state before the present one with its history, or None at the beginning."""

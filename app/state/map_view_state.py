@@ -58,6 +58,7 @@ class MapViewState:
         comparison: the newest result of that.
         explained: the candidates of the cell that was picked last.
         candidate: index of the candidate shown; None for the default, see `State.candidate`.
+        rolls_apart: whether each roll has a map of its own as well.
         hovered: the cell of the unshifted map that is pointed at.
     """
 
@@ -68,12 +69,15 @@ class MapViewState:
     comparison: Comparison | None = None
     explained: ExplainResult | None = None
     candidate: int | None = None
+    rolls_apart: bool = False
     hovered: Cell | None = None
 
     @property
     def input_values(self) -> tuple[object, ...]:
         """Everything that widgets show and can change."""
-        return self.roll, self.color_by, self.handprint, self.compare, self.candidate
+        return (
+            self.roll, self.color_by, self.handprint, self.compare, self.candidate, self.rolls_apart,
+        )  # fmt: skip
 
     def missing_request(self, request: MapRequest, delta: float, cell: Cell | None) -> Request | None:
         """Return the first request about a map whose result is missing.
@@ -114,7 +118,12 @@ class MapViewState:
 
     def for_another_scene(self) -> MapViewState:
         """Return it for another scene: both rolls, the same display options, nothing computed."""
-        return MapViewState(color_by=self.color_by, handprint=self.handprint, compare=self.compare)
+        return MapViewState(
+            color_by=self.color_by,
+            handprint=self.handprint,
+            compare=self.compare,
+            rolls_apart=self.rolls_apart,
+        )
 
     def for_another_cell(self) -> MapViewState:
         """Return it for another picked cell: the default candidate."""

@@ -7,18 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from symgrasp.feasibility.cell import Cell
 from symgrasp.motion.record import from_plan
+from symgrasp.object.manifold import ROLLS
 from symgrasp.plan.plan import Plan
 
-from .plan_results import PlanResult, PlanResults
+from .plan_results import HandsByHand, PlanResult, PlanResults
 from .state import Pick, State
 
 __all__ = [
+    "as_planned",
     "change_plan_results",
     "choose_plan",
     "choose_speed",
+    "hand_cells",
     "more_listed",
     "motion_found",
+    "move_hand",
     "play_arms",
     "play_climb",
     "played",
@@ -26,6 +31,7 @@ __all__ = [
     "show_position",
     "show_results",
     "show_step",
+    "slide_map",
     "sort_solutions",
 ]
 
@@ -84,6 +90,52 @@ def show_position(state: State, position: float) -> State:
         result=results.maps[task.name, hold.arm],
         problem="",
     )
+
+
+def slide_map(state: State, k: int, delta: float) -> State:
+    """Slide the map of the k-th task by δ (rad), by hand: the object of that task is turned by it."""
+    results = state.plan_results
+    after = show_step(state, k)
+    if state.plan is None:  # maps without a common grasp
+        names = [task for task, _ in results.maps]
+        after = replace(state, task=names[k], arm=[arm for _, arm in results.maps][k], step=None)
+    turns = {**results.turns, k: delta}
+    return replace(
+        after, delta=delta, step=None, plan_results=replace(after.plan_results, turns=turns, playing="")
+    )
+
+
+def hand_cells(state: State, k: int) -> tuple[Cell, ...]:
+    """Return where the hands of the k-th task of a plan are, over the grid in the object's frame."""
+    results, grid = state.plan_results, state.scene.manifold
+    if results.by_hand and results.by_hand.step == k:
+        return results.by_hand.cells
+    if state.climb_step and state.plan and state.plan.plan.tasks[k].name == state.task:
+        return state.climb_step.cells
+    holds = state.plan.plan.tasks[k].holds if state.plan else ()
+    return tuple(
+        Cell(ROLLS.index(hold.grasp.roll), *grid.cell(hold.grasp.h, hold.grasp.theta)) for hold in holds
+    )
+
+
+def move_hand(state: State, k: int, hand: int, row: int, column: int) -> State:
+    """Move a hand of the k-th task of a plan to a cell of the grid in the object's frame, by hand."""
+    cells = list(hand_cells(state, k))
+    cells[hand] = Cell(cells[hand].roll, row, column)
+    after = show_step(state, k)
+    if after.plan is None:
+        return state
+    grid, name = state.scene.manifold, after.plan.plan.tasks[k].holds[hand].arm
+    pick = Pick(float(grid.h[row]), float(grid.theta[column]), cells[hand].roll)
+    results = replace(after.plan_results, by_hand=HandsByHand(k, tuple(cells)), playing="")
+    result = results.maps[after.task, name]
+    return replace(after, plan_results=results, pick=pick, arm=name, result=result)
+
+
+def as_planned(state: State) -> State:
+    """Put maps and hands that a person moved back to where the plan has them."""
+    after = change_plan_results(state, PlanResults.as_planned)
+    return show_step(after, after.plan_results.nearest)
 
 
 def motion_found(state: State, index: int, plan: Plan, motionless: tuple[str, ...] = ()) -> State:

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from symgrasp.feasibility.cell import Cell
 from symgrasp.motion.segments import Motion
 from symgrasp.plan.plan import Plan
 from symgrasp.planners.bimanual import ClimbStep
@@ -21,6 +22,7 @@ from .solution_order import PLANNED, SolutionOrder
 __all__ = [
     "FIRST_SEED",
     "ClimbReplay",
+    "HandsByHand",
     "PlanFileReport",
     "PlanKind",
     "PlanResult",
@@ -73,6 +75,19 @@ class PlanResult:
     def times(self) -> list[tuple[float, float]]:
         """See `task_times`; empty where there is no motion."""
         return task_times(self.plan, self.motion) if self.motion else []
+
+
+@dataclass(frozen=True)
+class HandsByHand:
+    """Where a person put the hands of a plan's task.
+
+    Attributes:
+        step: index of the task.
+        cells: of each hand, in the order of the task's holds, over the grid in the object's frame.
+    """
+
+    step: int
+    cells: tuple[Cell, ...]
 
 
 @dataclass(frozen=True)
@@ -146,6 +161,8 @@ class PlanResults:
         climb: the hill climbing, if that was the method.
         frame: index of its step that is shown.
         slide: share of each task's δ by which its map is shifted, 0 to 1.
+        turns: index of a task → δ (rad) by which a person slid its map instead.
+        by_hand: where a person put the hands of a task; None where they are as planned.
         position: of the playback: time (s) of a plan with a motion, else k at task k.
         speed: of the playback of a motion: seconds of it in a second.
         playing: what is being played.
@@ -166,6 +183,8 @@ class PlanResults:
     climb: ClimbReplay | None = None
     frame: int | None = None
     slide: float = 1.0
+    turns: Mapping[int, float] = field(default_factory=dict)
+    by_hand: HandsByHand | None = None
     position: float = 0.0
     speed: float = 1.0
     playing: Playing = ""
@@ -203,6 +222,11 @@ class PlanResults:
         left = (self.nearest + 0.5 - self.position) * SECONDS_PER_TASK
         return self.playing == "arms" and not moves and self.nearest < self.last and left < FADE
 
+    def turn(self, k: int) -> float:
+        """Return the angle (rad) by which the map of the k-th task is shifted."""
+        delta = self.plan.plan.tasks[k].delta if self.plan else 0.0
+        return self.turns.get(k, self.slide * delta)
+
     def position_of(self, step: int) -> float:
         """Return the position of the playback at a task by its index."""
         if self.plan and self.plan.motion:
@@ -214,7 +238,7 @@ class PlanResults:
         """All values that widgets show and can change."""
         return (
             self.sequence_method, self.hands_method, self.seed, self.index, self.plans, self.frame,
-            self.slide, self.position, self.speed, self.climb,
+            self.slide, self.position, self.speed, self.climb, self.turns, self.by_hand,
         )  # fmt: skip
 
     # -- changes ----------------------------------------------------------------------------
@@ -261,18 +285,29 @@ class PlanResults:
 
     def at_plan(self, index: int) -> PlanResults:
         """Show another plan of the list by its index."""
-        return replace(self, index=int(np.clip(index, 0, len(self.plans) - 1))) if self.plans else self
+        index = int(np.clip(index, 0, len(self.plans) - 1))
+        return replace(self.as_planned(), index=index) if self.plans else self
 
     def at_position(self, position: float) -> PlanResults:
         """Move the playback to a position."""
         position = float(np.clip(position, 0.0, self.end)) if np.isfinite(position) else self.position
-        return replace(self, position=position, frame=None)
+        stays = position == self.position and self.frame is None
+        return replace(self, position=position, frame=None, by_hand=self.by_hand if stays else None)
 
     def at_frame(self, frame: int) -> PlanResults:
         """Show a step of the climb by its index."""
         if self.climb is None:
             return self
-        return replace(self, frame=int(np.clip(frame, 0, len(self.climb.steps) - 1)))
+        frame = int(np.clip(frame, 0, len(self.climb.steps) - 1))
+        return replace(self, frame=frame, by_hand=None)
+
+    def as_planned(self) -> PlanResults:
+        """Put maps and hands that a person moved back to where the plan has them."""
+        return replace(self, turns={}, by_hand=None)
+
+    def slid(self, share: float) -> PlanResults:
+        """Shift the maps of all tasks by a share of their δ."""
+        return replace(self, slide=share, turns={})
 
     def play_arms(self) -> PlanResults:
         """Start or pause the playback of the plan; at its end it restarts."""

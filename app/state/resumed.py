@@ -15,6 +15,7 @@ def resumed(state: State) -> State:
         state,
         busy=None,
         problem="",
+        press=0,
         map_view=replace(state.map_view, hovered=None),
         plan_results=state.plan_results.paused(),
         survey=replace(state.survey, run=None),

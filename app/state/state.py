@@ -81,6 +81,7 @@ class State:
         problem: one line about the last error.
         display: display options of the page.
         link: the link that was made last.
+        press: number of the press of the pointer under way on the page; 0 for none.
         history: what can be undone and redone.
     """
 
@@ -109,6 +110,7 @@ class State:
     problem: str = ""
     display: Display = field(default_factory=Display)
     link: PageLink | None = None
+    press: int = 0
     history: History[State] = field(default_factory=History)
 
     @staticmethod

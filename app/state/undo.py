@@ -31,8 +31,8 @@ def remember(before: State, after: State, origin: str, time: float) -> State:
     Args:
         before: the state that was changed.
         after: the changed one.
-        origin: "inputs", "gizmo", "map" or "scrub" if the change may be part of a drag; "play" for the
-            playback, which is not recorded.
+        origin: "inputs", "gizmo", "scrub" or what begins with "map" if the change may be part of a drag;
+            "play" for the playback, which is not recorded.
         time: of the change (s), by a monotonic clock.
     """
     if after.history is not before.history:  # the change was an undo or a redo
@@ -40,7 +40,9 @@ def remember(before: State, after: State, origin: str, time: float) -> State:
     if after.input_values == before.input_values or origin == "play":
         return after
     values = _changed_values(before, after, origin)
-    history = before.history.recorded(lambda: _without_results(before), values, time, dragged=bool(origin))
+    history = before.history.recorded(
+        lambda: _without_results(before), values, time, dragged=bool(origin), press=before.press
+    )
     if history.past is not before.history.past:
         history = replace(history, past=_with_few_plans(_with_few_uploads(history.past)))
     return replace(after, history=history)
@@ -59,8 +61,8 @@ def redo(state: State) -> State:
 
 
 def _changed_values(before: State, after: State, origin: str) -> frozenset[object]:
-    """Return names for the changed values; gizmo and scrubbers count as one, as they change several."""
-    if origin in ("gizmo", "scrub"):
+    """Return names for the changed values; those of a drag that changes several count as one."""
+    if origin in ("gizmo", "scrub") or origin.startswith("map"):
         return frozenset([origin])
     pairs = zip(before.input_values, after.input_values, strict=True)
     return frozenset(k for k, (old, new) in enumerate(pairs) if old != new)
@@ -112,4 +114,5 @@ def _restored(present: State, restored: State, history: History[State]) -> State
         plan_results=restored.plan_results.paused(),
         link=present.link,
         survey=present.survey,
+        press=present.press,
     )

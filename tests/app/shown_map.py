@@ -34,7 +34,8 @@ class ShownMap:
         """Take a message; see `app.shell.map_parts`."""
         length = int.from_bytes(message[:4], "little")
         head = json.loads(message[4 : 4 + length])
-        self._arrived[head["kind"]] = head, message[4 + length :]
+        kind = f"{head['kind']} {head['layer']}" if "layer" in head else head["kind"]
+        self._arrived[kind] = head, message[4 + length :]
         if head["kind"] != "look":
             return
         self._heads |= {kind: head for kind, (head, _) in self._arrived.items()}
@@ -73,17 +74,31 @@ class ShownMap:
 
     def picture(self) -> np.ndarray | None:
         """The colours (H, COLUMNS, 3) of the map, the highest cells first; None while there is none."""
-        head = self._heads.get("cells")
+        return self._picture("cells", self.look)
+
+    def layer(self, k: int) -> np.ndarray:
+        """The colours of a map of the stack."""
+        picture = self._picture(f"cells {k}", self.look["layers"][k])
+        assert picture is not None
+        return picture
+
+    def layer_prints(self, k: int) -> np.ndarray:
+        """The hand (H, A) that is over each cell of a map of the stack, as an index into the colours."""
+        head = self._heads[f"prints {k}"]
+        return np.frombuffer(self._data[f"prints {k}"], np.uint8).reshape(head["heights"], head["angles"])
+
+    def _picture(self, kind: str, look: dict[str, Any]) -> np.ndarray | None:
+        head = self._heads.get(kind)
         if not head or not head["heights"]:
             return None
         size = head["heights"] * head["angles"]
-        data = np.frombuffer(self._data["cells"], np.uint8)
-        assert len(data) == 5 * size
+        data = np.frombuffer(self._data[kind], np.uint8)
+        assert len(data) == 6 * size
         index = data[2 * size : 3 * size].reshape(head["heights"], head["angles"])
-        theta = -np.pi + (np.arange(COLUMNS) + 0.5) * (2 * np.pi / COLUMNS) + self.look["delta"]
+        theta = -np.pi + (np.arange(COLUMNS) + 0.5) * (2 * np.pi / COLUMNS) + look["delta"]
         share = np.mod(theta - head["start"], 2 * np.pi) / (2 * np.pi)
         colors = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in head["colors"]])
-        if self.look["stale"]:
+        if look["stale"]:
             colors = np.round(0.3 * colors + 0.7 * GREY)
         columns = np.floor(share * head["angles"]).astype(int) % head["angles"]
         return colors.astype(np.uint8)[index[::-1, columns]]

@@ -3,6 +3,8 @@ import { TURN, mod } from "./frame.js";
 
 const FONT = "11px system-ui, sans-serif";
 const ROOM = { left: 46, bottom: 38, top: 10, right: 12, profile: 64 };
+const STRIP = { ...ROOM, bottom: 17, top: 4 }; // of several maps below each other
+const NAMED = 64; // height (px) from which on an upward axis has its name
 const GREY = [236, 238, 241];
 
 /** A canvas with one pixel a cell, lowest θ left and highest h on top. */
@@ -30,8 +32,8 @@ export function layout(pane) {
     canvas.height = Math.round(height * ratio);
   }
   const around = cells ? TURN * Math.max(...cells.profile.map(([, r]) => r)) : 1;
-  const lying = Boolean(cells) && cells.high - cells.low > around === width > height && width !== height && cells.high - cells.low > 1.25 * around;
-  const { left, bottom, top, right, profile } = ROOM;
+  const lying = Boolean(cells) && pane.lies && cells.high - cells.low > around === width > height && width !== height && cells.high - cells.low > 1.25 * around;
+  const { left, bottom, top, right } = pane.strip ? STRIP : ROOM, profile = lying && pane.strip ? 0 : ROOM.profile;
   frame.place(left, top + (lying ? profile : 0), Math.max(20, width - left - right - (lying ? 0 : profile)),
     Math.max(20, height - top - bottom - (lying ? profile : 0)), lying);
 }
@@ -65,7 +67,7 @@ export function draw(pane) {
   context.lineWidth = 1;
   context.strokeRect(x - 0.5, y - 0.5, width + 1, height + 1);
   axes(context, pane);
-  profile(context, pane);
+  if (!(pane.strip && frame.lying)) profile(context, pane);
 }
 
 /** Draw a picture of all cells that begins at a share of the turn, and goes on from its other end. */
@@ -125,7 +127,7 @@ function drawMark(context, { frame, cells, style }, [h, theta, label]) {
 
 // -- axes -----------------------------------------------------------------------------------------
 
-function axes(context, { frame, cells, style }) {
+function axes(context, { frame, cells, style, strip }) {
   const { x, y, width, height, lying, span, u0, v0 } = frame;
   const low = 100 * cells.low, high = 100 * cells.high;
   const across = lying
@@ -141,7 +143,7 @@ function axes(context, { frame, cells, style }) {
   for (const tick of ticks(across, width / 48)) {
     context.fillText(label(tick), x + ((tick - across.from) / (across.to - across.from)) * width, y + height + 4);
   }
-  context.fillText(across.name, x + width / 2, y + height + 20);
+  if (!strip) context.fillText(across.name, x + width / 2, y + height + 20);
   context.textAlign = "right";
   context.textBaseline = "middle";
   for (const tick of ticks(upwards, height / 28)) {
@@ -151,7 +153,7 @@ function axes(context, { frame, cells, style }) {
   context.translate(9, y + height / 2);
   context.rotate(-Math.PI / 2);
   context.textAlign = "center";
-  context.fillText(upwards.name, 0, 0);
+  if (height >= NAMED) context.fillText(upwards.name, 0, 0);
   context.restore();
 }
 

@@ -1,7 +1,10 @@
 /* The websocket of the map: opened again whenever it closes. */
 const FIRST_PAUSE = 200, LONGEST_PAUSE = 3000, INTERVAL = 25;
 /** Commands of which only the newest counts, sent at most every INTERVAL ms. */
-const VALUES = { turn: "turn", hover: "hover", leave: "hover" };
+const VALUES = {
+  turn: () => "turn", hover: () => "hover", leave: () => "hover",
+  slide: ({ step }) => `slide ${step}`, move: ({ step, hand }) => `move ${step} ${hand}`,
+};
 
 export class Link {
   /**
@@ -33,7 +36,7 @@ export class Link {
   }
 
   send(command) {
-    const value = VALUES[command.do];
+    const value = VALUES[command.do]?.(command);
     if (!value) {
       this.flush(); // what came before it goes before it
       this.post(command);

@@ -5,22 +5,25 @@ import { draw, layout, texture } from "./drawing.js";
 const CLICK = 5; // how far (px) a pointer may move in a click
 const STEP = Math.PI / 720; // that of the slider (rad)
 const UNKNOWN = 0xffff;
-const degrees = (angle) => (angle * 360) / TURN;
-const wrap = (angle) => mod(angle + Math.PI, TURN) - Math.PI;
+export const degrees = (angle) => (angle * 360) / TURN;
+export const wrap = (angle) => mod(angle + Math.PI, TURN) - Math.PI;
 
 export class MapPane {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {{send: (command: object) => void, say: (text: string) => void, speak: (text: string) => void,
-   *   turned: (text: string) => void}} on
+   *   turned: (text: string) => void, move?: (hand: number, row: number, column: number) => void}} on move is
+   *   called where prints of hands are dragged
    */
   constructor(canvas, on) {
     this.canvas = canvas;
     this.on = on;
     this.frame = new Frame();
     this.pointers = new Map();
-    this.arrived = [];
     this.cells = this.prints = this.look = this.own = this.hovered = this.awaited = null;
+    this.strip = false; // one of several below each other: axes without names
+    this.lies = true; // a long object lies along the longer side
+    this.fixed = false; // cannot be turned
     new ResizeObserver(() => this.redraw()).observe(canvas);
     matchMedia("(resolution: 1dppx)").addEventListener("change", () => this.redraw());
     const listen = (name, act) => canvas.addEventListener(name, act.bind(this));
@@ -44,15 +47,7 @@ export class MapPane {
     return this.own ?? this.look?.delta ?? 0;
   }
 
-  /** Keep a message; all of them are shown with the next look. */
-  take(head, data) {
-    this.arrived.push([head, data]);
-    if (head.kind !== "look") return false;
-    for (const message of this.arrived.splice(0)) this.apply(...message);
-    this.redraw();
-    return true;
-  }
-
+  /** Take a message. */
   apply(head, data) {
     const size = head.heights * head.angles;
     if (head.kind === "cells") {
@@ -62,6 +57,7 @@ export class MapPane {
         index: new Uint8Array(data, 2 * size, size),
         reason: new Uint8Array(data, 3 * size, size),
         roll: new Uint8Array(data, 4 * size, size),
+        rolls: new Uint8Array(data, 5 * size, size),
       } : null;
       this.awaited = null;
       if (this.cells) this.picture = texture(this.cells, this.cells.index, this.cells.colors);
@@ -70,8 +66,7 @@ export class MapPane {
       if (this.prints) this.shade = texture(head, this.prints.index, head.colors, 205);
     } else {
       this.look = head;
-      if (!this.drag && this.own !== null && Math.abs(wrap(head.delta - this.own)) < 1e-6) this.own = null;
-      this.on.turned(`turned by ${degrees(this.delta).toFixed(2)}°`);
+      this.settle();
       this.canvas.setAttribute("aria-label", `Unwrapped map: ${head.title}`);
       if (this.awaited && String(head.picked) === String(this.awaited)) {
         this.awaited = null;
@@ -132,7 +127,8 @@ export class MapPane {
     this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
     const inside = this.frame.contains(event.offsetX, event.offsetY);
     this.drag = this.pointers.size === 1 && inside && this.cells
-      ? { id: event.pointerId, x: event.offsetX, y: event.offsetY, delta: this.delta, moves: false }
+      ? { id: event.pointerId, x: event.offsetX, y: event.offsetY, delta: this.delta, moves: false,
+        hand: this.handAt(event.offsetX, event.offsetY) }
       : null;
   }
 
@@ -154,8 +150,42 @@ export class MapPane {
     if (!drag.moves) return;
     this.hover(null);
     const [u1, v1] = this.frame.toMap(drag.x, drag.y), [u, v] = this.frame.toMap(x, y);
+    if (drag.hand) {
+      const { hand, row, column } = drag.hand;
+      this.carry(hand, row + Math.round((v - v1) * this.prints.heights), column + Math.round((u - u1) * this.prints.angles));
+      return;
+    }
+    if (this.prints && this.on.move || this.fixed) return;
     this.turn(drag.delta - (u - u1) * TURN);
     if (this.frame.span < 1) this.frame.pan(0, this.frame.toMap(...before)[1] - v);
+  }
+
+  /** The hand whose print is at a point of the canvas, with its cell in the frame of the turned object. */
+  handAt(x, y) {
+    if (!this.on.move || !this.prints) return null;
+    const { heights, angles, index } = this.prints, [u, v] = this.frame.toMap(x, y);
+    const row = Math.min(heights - 1, Math.floor(v * heights)), column = Math.min(angles - 1, Math.floor(u * angles));
+    if (!index[row * angles + column]) return null;
+    const cells = this.look.marks.map((mark) => this.cellOf(mark));
+    const apart = ([i, j]) => Math.hypot(i - row, mod(j - column + angles / 2, angles) - angles / 2);
+    const hand = cells.reduce((best, cell, k) => (apart(cell) < apart(cells[best]) ? k : best), 0);
+    return { hand, row: cells[hand][0], column: cells[hand][1] };
+  }
+
+  /** The cell [row, column] of a grasp in the frame of the turned object. */
+  cellOf([h, theta]) {
+    const { heights, angles } = this.prints, { low, high } = this.cells;
+    const row = Math.floor(((h - low) / (high - low)) * heights), turn = mod(theta + Math.PI, TURN);
+    return [Math.min(heights - 1, Math.max(0, row)), Math.min(angles - 1, Math.floor((turn * angles) / TURN))];
+  }
+
+  /** Move a hand to a cell in the frame of the turned object. */
+  carry(hand, row, column) {
+    const { heights, angles } = this.prints;
+    const cell = [hand, Math.min(heights - 1, Math.max(0, row)), mod(column, angles)];
+    if (String(cell) === String(this.carried)) return;
+    this.carried = cell;
+    this.on.move(...cell);
   }
 
   pinched(id, before, now) {
@@ -171,9 +201,20 @@ export class MapPane {
     const drag = this.drag;
     this.pointers.delete(event.pointerId);
     if (drag?.id !== event.pointerId) return;
-    this.drag = null;
+    this.drag = this.carried = null;
     if (!drag.moves) this.pick(this.cellAt(event.offsetX, event.offsetY));
-    else setTimeout(() => { if (!this.drag) { this.own = null; this.redraw(); } }, 1500); // the server's again
+    else {
+      this.settle();
+      setTimeout(() => this.settle(true), 1500);
+    }
+  }
+
+  /** Take the server's turn again once it is that of the last drag, or anyway. */
+  settle(anyway = false) {
+    const answered = this.own !== null && Math.abs(wrap(this.look.delta - this.own)) < 1e-6;
+    if (!this.drag && (anyway || answered)) this.own = null;
+    this.on.turned(`turned by ${degrees(this.delta).toFixed(2)}°`);
+    this.redraw();
   }
 
   cancelled(event) {
@@ -233,13 +274,21 @@ export class MapPane {
       this.frame.reset();
     } else if (right || up) {
       const [around, along] = this.frame.lying ? [up, right] : [right, up];
-      if (event.shiftKey) this.turn(this.delta - around * 4 * STEP);
+      if (this.fixed) return;
+      if (this.on.move && this.prints) this.stepHand(along, around);
+      else if (event.shiftKey || this.strip) this.turn(this.delta - around * 4 * STEP);
       else this.step(along, around);
     } else {
       return;
     }
     event.preventDefault();
     this.redraw();
+  }
+
+  stepHand(along, around) {
+    const { hand, marks } = this.look, [row, column] = this.cellOf(marks[hand]);
+    this.carried = null;
+    this.carry(hand, row + along, column + around);
   }
 
   step(along, around) {

@@ -1,5 +1,6 @@
 /* The page: makes the token that ties map and view together, and hands what one says to the other. */
 import { Link } from "./link.js";
+import { Layers } from "./layers.js";
 import { MapPane } from "./map_pane.js";
 import { describe } from "./legend.js";
 import { watchPlaces } from "./places.js";
@@ -21,13 +22,35 @@ const pane = new MapPane(canvas, {
   speak: (text) => { element("spoken").textContent = text; },
   turned: (text) => { element("turn").textContent = text; },
 });
+/* What changes while a pointer is down, here or in the view, is one drag. */
+let presses = 0;
+function watchPresses(target) {
+  target.addEventListener("pointerdown", () => link.send({ do: "press", number: ++presses }), true);
+  for (const name of ["pointerup", "pointercancel"]) {
+    target.addEventListener(name, () => link.send({ do: "release" }), true);
+  }
+}
+watchPresses(window);
+view.addEventListener("load", () => watchPresses(view.contentWindow));
+
+const layers = new Layers(element, {
+  send: (command) => link.send(command),
+  say: (text) => { element("readout").textContent = text; },
+});
+const arrived = [];
 const link = new Link(`/map/${visit.token}`, {
   message: (head, data) => {
     visit.remember();
-    if (!pane.take(head, data)) return;
+    arrived.push([head, data]);
+    if (head.kind !== "look") return;
+    for (const message of arrived.splice(0)) { // all of them are shown with the look
+      if (message[0].layer === undefined) pane.apply(...message);
+      if (message[0].layer !== undefined || message[0] === head) layers.take(...message);
+    }
     element("nothing").hidden = pane.hasMap;
     document.documentElement.dataset.theme = head.dark ? "dark" : "light";
     pane.restyle();
+    layers.restyle();
     describe(element, pane);
   },
   closed: () => {

@@ -6,10 +6,7 @@ import gc
 import weakref
 from dataclasses import replace
 
-import numpy as np
-
 from app.html.map import map_html
-from app.html.stack import shared_columns, stack_html
 from app.render.cell_colors import cell_colors
 from app.render.prints import shown_prints
 from app.render.weak_cache import cached_with_first
@@ -17,8 +14,6 @@ from app.shell.map_parts import map_parts
 from app.state import plan_changes
 from app.state.map_view_state import RollChoice
 from app.state.plan_results import PlanResults
-from app.state.state import State
-from symgrasp.object.manifold import ROLLS
 from tests.app.state.test_state import opened, planned
 
 
@@ -62,8 +57,6 @@ def drawn() -> list[weakref.ref[object]]:
     state = plan_changes.show_results(state, results_of_its_own())
     state = replace(state, map_view=replace(state.map_view, handprint=True))
     assert state.map
-    for slide in (0.5, 1.0):
-        stack_html(replace(state, plan_results=replace(state.plan_results, slide=slide)))
     map_html(state.map, RollChoice.EITHER)
     map_parts(state)
     cell_colors(state, state.map)
@@ -76,16 +69,3 @@ def test_no_picture_keeps_the_maps_and_the_scene_of_a_closed_page():
     drawn_from = drawn()
     gc.collect()
     assert [reference() for reference in drawn_from] == [None] * 5
-
-
-def test_cells_that_serve_all_tasks_are_those_of_the_turned_maps():
-    state: State = opened("pick_pour_place")
-    m = state.result.map if state.result else None
-    assert m
-    turns = (0.3, -1.7)
-    for roll in range(len(ROLLS)):
-        both = [shared_columns((m,), (turn,), roll) for turn in turns]
-        for turn, columns in zip(turns, both, strict=True):
-            turned = m.shift(turn)
-            assert np.array_equal(columns, shared_columns((turned,), (0.0,), roll))
-        assert np.array_equal(shared_columns((m, m), turns, roll), both[0] & both[1])

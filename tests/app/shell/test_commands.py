@@ -10,6 +10,7 @@ import pytest
 from app.scene3d.ghost import ghost
 from app.shell.commands import LONGEST, decode
 from app.state import changes
+from app.state.history import DRAG_PAUSE
 from app.state.state import State
 from app.state.undo import remember, undo
 from symgrasp.reason import Reason
@@ -95,9 +96,37 @@ def test_a_cell_that_the_map_does_not_have_is_ignored(deed):
         "", "[]", "{}", "null", '{"do":"quit"}', '{"do":"turn"}', '{"do":"turn","delta":"1"}',
         '{"do":"turn","delta":1e9}', '{"do":"turn","delta":NaN}', '{"do":"pick","row":-1,"column":0}',
         '{"do":"pick","row":1.5,"column":0}', '{"do":"pick","row":0,"column":0,"more":1}', b"{}",
-        '{"do":"leave"' + " " * LONGEST + "}", '{"do":"place","index":-1}',
+        '{"do":"leave"' + " " * LONGEST + "}", '{"do":"press"}', '{"do":"press","number":0}',
+        '{"do":"slide","step":-1,"delta":0}', '{"do":"move","step":0,"hand":0,"row":0,"column":70000}',
+        '{"do":"pick","row":0,"column":0,"roll":2}', '{"do":"place","index":-1}',
     ],
 )  # fmt: skip
 def test_anything_else_is_an_error(message):
     with pytest.raises(ValueError, match=r"."):
         decode(message)
+
+
+@pytest.mark.parametrize("press", [True, False])
+def test_a_slow_drag_is_one_step_as_long_as_the_pointer_is_down(press):
+    state, time = opened(), 0.0
+    messages = [{"do": "press", "number": 7}] if press else []
+    messages += [{"do": "turn", "delta": 0.1 * k} for k in range(1, 4)]
+    for message in messages:
+        deed = decode(json.dumps(message))
+        time += 5 * DRAG_PAUSE
+        state = remember(state, deed.applied(state), deed.origin, time)
+    assert undo(state).delta == (0.0 if press else 0.2)
+
+
+def test_what_follows_a_release_is_another_step():
+    state, time = opened(), 0.0
+    for message in (
+        {"do": "press", "number": 1}, {"do": "turn", "delta": 0.1}, {"do": "release"},
+        {"do": "press", "number": 2}, {"do": "turn", "delta": 0.2}, {"do": "turn", "delta": 0.3},
+        {"do": "release"},
+    ):  # fmt: skip
+        deed = decode(json.dumps(message))
+        time += 5 * DRAG_PAUSE
+        state = remember(state, deed.applied(state), deed.origin, time)
+    assert (undo(state).delta, undo(undo(state)).delta) == (0.1, 0.0)
+    assert undo(state).press == state.press == 0
