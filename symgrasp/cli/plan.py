@@ -96,9 +96,11 @@ def _method(args: argparse.Namespace) -> Any:
 def _moving(args: argparse.Namespace, scene: Scene, method: Any, progress: Progress | None) -> Plan:
     """Return the plan with a motion that is asked for, and print why others have none."""
     from symgrasp.motion.choosing import best_motion, failures_in_words
-    from symgrasp.planners.planning import bimanual_plans, handover_plans, sequential_plans
+    from symgrasp.planners.planning import bimanual_plans, handover_plans, regrasp_plans, sequential_plans
 
-    if method != ALGORITHMS[args.kind][0]:
+    if method == "regrasp":
+        plans = regrasp_plans(scene, args.arm, progress=progress)
+    elif method != ALGORITHMS[args.kind][0]:
         plans = (_by_other_method(args, scene, method, progress) for _ in range(1))
     elif args.kind == "sequential":
         plans = sequential_plans(scene, args.arm, progress=progress)

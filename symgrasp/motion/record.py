@@ -65,7 +65,7 @@ def from_plan(plan: Plan, scene: Scene) -> Motion | None:
     """
     if plan.motion is None:
         return None
-    poses = {task.name: task.object_pose_turned.array() for task in plan.tasks}
+    poses = [task.object_pose_turned.array() for task in plan.tasks]
     segments = tuple(
         Segment(
             kind=segment.kind,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate
@@ -83,12 +83,12 @@ class Motion:
 
     Attributes:
         scene: the scene.
-        poses: task → pose (4, 4) of the object there, turned as the plan says.
+        poses: (4, 4) of the object in the tasks of the plan, turned as that says; at the first one it starts.
         segments: one after the other, at least one.
     """
 
     scene: Scene
-    poses: Mapping[str, Array]
+    poses: Sequence[Array]
     segments: tuple[Segment, ...]
 
     @cached_property
@@ -178,11 +178,11 @@ class Motion:
     @cached_property
     def _start_poses(self) -> tuple[Array, ...]:
         """Of each segment, the pose (4, 4) of the object where it starts."""
-        pose, found = self.poses[self.segments[0].task_from], []
+        pose, found = self.poses[0], []
         values = self._start_values
         for segment, start, end in zip(self.segments, values, (*values[1:], values[-1]), strict=True):
-            if not segment.held_by:  # where it was put down, exactly
-                pose = self.poses[segment.task_from]
+            if not segment.held_by:  # where it was put down, exactly: a task may be done at several turns
+                pose = min(self.poses, key=lambda T, last=pose: float(np.abs(T - last).max()))
             found.append(pose)
             pose = self._moved(segment, start, end) @ pose
         return tuple(found)

@@ -38,6 +38,7 @@ __all__ = [
     "plan_bimanual",
     "plan_handover",
     "plan_sequential",
+    "regrasp_plans",
     "sequential_maps",
     "sequential_plans",
     "tasks_of_plan",
@@ -80,15 +81,15 @@ def plan_sequential(
         ConflictError: no grasp serves all tasks; says which exclude each other.
         SceneError: no task is done by that arm alone.
     """
-    if method == "best":
-        return _best(sequential_plans(scene, arm, maps, progress))
+    if method != "first":
+        plans = sequential_plans if method == "best" else regrasp_plans
+        return _best(plans(scene, arm, maps, progress))
     name, tasks = _tasks_alone(scene, arm)
     with open_world(scene) as world:
         visits = _visits(world, tasks, maps, progress)
-        planner = first_grasp if method == "first" else with_regrasps
-        entries = planner(world, visits, name)
+        entries = first_grasp(world, visits, name)
         scene = _with_supports(world, tasks)
-    return write_plan(scene, "sequential", Planner(algorithm=method), entries)
+    return write_plan(scene, "sequential", Planner(algorithm="first"), entries)
 
 
 def sequential_plans(
@@ -109,6 +110,24 @@ def sequential_plans(
         scene = _with_supports(world, tasks)
         for entries, _ in holdings(world, visits, progress):
             yield write_plan(scene, "sequential", Planner(algorithm="best"), entries)
+
+
+def regrasp_plans(
+    scene: Scene,
+    arm: str | None = None,
+    maps: MapsByKey | None = None,
+    progress: Progress | None = None,
+) -> Plans:
+    """List the plans with the fewest grasps for all tasks that an arm does alone, the best of each first.
+
+    Arguments and errors are those of `plan_sequential`.
+    """
+    name, tasks = _tasks_alone(scene, arm)
+    with open_world(scene) as world:
+        visits = _visits(world, tasks, maps, progress)
+        scene = _with_supports(world, tasks)
+        for entries in with_regrasps(world, visits, name):
+            yield write_plan(scene, "sequential", Planner(algorithm="regrasp"), entries)
 
 
 def sequential_maps(

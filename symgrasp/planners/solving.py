@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
+from itertools import count, product
 from typing import NamedTuple
 
 import numpy as np
@@ -79,18 +79,19 @@ def _azimuth(held: Held) -> float:
     return held.configuration.arm.pitch_and_azimuth(held.configuration.q, roll)[1]
 
 
-def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> list[PlanTask]:
-    """Find the fewest grasps for a sequence of one arm, each the best for its tasks.
+def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> Iterator[list[PlanTask]]:
+    """Yield the fewest grasps for a sequence of one arm, first each the best for its tasks.
 
     A regrasp visits the task where the object is set down twice: at the end with the old grasp,
-    and at the beginning with the new one.
+    and at the beginning with the new one. The others follow in the order of the sum of their places in
+    the lists of grasps for their tasks, so that none of several grasps is kept for long.
 
     Args:
         world: a world of the scene.
         visits: every task once, in order.
         arm: the arm.
 
-    Returns:
+    Yields:
         The tasks as a plan states them, visits for a regrasp included.
 
     Raises:
@@ -101,7 +102,7 @@ def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> 
     segments = fewest_regrasps(maps, resting)
     if segments is None:
         raise ConflictError(find_conflict(maps, resting))
-    entries: list[PlanTask] = []
+    parts: list[list[TaskVisit]] = []
     entry: list[TaskVisit] = []
     for segment in segments:
         down = segment.set_down
@@ -109,9 +110,51 @@ def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> 
         part = [*(v for v in entry if v is not own[0]), *own]
         entry = [] if down is None else [visits[down]]
         part += (v for v in entry if v is not own[-1])
-        turned = entries[-1].delta if entries else 0.0  # the object stays as it was set down
-        entries += next(holdings(world, part, None, turned))[0]
-    return entries
+        parts.append(part)
+    chains = _Chains(world, parts)
+    for total in count():
+        found = False
+        for places in product(range(total + 1), repeat=len(parts)):
+            entries = chains.at(places) if sum(places) == total else None
+            if entries is not None:
+                found = True
+                yield entries
+        if not found:
+            return
+
+
+class _Chains:
+    """The grasps of parts of a sequence one after the other, found when asked for.
+
+    Args:
+        world: a world of the scene.
+        parts: the visits of each part; the object is where the one before has left it.
+    """
+
+    def __init__(self, world: BulletWorld, parts: Sequence[Sequence[TaskVisit]]) -> None:
+        self._world, self._parts = world, parts
+        self._further: dict[tuple[int, ...], Iterator[tuple[list[PlanTask], Planner]]] = {}
+        self._known: dict[tuple[int, ...], list[PlanTask] | None] = {(): []}
+
+    def at(self, places: tuple[int, ...]) -> list[PlanTask] | None:
+        """Return the tasks of the first few parts, None where there are not as many grasps.
+
+        Args:
+            places: of the grasp of each of these parts in the list of those that go on from the ones before.
+        """
+        if places not in self._known:
+            *_, last = places
+            before = self.at(places[:-1])
+            if before is None or (last and self.at((*places[:-1], last - 1)) is None):
+                self._known[places] = None
+                return None
+            if places[:-1] not in self._further:
+                turned = before[-1].delta if before else 0.0  # the object stays as it was set down
+                part = self._parts[len(places) - 1]
+                self._further[places[:-1]] = holdings(self._world, part, None, turned)
+            found = next(self._further[places[:-1]], None)
+            self._known[places] = None if found is None else [*before, *found[0]]
+        return self._known[places]
 
 
 def _resting(world: BulletWorld, visits: Sequence[TaskVisit]) -> list[int]:

@@ -30,7 +30,7 @@ def _read() -> tuple[Plan, Motion]:
         gripper = {name: tuple(opening) for name, opening in entry.pop("gripper").items()}
         held_by = tuple(entry.pop("held_by"))
         segments.append(Segment(arms=tuple(joints), joints=joints, gripper=gripper, held_by=held_by, **entry))
-    poses = {task.name: task.object_pose_turned.array() for task in plan.tasks}
+    poses = [task.object_pose_turned.array() for task in plan.tasks]
     return plan, timed(Motion(scene, poses, tuple(segments)))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from symgrasp.motion.segments import Motion, Segment
@@ -14,10 +16,10 @@ GRASPED = np.array([0.3, 0.2, 0.1, -1.9, 0.0, 2.1, 0.6])
 CARRIED = np.array([-0.5, 0.1, 0.2, -1.7, 0.2, 1.9, 0.1])
 
 
-def straight_motion(scene: Scene, poses: dict[str, Array]) -> Motion:
+def straight_motion(scene: Scene, poses: Sequence[Array]) -> Motion:
     """Return an untimed motion of the first arm, from home to a grasp and on with the object."""
     (name, arm), *_ = scene.arms.items()
-    first, last = poses
+    first, last = "pick", "place"
     return Motion(
         scene,
         poses,

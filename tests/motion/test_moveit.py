@@ -67,7 +67,7 @@ def test_the_planning_scene_has_the_bodies_where_they_are():
             else:
                 np.testing.assert_array_equal(size, shape.size)
     ((_, vertices, T),) = found[scene.file.object.name]
-    np.testing.assert_allclose(T, recorded_motion().poses["pick"], atol=1e-12)
+    np.testing.assert_allclose(T, recorded_motion().poses[0], atol=1e-12)
     assert np.hypot(*vertices[:, :2].T).max() == pytest.approx(scene.profile.points[:, 1].max())
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from symgrasp.motion.segments import Motion
-from symgrasp.poses import inverse, pose_error
+from symgrasp.poses import inverse, pose_error, rotation_z
 from symgrasp.scene.scene import Scene
 from tests.motion.straight import CARRIED, GRASPED, straight_motion
 
@@ -20,7 +20,7 @@ def timed() -> Motion:
     arm = scene.arm()
     start = scene.task().T_world_object
     carried = arm.world_tool_pose(CARRIED) @ inverse(arm.world_tool_pose(GRASPED)) @ start
-    motion = straight_motion(scene, {"pick": start, "place": carried})
+    motion = straight_motion(scene, [start, carried])
     segments = zip(motion.segments, TIMES, strict=True)
     return replace(
         motion,
@@ -60,16 +60,24 @@ def test_the_object_moves_with_the_hand_that_holds_it():
     motion = timed()
     arm = motion.scene.arm()
     start, end = motion.starts[3:]
-    in_hand = inverse(arm.world_tool_pose(GRASPED)) @ motion.poses["pick"]
+    in_hand = inverse(arm.world_tool_pose(GRASPED)) @ motion.poses[0]
     for t in np.linspace(start, end, 7):
         state = motion.at(t)
         q = state.values[arm.robot.name][arm.indices]
         distance, angle = pose_error(state.T_world_object, arm.world_tool_pose(q) @ in_hand)
         assert distance < 1e-9
         assert angle < 1e-9
-    distance, angle = pose_error(motion.at(end).T_world_object, motion.poses["place"])
+    distance, angle = pose_error(motion.at(end).T_world_object, motion.poses[1])
     assert distance < 1e-9
     assert angle < 1e-9
+
+
+def test_the_object_stays_as_it_was_put_down_where_a_task_is_done_at_two_turns():
+    motion = timed()
+    again = motion.poses[1] @ rotation_z(0.7)
+    wait = replace(motion.segments[0], task_from="place", task_to="place")
+    motion = replace(motion, poses=[*motion.poses, again], segments=(*motion.segments, wait))
+    np.testing.assert_array_equal(motion.at(motion.duration).T_world_object, motion.poses[1])
 
 
 def test_the_hand_opens_from_home_and_closes():

@@ -6,8 +6,10 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import jsonschema
@@ -22,7 +24,7 @@ from symgrasp.plan.verify import verify
 from symgrasp.planners.configurations import ConfigurationFinder
 from symgrasp.planners.conflicts import ConflictError, Shared
 from symgrasp.planners.gaps import PrintGaps
-from symgrasp.planners.planning import plan_bimanual, plan_handover, plan_sequential
+from symgrasp.planners.planning import plan_bimanual, plan_handover, plan_sequential, regrasp_plans
 from symgrasp.poses import from_position_quat, pose_error, rotation_z
 from symgrasp.reason import Reason
 from symgrasp.scene.format import MOST_TASKS, scene_schema
@@ -277,18 +279,21 @@ def test_methods():
     assert plan_sequential(scene, maps=maps, method="regrasp").tasks == best.tasks  # none is needed
 
 
-def test_a_regrasp_where_one_grasp_does_not_do():
-    """Pick only low, pour only high: set down at the place, where both are feasible."""
+def low_and_high():
+    """Return a scene and its maps, where picking is feasible only low on the bottle and pouring only high."""
     scene = load_small("pick_pour_place", 12, 24, 8)
     maps = {(task, "panda"): create_map(scene, task=task) for task in scene.tasks}
-
-    def only(task, rows):
+    for task, rows in (("pick", slice(0, 6)), ("pour", slice(6, 12))):
         m = maps[task, "panda"]
         reason = np.full_like(m.reason, Reason.UNREACHABLE)
         reason[:, rows] = m.reason[:, rows]
-        return {(task, "panda"): replace(m, reason=reason)}
+        maps[task, "panda"] = replace(m, reason=reason)
+    return scene, maps
 
-    maps |= only("pick", slice(0, 6)) | only("pour", slice(6, 12))
+
+def test_a_regrasp_where_one_grasp_does_not_do():
+    """Set down at the place, where both grasps are feasible."""
+    scene, maps = low_and_high()
     with pytest.raises(ConflictError, match="no grasp serves pick and pour") as caught:
         plan_sequential(scene, maps=maps)
     assert caught.value.conflict.regrasps == (Shared(("pick",), "place"), Shared(("pour", "place"), None))
@@ -299,6 +304,26 @@ def test_a_regrasp_where_one_grasp_does_not_do():
     down, up = (plan.tasks[k].object_pose_turned.array() for k in (1, 2))
     np.testing.assert_allclose(down, up, atol=1e-9)  # nobody turns it while it stands
     assert verify(plan).failures == []
+
+
+def test_plans_with_a_regrasp_end():
+    """Where one height is left for either grasp, plans combine their rolls, each combination once."""
+    scene, maps = low_and_high()
+    with closing(regrasp_plans(scene, maps=maps)) as plans:
+        first = next(plans)
+    for task, k in (("pick", 0), ("pour", -1)):
+        m, grasp = maps[task, "panda"], first.tasks[k].holds[0].grasp
+        row = int(np.abs(m.manifold.h - grasp.h).argmin())
+        reason = np.full_like(m.reason, Reason.UNREACHABLE)
+        reason[:, row] = m.reason[:, row]
+        maps[task, "panda"] = replace(m, reason=reason)
+    with closing(regrasp_plans(scene, maps=maps)) as plans:
+        found = list(plans)
+    rolls = [(plan.tasks[0].holds[0].grasp.roll, plan.tasks[-1].holds[0].grasp.roll) for plan in found]
+    assert found[0].tasks == first.tasks
+    assert len(rolls) > 1
+    assert all(verify(plan) for plan in found)
+    assert sorted(rolls) == sorted(product(*map(set, zip(*rolls, strict=True))))
 
 
 def test_progress_grows_to_the_end():

@@ -98,7 +98,7 @@ class MotionDraft:
         elif self._bodies.rests(self._course.state.T_world_object):
             self._release(task, list(held))
         self._decide_all(task)
-        poses = {task.name: task.object_pose_turned.array() for task in self._tasks}
+        poses = [task.object_pose_turned.array() for task in self._tasks]
         if self._progress:
             self._progress(1.0)
         return PlannedMotion(Motion(self._scene, poses, tuple(self._course.segments)), self._visits)

@@ -19,7 +19,7 @@ def motion_along(rows: Array, clearance: float, name: str = "bottle_on_table") -
     arm = scene.arm()
     pose = scene.task().T_world_object
     segment = Segment("reach", (arm.name,), {arm.name: rows}, None, {}, (), "pick", "pick", clearance)
-    return Motion(scene, {"pick": pose}, (segment,))
+    return Motion(scene, [pose], (segment,))
 
 
 def check_limits(motion: Motion) -> None:
@@ -85,7 +85,7 @@ def test_a_scene_sets_the_acceleration():
 def test_hands_take_their_time_and_arms_that_rest_stay():
     scene = Scene.load("bottle_on_table")
     pose = scene.task().T_world_object
-    motion = timed(straight_motion(scene, {"pick": pose, "place": pose}))
+    motion = timed(straight_motion(scene, [pose, pose]))
     for segment in motion.segments:
         if segment.kind in ("open", "close"):
             assert segment.duration == pytest.approx(GRIP_TIME, rel=1e-3)
@@ -104,6 +104,6 @@ def test_arms_move_together_and_share_a_torso_once():
     rows = {name: np.linspace(scene.arms[name].home, scene.arms[name].home + 0.2, 4) for name in names}
     pose = scene.task().T_world_object
     segment = Segment("reach", tuple(names), rows, None, {}, (), "pick", "pick", 0.01)
-    motion = timed(Motion(scene, {"pick": pose}, (segment,)))
+    motion = timed(Motion(scene, [pose], (segment,)))
     check_limits(motion)
     assert len({len(path) for path in motion.segments[0].joints.values()}) == 1
