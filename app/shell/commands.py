@@ -1,4 +1,4 @@
-"""What a person does with maps or a survey, as the page sends it: JSON with the name of the deed in ``do``."""
+"""What a person does with maps or a survey, as the page sends it: JSON, the name of the deed in ``do``."""
 
 from __future__ import annotations
 

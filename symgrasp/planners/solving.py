@@ -113,13 +113,16 @@ def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> 
         parts.append(part)
     chains = _Chains(world, parts)
     for total in count():
-        found = False
+        alive = False
         for places in product(range(total + 1), repeat=len(parts)):
-            entries = chains.at(places) if sum(places) == total else None
-            if entries is not None:
-                found = True
-                yield entries
-        if not found:
+            if sum(places) == total:
+                # Grasps of the first parts from which nothing goes on do not end the list.
+                firsts = (places[:n] for n in range(1, len(parts) + 1) if sum(places[:n]) == total)
+                alive = alive or any(chains.at(first) is not None for first in firsts)
+                entries = chains.at(places)
+                if entries is not None:
+                    yield entries
+        if not alive:
             return
 
 
