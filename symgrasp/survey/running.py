@@ -66,10 +66,13 @@ def run_survey(
     Raises:
         SurveyError: the store is another survey's, or the cluster cannot be reached or was lost.
     """
-    if create_store(Path(out), survey).missing():
+    store = create_store(Path(out), survey)
+    if store.missing():
         with cluster(workers, scheduler) as client:
             run_on(client, survey, out, progress)
-    elif progress:
+        return
+    store.remove_partial()  # the last run may have been killed after its last batch
+    if progress:
         progress(Done(survey.points, survey.points))
 
 
@@ -88,7 +91,8 @@ def run_on(
         SurveyError: the store is another survey's, or the cluster was lost.
     """
     path = Path(out).resolve()
-    missing = create_store(path, survey).missing()
+    store = create_store(path, survey)
+    missing = store.missing()
     total, left = survey.points, sum(_size(survey, batch) for batch in missing)
     if progress:
         progress(Done(total - left, total))
@@ -103,6 +107,7 @@ def run_on(
             progress(Done(total - left, total))
         if following := next(waiting, None):
             running.add(following)
+    store.remove_partial()  # what killed workers, and earlier runs that were killed, have left
 
 
 def plan_margins_on(

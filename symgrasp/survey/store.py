@@ -105,6 +105,11 @@ class SurveyStore:
         """Return the batches that are not computed, or cannot be read."""
         return [batch for batch in range(self.survey.batches) if not self._is_whole(batch)]
 
+    def remove_partial(self) -> None:
+        """Remove chunks that were not written to their end; for when nothing is being written."""
+        for path in self._path.rglob("*.partial"):  # zarr writes a chunk there, and then renames it
+            path.unlink(missing_ok=True)
+
     def _is_whole(self, batch: int) -> bool:
         """Whether every chunk of a batch is there, as it was written."""
         region, where = self.survey.region(batch), np.unravel_index(batch, self.survey.batch_grid)

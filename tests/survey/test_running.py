@@ -145,11 +145,16 @@ def test_a_killed_run_goes_on(survey, file, one_go, tmp_path):
     program = [sys.executable, str(script), str(file), str(out)]
     assert subprocess.run(program, check=False).returncode == -signal.SIGKILL
     assert 0 < len(SurveyStore(out, survey).missing()) < survey.batches
+    half_written = out / "state/c/0.6b95ef98105947269c16cb8a41064e41.partial"  # as of a killed worker
+    half_written.touch()
     counts: list[Done] = []
     with threads(8) as cluster:
         run_survey(survey, out, scheduler=cluster.scheduler_address, progress=counts.append)
     assert counts[0].points > 0
     assert counts[-1] == (survey.points, survey.points)
+    assert content(out) == content(one_go)
+    half_written.touch()
+    run_survey(survey, out)
     assert content(out) == content(one_go)
 
 
