@@ -59,7 +59,8 @@ def run(args: argparse.Namespace) -> int:
         check_out(getattr(args, option), endings, f"--{option}")
     scene, task, arm = chosen(args)
 
-    from symgrasp.survey.success import PoseNoise, plan_for_success
+    from symgrasp.survey.evaluation import plan_margin
+    from symgrasp.survey.success import CONFIDENCE, PoseNoise, plan_for_success
 
     kind = "uniform" if args.uniform else "normal"
     noise = PoseNoise(args.position / 1e3, math.radians(args.tilt), kind, args.shared)
@@ -67,8 +68,10 @@ def run(args: argparse.Namespace) -> int:
         with progress_of("plan") as progress:
             found = plan_for_success(scene, noise, args.arm, args.samples, args.seed, progress)
         found.plan.save(args.plan)
-        p, e = 100 * found.probability, 100 * found.standard_error
-        say(f"{scene.name}: all tasks feasible with probability {p:.1f} ± {e:.1f} %")
+        low, high = (100 * p for p in found.interval)
+        say(f"{scene.name}: all tasks feasible at {100 * found.probability:.1f} % of {args.samples} draws")
+        say(f"  probability {low:.1f} to {high:.1f} % ({100 * CONFIDENCE:.0f} % confidence)")
+        say(f"  margin where the object is expected: {1e3 * plan_margin(found.plan, scene.profile):.1f} mm")
         say(f"written to {args.plan}")
         if not args.out:
             return 0

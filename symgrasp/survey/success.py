@@ -8,17 +8,20 @@ turns out to stand; the arm knows that when it moves, but the grasp on the objec
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from scipy.special import betaincinv
 
 from symgrasp.errors import InputError, NoPlanError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan
 from symgrasp.planners.planning import plan_sequential, tasks_of_plan
+from symgrasp.planners.sequential import surface_margin
 from symgrasp.poses import Array, from_rotation
 from symgrasp.progress import Progress, part_of
 from symgrasp.scene.parts import Task
@@ -28,7 +31,13 @@ from symgrasp.world import open_world
 MOST_CELLS = 1_000_000_000
 """Most cells of the maps of all draws together, each a byte."""
 
-__all__ = ["PoseNoise", "ProbablePlan", "SuccessMap", "best_columns", "plan_for_success", "success_map"]
+__all__ = [
+    "CONFIDENCE", "Line", "PoseNoise", "ProbablePlan", "SuccessMap", "best_columns", "interval",
+    "plan_for_success", "success_map",
+]  # fmt: skip
+
+CONFIDENCE = 0.95
+"""Of the intervals of probabilities."""
 
 
 @dataclass(frozen=True)
@@ -127,13 +136,15 @@ class ProbablePlan:
 
     Attributes:
         plan: the plan, for the poses that are expected.
-        probability: share of the draws at which every task is feasible with its grasp and turn.
-        standard_error: of the probability.
+        probability: share of the draws at which every task is feasible with its grasp and turn; of draws of
+            their own, the product of the tasks' shares.
+        interval: of the probability, which covers it at a confidence of at least `CONFIDENCE`; as for a grasp
+            that was not chosen by these draws.
     """
 
     plan: Plan
     probability: float
-    standard_error: float
+    interval: tuple[float, float]
 
 
 def plan_for_success(
@@ -146,7 +157,8 @@ def plan_for_success(
 ) -> ProbablePlan:
     """Find the grasp for all tasks of an arm, and the turns, that are feasible with the largest probability.
 
-    Of all grasps and turns that are feasible at the expected poses, none is more probable, given the draws.
+    Of all grasps and turns that are feasible at the expected poses, none is more probable, given the draws;
+    and of those that are as probable, none has a larger margin.
 
     Args:
         scene: the scene.
@@ -159,6 +171,7 @@ def plan_for_success(
     Raises:
         NoPlanError: no grasp serves all tasks.
         SceneError: no task is done by that arm alone.
+        InputError: the maps of so many draws are too large.
     """
     name = scene.arm(arm or scene.task().arms[0]).name
     tasks = tasks_of_plan(scene, "sequential", name)
@@ -169,71 +182,158 @@ def plan_for_success(
                         part_of(progress, k, len(tasks)))
             for k, task in enumerate(tasks)
         ]  # fmt: skip
-    best: tuple[float, int, int, list[int]] = (0.0, 0, 0, [])
+    margins = [surface_margin(m.nominal) for m in maps]
+    best: tuple[Columns, int, int] | None = None
     rolls, heights, _ = maps[0].nominal.feasible.shape
     for roll in range(rolls):
         for row in range(heights):
-            lines = [(m.nominal.feasible[roll, row], m.feasible[:, roll, row]) for m in maps]
+            lines = [
+                Line(m.nominal.feasible[roll, row], m.feasible[:, roll, row], margin[roll, row])
+                for m, margin in zip(maps, margins, strict=True)
+            ]
             found = best_columns(lines, shared=noise.shared)
-            if found and found[0] > best[0]:
-                best = (found[0], roll, row, found[1])
-    probability, roll, row, columns = best
-    if not columns:
+            if found and (best is None or found.rank > best[0].rank):
+                best = found, roll, row
+    if best is None:
         raise NoPlanError(f"no grasp of {name} serves all tasks")
+    chosen, roll, row = best
     masked = {}
-    for m, task, column in zip(maps, tasks, columns, strict=True):
+    for m, task, column in zip(maps, tasks, chosen.columns, strict=True):
         keep = np.zeros(m.nominal.feasible.shape, dtype=bool)
         keep[roll, row, column] = True
         masked[task.name, name] = m.nominal.masked(keep)
-    plan = plan_sequential(scene, name, masked)
-    return ProbablePlan(plan, probability, float(np.sqrt(probability * (1 - probability) / count)))
+    plan = _with_margins(plan_sequential(scene, name, masked), [m.nominal for m in maps], roll, row, chosen)
+    return ProbablePlan(plan, chosen.probability, interval(chosen.counts, count))
 
 
-def best_columns(
-    lines: list[tuple[np.ndarray, np.ndarray]], *, shared: bool
-) -> tuple[float, list[int]] | None:
-    """Return the largest probability that all tasks are feasible at a height and roll, and the columns.
+def _with_margins(plan: Plan, maps: Sequence[FeasibilityMap], roll: int, row: int, chosen: Columns) -> Plan:
+    """Return a plan with the margins of whole maps, not of those of which one cell was kept."""
+    tasks = []
+    for task, m, column in zip(plan.tasks, maps, chosen.columns, strict=True):
+        (hold,) = task.holds
+        along, around = m.cell_margins[roll, row, column].tolist()
+        tasks.append(
+            task.model_copy(
+                update={"holds": (hold.model_copy(update={"margin_along": along, "margin_around": around}),)}
+            )
+        )
+    return plan.model_copy(update={"tasks": tuple(tasks)})
+
+
+class Line(NamedTuple):
+    """The cells of a task at a height and roll.
+
+    Attributes:
+        nominal: (A,) which columns are feasible at the expected pose.
+        draws: (K, A) which are feasible at each draw.
+        margin: (A,) margin (m) of each at the expected pose.
+    """
+
+    nominal: np.ndarray
+    draws: np.ndarray
+    margin: Array
+
+
+class Columns(NamedTuple):
+    """A column for each task.
+
+    Attributes:
+        probability: that all are feasible.
+        margin: the smallest margin (m) of any of them, see `surface_margin`.
+        columns: the columns.
+        counts: at how many draws all tasks are feasible; of draws of their own, a number for each task.
+    """
+
+    probability: float
+    margin: float
+    columns: tuple[int, ...]
+    counts: tuple[int, ...]
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What is larger of better columns."""
+        return self.probability, self.margin
+
+
+def interval(counts: Sequence[int], draws: int) -> tuple[float, float]:
+    """Return an interval of a probability that is the product of those that successes were counted of.
+
+    Clopper and Pearson, The use of confidence or fiducial limits illustrated in the case of the binomial,
+    Biometrika 26, 1934: exact, however few the draws are, and wide rather than wrong. Of several factors each
+    gets its part of what may be missed (Bonferroni).
+
+    Args:
+        counts: number of successes of each factor.
+        draws: of how many.
+    """
+    missed = (1 - CONFIDENCE) / len(counts) / 2
+    low = [betaincinv(k, draws - k + 1, missed) if k else 0.0 for k in counts]
+    high = [betaincinv(k + 1, draws - k, 1 - missed) if k < draws else 1.0 for k in counts]
+    return float(np.prod(low)), float(np.prod(high))
+
+
+def best_columns(lines: Sequence[Line], *, shared: bool) -> Columns | None:
+    """Return the most probable columns at a height and roll; of equal ones, those of most margin.
 
     With draws of their own the tasks do not depend on each other, and each takes its best column. With shared
     draws it is searched, and what cannot be better is passed by.
 
     Args:
-        lines: for every task which columns (A,) are feasible at the expected pose, and at each draw (K, A).
+        lines: of every task.
         shared: whether the draws of all tasks are the same.
 
     Returns:
         None where some task has no feasible column.
     """
-    if not all(nominal.any() for nominal, _ in lines):
+    if not all(line.nominal.any() for line in lines):
         return None
+    draws = len(lines[0].draws)
     if not shared:
-        shares = [np.where(nominal, draws.mean(axis=0), -1.0) for nominal, draws in lines]
-        return float(np.prod([share.max() for share in shares])), [int(s.argmax()) for s in shares]
-    options = [_undominated(nominal, draws) for nominal, draws in lines]
-    rest = [np.ones(len(lines[0][1]), dtype=bool)]
+        columns, counts = [], []
+        for line in lines:
+            counted = line.draws.sum(axis=0)
+            at = np.flatnonzero(line.nominal).tolist()
+            columns.append(max(at, key=lambda c: (counted[c], line.margin[c])))
+            counts.append(int(counted[columns[-1]]))
+        margin = min(float(line.margin[c]) for line, c in zip(lines, columns, strict=True))
+        return Columns(float(np.prod([k / draws for k in counts])), margin, tuple(columns), tuple(counts))
+    options = [_undominated(line) for line in lines]
+    rest = [(np.ones(draws, dtype=bool), np.inf)]
     for own in reversed(options):  # what the tasks from there on can reach at most
-        rest.insert(0, rest[0] & np.any([draws for _, draws in own], axis=0))
-    best: tuple[int, list[int]] = (-1, [])
+        reached, margin = rest[0]
+        some = reached & np.any([option.draws for option in own], axis=0)
+        rest.insert(0, (some, min(margin, max(option.margin for option in own))))
+    best: tuple[tuple[int, float], tuple[int, ...]] = ((-1, 0.0), ())
 
-    def search(k: int, reached: np.ndarray, columns: list[int]) -> None:
+    def search(k: int, reached: np.ndarray, margin: float, columns: tuple[int, ...]) -> None:
         nonlocal best
-        if int((reached & rest[k]).sum()) <= best[0]:
+        most = int((reached & rest[k][0]).sum()), min(margin, rest[k][1])
+        if most <= best[0]:
             return
         if k == len(options):
-            best = (int(reached.sum()), columns)
+            best = most, columns
             return
-        for column, draws in sorted(options[k], key=lambda o: -int((reached & o[1]).sum())):
-            search(k + 1, reached & draws, [*columns, column])
+        for own in sorted(options[k], key=lambda o: (-int((reached & o.draws).sum()), -o.margin)):
+            search(k + 1, reached & own.draws, min(margin, own.margin), (*columns, own.column))
 
-    search(0, np.ones(len(lines[0][1]), dtype=bool), [])
-    return best[0] / len(lines[0][1]), best[1]
+    search(0, np.ones(draws, dtype=bool), np.inf, ())
+    (count, margin), columns = best
+    return Columns(count / draws, margin, columns, (count,))
 
 
-def _undominated(nominal: np.ndarray, draws: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    """Return the columns, with their draws (K,), that no other serves wherever they serve."""
-    kept: list[tuple[int, np.ndarray]] = []
-    for column in sorted(np.flatnonzero(nominal).tolist(), key=lambda c: -int(draws[:, c].sum())):
-        own = draws[:, column]
-        if not any((other >= own).all() for _, other in kept):
-            kept.append((column, own))
+class _Option(NamedTuple):
+    """A column, at which draws (K,) it is feasible, and its margin (m)."""
+
+    column: int
+    draws: np.ndarray
+    margin: float
+
+
+def _undominated(line: Line) -> list[_Option]:
+    """Return the columns of which no other serves wherever they serve, with as much margin."""
+    own = [_Option(c, line.draws[:, c], float(line.margin[c])) for c in np.flatnonzero(line.nominal).tolist()]
+    kept: list[_Option] = []
+    for option in sorted(own, key=lambda o: (-int(o.draws.sum()), -o.margin)):
+        if not any((k.draws >= option.draws).all() and k.margin >= option.margin for k in kept):
+            kept.append(option)
     return kept

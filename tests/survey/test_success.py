@@ -11,11 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy.spatial.transform import Rotation
+from scipy.stats import binom
 
+from symgrasp.cli.main import main
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.object.manifold import ROLLS
+from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
-from symgrasp.survey.success import PoseNoise, best_columns, plan_for_success, success_map
+from symgrasp.scene.scene import Scene
+from symgrasp.survey.evaluation import plan_margin
+from symgrasp.survey.success import Line, PoseNoise, best_columns, interval, plan_for_success, success_map
 from symgrasp.survey.success_picture import draw_success
 from symgrasp.world import open_world
 from tests.conftest import load_small
@@ -47,8 +53,11 @@ def test_without_noise_grasps_are_certain_or_impossible():
 @settings(max_examples=30)
 @given(
     st.lists(
-        st.tuples(
-            arrays.arrays(bool, 4), arrays.arrays(bool, (6, 4), elements=st.booleans(), fill=st.nothing())
+        st.builds(
+            Line,
+            arrays.arrays(bool, 4),
+            arrays.arrays(bool, (6, 4), elements=st.booleans(), fill=st.nothing()),
+            arrays.arrays(float, 4, elements=st.sampled_from([0.01, 0.02, 0.03]), fill=st.nothing()),
         ),
         min_size=1,
         max_size=3,
@@ -58,16 +67,45 @@ def test_without_noise_grasps_are_certain_or_impossible():
 def test_no_columns_are_better(lines, shared):
     found = best_columns(lines, shared=shared)
     tried = {}
-    for columns in product(*(np.flatnonzero(nominal) for nominal, _ in lines)):
-        draws = [d[:, c] for (_, d), c in zip(lines, columns, strict=True)]
+    for columns in product(*(np.flatnonzero(line.nominal) for line in lines)):
+        draws = [line.draws[:, c] for line, c in zip(lines, columns, strict=True)]
         together = np.logical_and.reduce(draws).mean()
-        tried[columns] = together if shared else np.prod([d.mean() for d in draws])
+        margin = min(line.margin[c] for line, c in zip(lines, columns, strict=True))
+        tried[columns] = (together if shared else np.prod([d.mean() for d in draws])), margin
     if not tried:
         assert found is None
         return
     assert found is not None
-    assert found[0] == pytest.approx(max(tried.values()))
-    assert tried[tuple(found[1])] == pytest.approx(found[0])
+    best = max(probability for probability, _ in tried.values())
+    assert found.probability == pytest.approx(best)
+    most = max(margin for probability, margin in tried.values() if probability > best - 1e-9)
+    if best > 0:  # where nothing succeeds, columns that fail do not matter
+        assert found.margin == most
+    assert tried[found.columns] == pytest.approx((found.probability, found.margin))
+
+
+@pytest.mark.parametrize(("count", "draws"), [(0, 8), (3, 8), (8, 8), (99, 100), (100, 100)])
+def test_an_interval_ends_where_the_count_would_be_too_rare(count, draws):
+    """At its ends so many successes or more, or so few or fewer, have the probability that is left out."""
+    low, high = interval([count], draws)
+    assert low <= count / draws <= high
+    if count:
+        assert binom.sf(count - 1, draws, low) == pytest.approx(0.025)
+    if count < draws:
+        assert binom.cdf(count, draws, high) == pytest.approx(0.025)
+    assert interval([count, draws], draws)[0] < low or not count
+
+
+def test_few_draws_do_not_make_a_plan_certain(tmp_path, capsys):
+    out = tmp_path / "plan.json"
+    command = ["success", "bottle_on_table", "--samples", "3", "--position", "0.1", "--plan", str(out)]
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    assert "100.0 % of 3 draws" in said
+    assert "probability 29.2 to 100.0 % (95 % confidence)" in said
+    plan = Plan.load(out)
+    assert verify(plan)
+    assert f"{1e3 * plan_margin(plan, Scene.load('bottle_on_table').profile):.1f} mm" in said
 
 
 @pytest.mark.parametrize("shared", [True, False])
@@ -75,7 +113,14 @@ def test_the_plan_for_success_holds(shared):
     scene = load_small("pick_pour_place", 8, 16, 4)
     found = plan_for_success(scene, PoseNoise(0.01, shared=shared), count=6)
     assert 0 < found.probability <= 1
+    assert found.interval[0] < found.probability <= found.interval[1]
     assert verify(found.plan)
+    for task in found.plan.tasks:  # margins are those of the whole map
+        (hold,) = task.holds
+        m = create_map(scene, task=task.name)
+        cell = m.manifold.cell(hold.grasp.h, hold.grasp.theta + task.delta)
+        own = m.cell_margins[ROLLS.index(hold.grasp.roll), cell[0], cell[1]]
+        assert (hold.margin_along, hold.margin_around) == pytest.approx(tuple(own))
 
 
 def test_no_grasp_no_plan():
