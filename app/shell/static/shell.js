@@ -16,9 +16,11 @@ view.src = `/?${opened ? `${opened}&` : ""}page=${visit.tokens}`;
 // viser connects again only while its own document has the focus.
 view.addEventListener("load", () => view.contentWindow.focus());
 
+const HINT = "Point at a cell to read it, click to take it.";
+const say = (text) => { element("readout").textContent = text || HINT; };
 const pane = new MapPane(canvas, {
   send: (command) => link.send(command),
-  say: (text) => { element("readout").textContent = text; },
+  say,
   speak: (text) => { element("spoken").textContent = text; },
   turned: (text) => { element("turn").textContent = text; },
 });
@@ -35,7 +37,7 @@ view.addEventListener("load", () => watchPresses(view.contentWindow));
 
 const layers = new Layers(element, {
   send: (command) => link.send(command),
-  say: (text) => { element("readout").textContent = text; },
+  say,
 });
 const arrived = [];
 const link = new Link(`/map/${visit.token}`, {
@@ -47,6 +49,7 @@ const link = new Link(`/map/${visit.token}`, {
       if (message[0].layer === undefined) pane.apply(...message);
       if (message[0].layer !== undefined || message[0] === head) layers.take(...message);
     }
+    if (element("nothing").hidden !== pane.hasMap) say("");
     element("nothing").hidden = pane.hasMap;
     document.documentElement.dataset.theme = head.dark ? "dark" : "light";
     pane.restyle();
