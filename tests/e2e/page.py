@@ -28,6 +28,9 @@ WAIT = 30_000
 PACE = 80
 """Time (ms) a key is held, and between two keys."""
 
+TRIES = 3
+"""How often a number is typed until the box shows it."""
+
 MAP_SHARE = 1.5e-4
 """Share of the 3D view that has the colour of feasible cells at least, when the map is in it."""
 
@@ -190,10 +193,15 @@ class GraspPage:
 
         By keys: the box looks where the caret was when one went down, to tell what is new in it, and may
         lose a text that comes without any. At a person's pace: it sends one change in 50 ms, and a change
-        of the next box would take the place of one that waits.
+        of the next box would take the place of one that waits. Again where the page wrote into the box
+        meanwhile, as a person would who sees it.
         """
-        box.press("ControlOrMeta+a")
-        box.press_sequentially(f"{value:g}", delay=PACE)
+        typed = f"{value:g}"
+        for _ in range(TRIES):
+            box.press("ControlOrMeta+a")
+            box.press_sequentially(typed, delay=PACE)
+            if box.input_value() == typed:
+                break
         box.press("Enter", delay=PACE)
 
     def slider_box(self, label: str) -> Locator:
