@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench surveys robots opening grids cells
+.PHONY: app test figures schemas bench surveys motions robots opening grids cells
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -41,6 +41,10 @@ bench: $(VENV)/dev.stamp  ## measure, and write the times of the README and docs
 surveys: $(VENV)/dev.stamp  ## measure what surveys cost, and write it to docs/surveys.md (minutes)
 	$(BIN)/symgrasp bench survey --out docs/surveys.json
 	$(BIN)/python -m docs.surveys
+
+motions: $(VENV)/dev.stamp  ## measure how fast motions are planned, and write it to docs/motions.md (minutes)
+	$(BIN)/symgrasp bench motion --out docs/motions.json
+	$(BIN)/python -m docs.motions
 
 robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write the table of docs/robots.md (minutes)
 	$(BIN)/symgrasp bench robots --out docs/robots.json
