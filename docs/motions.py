@@ -45,7 +45,7 @@ def _row(figure: Figure) -> str:
     if not figure.values:
         return f"| {name} | 0 | | | | |"
     if not figure.unit:
-        return f"| {name} | {len(figure.values)} | {100 * np.mean(figure.values):.3g} % | | | |"
+        return f"| {name} | | {100 * np.mean(figure.values):.3g} % | | | |"
     low, middle, high = (f"{value:.3g}" for value in np.quantile(figure.values, [0.0, 0.5, 1.0]))
     cpu = f"{np.median(figure.cpu):.3g} {figure.unit}" if figure.cpu else ""
     return f"| {name} | {len(figure.values)} | {middle} {figure.unit} | {low} | {high} | {cpu} |"
