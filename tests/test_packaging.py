@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 import yaml
 
-from app.server.viser_server import any_port
+from app.server.door.viser_server import any_port
 from symgrasp.files import SCENES_DIR
-from tests.app.server.test_session import picture, ready
+from tests.app.server.session.served import picture, ready
 from tests.app.wire import Wire
 from tests.conftest import SHIPPED, write_scene
 

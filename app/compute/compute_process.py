@@ -21,7 +21,7 @@ from ..choices.object_choice import ObjectChoice
 from ..choices.scene_assets import BuiltScene
 from ..choices.uploaded_scene import UploadedScene
 from ..files.file_kinds import FileKind
-from ..state.plan_results import PlanResult
+from ..state.plans.plan_results import PlanResult
 from ..state.requests import (
     CompareRequest,
     Comparison,
@@ -31,7 +31,7 @@ from ..state.requests import (
     MapResult,
     Maps,
 )
-from ..state.survey import Stand, SurveyRequest
+from ..state.surveys.survey import Stand, SurveyRequest
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, Part, ProgressReport
 from .limits import MEMORY_LIMIT
 from .plan_service import MotionOutcome, MotionRequest, OpenedPlan, PlanOutcome, PlanRequest

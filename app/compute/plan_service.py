@@ -38,7 +38,7 @@ from ..files.scene_files import refuse_foreign_files
 from ..files.shown_paths import shown_paths
 from ..scene3d.visual_meshes import read_visuals
 from ..state.object_pose import ObjectPose, with_poses
-from ..state.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
+from ..state.plans.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
 from ..state.requests import MapRequest, Maps
 from .map_service import MapService
 

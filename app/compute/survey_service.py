@@ -21,7 +21,7 @@ from symgrasp.survey.placement import Base, kind_of_plan, place_base, reach_of
 from symgrasp.survey.regions import places_of_object, support_height
 from symgrasp.survey.survey import Survey
 
-from ..state.survey import Places, Stand, SurveyRequest
+from ..state.surveys.survey import Places, Stand, SurveyRequest
 
 __all__ = ["SurveyPart", "SurveyService"]
 

@@ -25,7 +25,7 @@ from ..state.display import Display
 from ..state.map_view_state import RollChoice
 from ..state.object_pose import ObjectPose
 from ..state.page_link import Camera
-from ..state.plan_results import PlanResults
+from ..state.plans.plan_results import PlanResults
 from ..state.state import State
 from .scene_files import scene_archive, scene_yaml
 

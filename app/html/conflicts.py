@@ -6,7 +6,7 @@ from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.planners.conflicts import Conflict, Exclusion
 from symgrasp.reason import Reason
 
-from ..state.plan_results import PlanFileReport, Refusal
+from ..state.plans.plan_results import PlanFileReport, Refusal
 from .escaping import escape
 from .map import h_axis
 

@@ -11,7 +11,7 @@ from symgrasp.planners.bimanual import ClimbStep
 
 from ..render.palette import PRINTS
 from ..render.prints import apart_text, hand_color
-from ..state.plan_results import ClimbReplay, PlanResult
+from ..state.plans.plan_results import ClimbReplay, PlanResult
 from ..state.state import State
 from .escaping import escape
 from .readout import count_text

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from symgrasp.plan.plan import CLEARANCE_LIMIT
 
-from ..state.plan_results import PlanResult
-from ..state.solution_list import listed, solution_numbers
-from ..state.solution_order import COLUMNS
+from ..state.plans.plan_results import PlanResult
+from ..state.plans.solution_list import listed, solution_numbers
+from ..state.plans.solution_order import COLUMNS
 from ..state.state import State
 from .escaping import escape
 from .stack import margin_texts

@@ -13,7 +13,7 @@ from symgrasp.survey.placement import Base
 from ..render.palette import INK, PICK
 from ..render.survey_colors import place_colors
 from ..state.state import State
-from ..state.survey import Places
+from ..state.surveys.survey import Places
 from .escaping import escape
 from .readout import count_text
 

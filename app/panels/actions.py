@@ -7,7 +7,7 @@ from typing import Protocol
 
 import viser
 
-from ..state.plan_results import PlanKind
+from ..state.plans.plan_results import PlanKind
 from ..state.state import State
 
 __all__ = ["Actions", "Change", "PlanActions", "SurveyActions"]

@@ -10,8 +10,8 @@ import viser
 from ..html.conflicts import failure_html
 from ..html.hands import climb_comparison_html, hands_html
 from ..html.readout import bimanual_html
-from ..state import plan_changes
-from ..state.plan_results import FIRST_SEED
+from ..state.plans import plan_changes
+from ..state.plans.plan_results import FIRST_SEED
 from ..state.state import State
 from .actions import Actions
 from .panel import Panel

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import viser
 
-from ..state import changes, plan_changes
+from ..state import changes
 from ..state.map_view_state import RollChoice
+from ..state.plans import plan_changes
 from ..state.state import State
 from ..state.undo import redo, undo
 from .actions import Actions

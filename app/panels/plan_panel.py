@@ -11,7 +11,7 @@ from ..html.conflicts import plan_file_html
 from ..html.motion import motion_html
 from ..html.readout import solution_html
 from ..html.solutions import solutions_html
-from ..state import plan_changes
+from ..state.plans import plan_changes
 from ..state.state import State
 from .actions import Actions
 from .click_targets import ClickTargets

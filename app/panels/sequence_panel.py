@@ -10,7 +10,8 @@ import viser
 from ..html.conflicts import failure_html, regrasp_count
 from ..html.readout import sequence_html, tasks_html
 from ..html.stack import stack_html
-from ..state import changes, plan_changes
+from ..state import changes
+from ..state.plans import plan_changes
 from ..state.state import State
 from ..state.task_list import TaskList
 from .actions import Actions

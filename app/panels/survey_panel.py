@@ -9,8 +9,8 @@ import viser
 
 from ..html.survey import places_html, run_html, stands_html
 from ..state.state import State
-from ..state.survey import SPACINGS, SurveyKind, SurveyState, SurveyValue
-from ..state.survey_changes import change_survey, stand_at
+from ..state.surveys.survey import SPACINGS, SurveyKind, SurveyState, SurveyValue
+from ..state.surveys.survey_changes import change_survey, stand_at
 from .actions import Actions
 from .panel import Panel, slider_value
 

@@ -7,7 +7,7 @@ from symgrasp.plan.plan import PlanTask
 from symgrasp.poses import Array
 from symgrasp.reason import Reason
 
-from ..state.plan_results import HandsByHand
+from ..state.plans.plan_results import HandsByHand
 from ..state.state import State
 from .playback import motion_state, plan_joint_values
 

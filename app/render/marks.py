@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..state.plan_changes import hand_cells
+from ..state.plans.plan_changes import hand_cells
 from ..state.state import State
 
 __all__ = ["Mark", "hand_marks", "marks_of"]

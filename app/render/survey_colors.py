@@ -7,7 +7,7 @@ import numpy as np
 from symgrasp.feasibility.color_by import FEASIBLE, INFEASIBLE, NONE, SCALE
 from symgrasp.poses import Array
 
-from ..state.survey import SurveyValue
+from ..state.surveys.survey import SurveyValue
 
 __all__ = ["place_colors"]
 

@@ -12,7 +12,7 @@ from symgrasp.meshes import joined
 from ..render.palette import rgb, to_linear
 from ..render.survey_colors import place_colors
 from ..state.state import State
-from ..state.survey import Places, Stand
+from ..state.surveys.survey import Places, Stand
 from .cell_mesh import QUAD, TRIANGLES
 from .ghost import link_mesh
 from .nodes import set_pose

@@ -14,8 +14,8 @@ from symgrasp.scene.scene import Scene
 from ..compute.plan_service import plan_result
 from ..scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
 from ..state import changes
-from ..state.plan_changes import show_results, show_step
-from ..state.plan_results import PlanResults
+from ..state.plans.plan_changes import show_results, show_step
+from ..state.plans.plan_results import PlanResults
 from ..state.requests import MapRequest, MapResult
 from ..state.state import State
 from .snapshot import snapshot_html

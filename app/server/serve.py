@@ -12,8 +12,8 @@ from symgrasp.errors import InputError
 
 from ..compute.cache import SharedCache
 from ..compute.warm_up import compute_first_map
-from .lobby import open_lobby
-from .stored_pages import stored_pages_folder
+from .door.lobby import open_lobby
+from .kept_pages.stored_pages import stored_pages_folder
 
 __all__ = ["serve"]
 

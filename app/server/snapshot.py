@@ -15,9 +15,9 @@ from symgrasp.errors import printable
 from ..render.playback import motion_state
 from ..scene3d.scene_view import SceneView
 from ..state.page_link import Camera
-from ..state.plan_changes import show_position
+from ..state.plans.plan_changes import show_position
 from ..state.state import State
-from .viser_server import quiet_server
+from .door.viser_server import quiet_server
 
 __all__ = ["snapshot_html"]
 

@@ -10,8 +10,10 @@ import msgspec
 from symgrasp.feasibility.cell import Cell
 from symgrasp.object.manifold import ROLLS
 
-from ..state import changes, plan_changes, survey_changes
+from ..state import changes
+from ..state.plans import plan_changes
 from ..state.state import State
+from ..state.surveys import survey_changes
 
 __all__ = ["LONGEST", "Command", "decode"]
 

@@ -20,7 +20,7 @@ from symgrasp.reason import Reason
 from ..render.marks import Mark, hand_marks, marks_of
 from ..render.prints import shown_prints, task_prints
 from ..state.map_view_state import RollChoice
-from ..state.plan_changes import hand_cells
+from ..state.plans.plan_changes import hand_cells
 from ..state.state import State
 
 __all__ = ["Layer", "LayerKind", "layers_of"]

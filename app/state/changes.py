@@ -17,7 +17,7 @@ from ..choices.uploaded_scene import UploadedScene
 from .map_view_state import RollChoice
 from .object_pose import ObjectPose
 from .page_link import Camera, PageLink
-from .plan_changes import show_step
+from .plans.plan_changes import show_step
 from .state import Pick, State
 from .task_list import TaskList
 

@@ -2,7 +2,7 @@
 
 The object is at ``T_world_object = base · Rz(delta)``: the base pose is what a map is computed for,
 and δ, the turn about the object's own axis, only shifts that map (equation 3). The changes are functions
-from state to state, in `app.state.changes`, `app.state.job_changes`, `app.state.plan_changes` and
+from state to state, in `app.state.changes`, `app.state.job_changes`, `app.state.plans.plan_changes` and
 `app.state.undo`.
 """
 
@@ -30,9 +30,9 @@ from .history import History
 from .map_view_state import MapViewState
 from .object_pose import ObjectPose, with_poses
 from .page_link import PageLink
-from .plan_results import PlanKind, PlanResult, PlanResults
+from .plans.plan_results import PlanKind, PlanResult, PlanResults
 from .requests import Busy, ExplainRequest, MapRequest, MapResult, Request
-from .survey import Places, SurveyRequest, SurveyState
+from .surveys.survey import Places, SurveyRequest, SurveyState
 
 __all__ = ["Pick", "State"]
 

@@ -13,7 +13,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from ..choices.scene_assets import NO_ASSETS
 from .history import History
 from .state import State
-from .survey import SurveyState
+from .surveys.survey import SurveyState
 
 __all__ = ["PLANS_KEPT", "UPLOADS_KEPT", "redo", "remember", "undo"]
 

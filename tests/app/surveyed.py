@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from app.state.state import State
-from app.state.survey import Places, Stand, SurveyKind, SurveyRun, SurveyValue
-from app.state.survey_changes import change_survey, places_arrived, survey_ended, survey_started
+from app.state.surveys.survey import Places, Stand, SurveyKind, SurveyRun, SurveyValue
+from app.state.surveys.survey_changes import change_survey, places_arrived, survey_ended, survey_started
 from symgrasp.survey.placement import Base
 from tests.conftest import load_small
 

@@ -19,8 +19,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from app.server.front_door import HELLO, MAP
-from app.server.origins import PAGE
+from app.server.door.front_door import HELLO, MAP
+from app.server.door.origins import PAGE
 from tests.app.shown_map import ShownMap
 
 WAIT = 60.0

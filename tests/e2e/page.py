@@ -17,7 +17,7 @@ from playwright.sync_api import Frame, Locator, Page, WebSocket, expect
 from app.panels.layout import panels_width
 from app.render.palette import rgb
 from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
-from app.server.front_door import MAP
+from app.server.door.front_door import MAP
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from tests.app.shown_map import ShownMap

@@ -17,7 +17,7 @@ import psutil
 import pytest
 from distributed import LocalCluster
 
-from app.server.viser_server import any_port
+from app.server.door.viser_server import any_port
 from symgrasp.cli.main import main
 from symgrasp.errors import SurveyError
 from symgrasp.feasibility.create import create_map

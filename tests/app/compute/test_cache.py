@@ -16,7 +16,7 @@ from app.state.state import State
 from symgrasp.errors import SymgraspError
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from tests.app.state.test_state import small_map
+from tests.app.state.states import small_map
 from tests.conftest import SHIPPED, load_small, write_scene
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.state.requests import MapRequest
-from tests.app.state.test_state import small_map
+from tests.app.state.states import small_map
 from tests.conftest import load_small
 
 

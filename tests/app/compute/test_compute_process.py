@@ -27,7 +27,7 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from tests.app import failures
 from tests.app.choices.test_object_choice import stl
-from tests.app.state.test_state import small_map
+from tests.app.state.states import small_map
 from tests.conftest import load_small
 
 

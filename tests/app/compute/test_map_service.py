@@ -18,7 +18,7 @@ from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world
-from tests.app.state.test_state import results_of, small_map
+from tests.app.state.states import results_of, small_map
 from tests.conftest import load_small
 
 

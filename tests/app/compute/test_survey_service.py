@@ -11,7 +11,7 @@ import pytest
 from app.compute import survey_service
 from app.compute.survey_service import SurveyPart, SurveyService
 from app.state.object_pose import ObjectPose
-from app.state.survey import SurveyRequest
+from app.state.surveys.survey import SurveyRequest
 from symgrasp.errors import Cancelled
 from symgrasp.feasibility.create import create_map
 from symgrasp.plan.verify import verify

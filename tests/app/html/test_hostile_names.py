@@ -16,13 +16,14 @@ import yaml
 
 import app.html
 from app.compute.plan_service import PlanRequest
-from app.state import changes, job_changes, plan_changes
+from app.state import changes, job_changes
+from app.state.plans import plan_changes
 from app.state.requests import MapResult
 from app.state.state import State
 from symgrasp.feasibility.create import create_map
 from symgrasp.files import SCENES_DIR
 from symgrasp.scene.scene import Scene
-from tests.app.state.test_state import results_of
+from tests.app.state.states import results_of
 from tests.hostile_names import HOSTILE_NAMES
 
 

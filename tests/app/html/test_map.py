@@ -26,7 +26,7 @@ from app.state.map_view_state import RollChoice
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
 from symgrasp.reason import Reason
-from tests.app.state.test_state import opened, with_plan
+from tests.app.state.states import opened, with_plan
 
 STEP = 2 * np.pi / COLUMNS
 

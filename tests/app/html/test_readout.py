@@ -13,7 +13,7 @@ from app.state.requests import MapResult
 from app.state.state import State
 from symgrasp.feasibility.create import create_map
 from symgrasp.scene.scene import Scene
-from tests.app.state.test_state import opened, with_plan
+from tests.app.state.states import opened, with_plan
 from tests.conftest import load_small, write_scene
 
 HOSTILE = "<script>alert(1)</script>"

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from app.html.solutions import solutions_html
-from app.state import plan_changes
-from app.state.solution_order import COLUMNS
+from app.state.plans import plan_changes
+from app.state.plans.solution_order import COLUMNS
 from app.state.state import State
-from tests.app.state.test_state import with_plan
+from tests.app.state.states import with_plan
 
 CASES = [("pick_pour_place", "sequential"), ("log_two_robots", "bimanual"), ("log_four_robots", "bimanual")]
 

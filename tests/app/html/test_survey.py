@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import pytest
 
 from app.html.survey import places_html, run_html, stands_html
-from app.state.survey import SurveyRun
-from app.state.survey_changes import places_arrived, survey_started
+from app.state.surveys.survey import SurveyRun
+from app.state.surveys.survey_changes import places_arrived, survey_started
 from tests.app.surveyed import surveyed
 
 

@@ -11,10 +11,10 @@ from app.render.cell_colors import cell_colors
 from app.render.prints import shown_prints
 from app.render.weak_cache import cached_with_first
 from app.shell.map_parts import map_parts
-from app.state import plan_changes
 from app.state.map_view_state import RollChoice
-from app.state.plan_results import PlanResults
-from tests.app.state.test_state import opened, planned
+from app.state.plans import plan_changes
+from app.state.plans.plan_results import PlanResults
+from tests.app.state.states import opened, planned
 
 
 class Kept:

@@ -16,9 +16,9 @@ from app.panels.pose_panel import position_range
 from app.scene3d.flat_map import MIN_FACING
 from app.scene3d.scene_view import SceneView
 from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
-from app.server.viser_server import quiet_server
+from app.server.door.viser_server import quiet_server
 from symgrasp.scene.scene import Scene
-from tests.app.state.test_state import opened
+from tests.app.state.states import opened
 from tests.conftest import PLAIN
 
 

@@ -10,8 +10,8 @@ from functools import partial
 
 import pytest
 
+from app.server.door.viser_server import any_port
 from app.server.serve import serve
-from app.server.viser_server import any_port
 from symgrasp.errors import InputError
 from tests.app.wire import Wire
 

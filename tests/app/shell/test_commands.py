@@ -14,7 +14,7 @@ from app.state.history import DRAG_PAUSE
 from app.state.state import State
 from app.state.undo import remember, undo
 from symgrasp.reason import Reason
-from tests.app.state.test_state import opened
+from tests.app.state.states import opened
 from tests.app.surveyed import BASES, surveyed
 
 

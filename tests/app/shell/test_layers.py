@@ -21,13 +21,13 @@ from app.shell.commands import decode
 from app.shell.layers import layers_of
 from app.shell.map_parts import map_parts
 from app.state.map_view_state import RollChoice
-from app.state.plan_changes import hand_cells
+from app.state.plans.plan_changes import hand_cells
 from app.state.state import State
 from app.state.undo import remember, undo
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import ROLLS
 from tests.app.shown_map import shown
-from tests.app.state.test_state import opened, with_plan
+from tests.app.state.states import opened, with_plan
 
 ONE_ROLL = (RollChoice.ZERO, RollChoice.HALF_TURN)
 

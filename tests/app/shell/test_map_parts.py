@@ -20,7 +20,8 @@ from app.state.state import State
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.reason import Reason
 from tests.app.shown_map import shown
-from tests.app.state.test_state import load_small, opened, with_plan
+from tests.app.state.states import opened, with_plan
+from tests.conftest import load_small
 
 
 @settings(deadline=None)

@@ -34,7 +34,7 @@ from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.poses import rotation_z
 from symgrasp.reason import Reason
 from symgrasp.world import BodyName, BulletWorld, Collision
-from tests.app.state.test_state import opened
+from tests.app.state.states import opened
 from tests.conftest import load_small
 from tests.world.link_pose import link_pose
 

@@ -11,8 +11,9 @@ from app.compute.plan_service import plan_result
 from app.html.motion import motion_html
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
 from app.scene3d.tool_path import tool_lines
-from app.state import changes, plan_changes
-from app.state.plan_results import SECONDS_PER_TASK, PlanResults
+from app.state import changes
+from app.state.plans import plan_changes
+from app.state.plans.plan_results import SECONDS_PER_TASK, PlanResults
 from app.state.requests import MapRequest, MapResult
 from app.state.state import State
 from symgrasp.feasibility.create import create_map

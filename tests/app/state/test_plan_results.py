@@ -20,9 +20,10 @@ from app.files.plan_formats import PLAN_LIMIT
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
 from app.render.playback import plan_joint_values
 from app.render.prints import shown_prints
-from app.server.plan_actions import show_opened_plan
-from app.state import changes, job_changes, plan_changes
-from app.state.plan_results import PlanResults
+from app.server.session.plan_actions import show_opened_plan
+from app.state import changes, job_changes
+from app.state.plans import plan_changes
+from app.state.plans.plan_results import PlanResults
 from app.state.state import State
 from app.state.task_list import TaskList
 from symgrasp.errors import InputError, PlanError, SceneError, SymgraspError
@@ -30,7 +31,7 @@ from symgrasp.files import SCENES_DIR
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.poses import pose_error
 from symgrasp.scene.scene import Scene
-from tests.app.state.test_state import opened, planned, results_of, small_map, with_plan
+from tests.app.state.states import opened, planned, results_of, small_map, with_plan
 from tests.conftest import load_small
 
 

@@ -10,8 +10,8 @@ import pytest
 from app.html.survey import places_html
 from app.state.changes import moved, open_scene, turn
 from app.state.robot_changes import place_robot
-from app.state.survey import SurveyRun
-from app.state.survey_changes import (
+from app.state.surveys.survey import SurveyRun
+from app.state.surveys.survey_changes import (
     change_survey,
     choose_place,
     places_arrived,

@@ -19,15 +19,16 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from app.choices.object_choice import from_library
 from app.choices.uploaded_scene import UploadedScene
-from app.state import changes, job_changes, plan_changes
+from app.state import changes, job_changes
 from app.state.history import DRAG_PAUSE, STEPS_KEPT, History
 from app.state.map_view_state import RollChoice
-from app.state.plan_results import PlanResults
+from app.state.plans import plan_changes
+from app.state.plans.plan_results import PlanResults
 from app.state.state import State
 from app.state.undo import PLANS_KEPT, UPLOADS_KEPT, redo, remember, undo
 from symgrasp.errors import InputError
 from symgrasp.feasibility.map import FeasibilityMap
-from tests.app.state.test_state import opened, planned, small_map, with_plan
+from tests.app.state.states import opened, planned, small_map, with_plan
 from tests.conftest import load_small
 
 

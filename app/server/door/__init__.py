@@ -1,0 +1,1 @@
+"""Who comes in from a browser, at what rate, and which session it is shown."""

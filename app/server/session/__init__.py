@@ -1,0 +1,1 @@
+"""One browser: its session, and the actions that its widgets and its map start."""

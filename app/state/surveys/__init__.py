@@ -1,0 +1,1 @@
+"""The part of the state about surveys, and its changes."""
