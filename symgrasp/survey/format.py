@@ -30,6 +30,9 @@ LEAN = ("tilt_deg", "direction_deg")
 BASE = ("base.x", "base.y", "base.z", "base.yaw_deg")
 """Axes that move a robot: x, y, z (m) of its base, and its turn about the vertical."""
 
+TURNS = ("direction_deg", "base.yaw_deg")
+"""Axes whose values mean the same when they differ by whole turns."""
+
 RESERVED = {
     "angle", "best", "byte", "cell", "cells", "feasible", "letter", "margin", "plan", "plan_margin",
     "problem", "reason", "roll", "row", "share", "state",
@@ -82,7 +85,9 @@ class NumberAxis(_Axis):
         if (self.values is None) == (None in grid) or (self.values is not None and grid != (None,) * 3):
             raise ValueError("either values, or all of from, to and count")
         numbers = self.numbers()
-        if len(set(numbers)) < len(numbers):
+        # What turns by whole turns more is the same pose.
+        distinct = {v % 360.0 for v in numbers} if self.of in TURNS else set(numbers)
+        if len(distinct) < len(numbers):
             raise ValueError("values that differ")
         if self.robot is not None and self.of not in BASE:
             raise ValueError(f"a robot only with {', '.join(BASE)}")
@@ -108,6 +113,12 @@ class PositionAxis(_Axis):
 
     of: Literal["position"]
     values: Annotated[tuple[tuple[Number, Number, Number], ...], Field(min_length=1, max_length=MOST_VALUES)]
+
+    @model_validator(mode="after")
+    def _all_differ(self) -> PositionAxis:
+        if len(set(self.values)) < len(self.values):
+            raise ValueError("values that differ")
+        return self
 
 
 class TaskAxis(_Axis):
