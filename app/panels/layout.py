@@ -36,6 +36,9 @@ PANEL_WIDTH = 320
 MOST = 0.4
 """Share of the width that panels which stand above each other take at most."""
 
+VIEW_SHARE = 0.42
+"""Share of the height of viser's page that the 3D view has above panels; style.css has it as well."""
+
 
 class Layout:
     """All panels of a browser: scene and object on the right, and grasps and plans beside or below them.
@@ -44,16 +47,21 @@ class Layout:
         client: the browser.
         actions: what the widgets do.
         scenes: names of the scenes that can be opened.
+        stacked: whether the panels lie below the 3D view: in a narrow window.
 
     Attributes:
-        view_width: width (px) that is left for the 3D view.
+        view_size: width and height (px) that are left for the 3D view.
     """
 
-    def __init__(self, client: viser.ClientHandle, actions: Actions, scenes: tuple[str, ...]) -> None:
+    def __init__(
+        self, client: viser.ClientHandle, actions: Actions, scenes: tuple[str, ...], *, stacked: bool = False
+    ) -> None:
         gui = client.gui
         self.gui, self._dark = gui, False
-        window = client.camera.image_width  # read before the panels narrow the canvas
-        self.view_width = window - panels_width(window)
+        camera = client.camera  # read before the panels narrow the canvas
+        window, height = camera.image_width, camera.image_height
+        beside = (window - panels_width(window), height)
+        self.view_size = (window, round(VIEW_SHARE * height)) if stacked else beside
         self._theme(dark=False)
         gui.set_panel_label("symgrasp")
         grasps = gui.add_panel()
@@ -95,6 +103,7 @@ class Layout:
         else:
             gui.main_panel.set_width(panels_width(window))
             grasps.dock_below(gui.main_panel)
+        grasps.expand()  # a phone shows it as a section of one panel, else closed
         main = [
             StatusPanel(gui, actions),
             PosePanel(gui, actions),

@@ -31,7 +31,8 @@ class SceneView:
 
     Args:
         client: the browser.
-        width: width (px) of the view at first; browsers report it only after the panels are laid out.
+        size: width and height (px) of the view at first, which browsers report only after the panels are laid
+            out; None for what they report.
         on_surface: called with the cell (row, column) that was clicked on the object.
         on_flat_map: called with the cell that was clicked on the flat map.
         on_drag: called with the pose (4, 4) that the object's gizmo was dragged to.
@@ -47,7 +48,7 @@ class SceneView:
     def __init__(
         self,
         client: viser.ClientHandle,
-        width: int,
+        size: tuple[int, int] | None,
         on_surface: Callable[[int, int], None],
         on_flat_map: Callable[[int, int], None],
         on_drag: Callable[[Array], None],
@@ -59,7 +60,7 @@ class SceneView:
         self.on_surface, self.on_flat_map = on_surface, on_flat_map
         self.on_drag, self.on_base_drag = on_drag, on_base_drag
         self.on_place, self.on_stand = on_place, on_stand
-        self._first_width: int | None = width
+        self._first_size = size
         self._scene: Scene | None = None
         self._builds = self._ghosts = 0
         self._dark = False
@@ -168,8 +169,9 @@ class SceneView:
     def _aspect(self) -> float:
         """Return the ratio of width to height of the 3D view."""
         camera = self.client.camera
-        width, self._first_width = self._first_width or camera.image_width, None
-        return width / max(camera.image_height, 1)
+        width, height = self._first_size or (camera.image_width, camera.image_height)
+        self._first_size = None
+        return width / max(height, 1)
 
 
 def _same_bodies(a: Scene, b: Scene) -> bool:

@@ -45,7 +45,7 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
             camera=SimpleNamespace(image_width=1280, image_height=800),
         )
         view = SceneView(
-            cast("viser.ClientHandle", client), 0, _ignore, _ignore, lambda _: None, lambda _: None
+            cast("viser.ClientHandle", client), None, _ignore, _ignore, lambda _: None, lambda _: None
         )
         view.camera = camera
         view.show(show_position(state, 0.0) if motion_state(state) else state, move_gizmo=True)

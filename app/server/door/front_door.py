@@ -10,10 +10,11 @@ passes; those that become websockets are read at a limited rate. The door refuse
 * more browsers at once than were allowed, and connections that do not say in time what they want.
 
 The page that is served is the project's own; it shows viser's in a frame, whose address has the setting
-`PAGE`: a token that the page has made up, and behind a dot that of the page which it continues, if any. A
-websocket alone serves an empty view: a browser gets a session after the view has loaded a picture with a
-secret token in its path, from a page of the same origin. The ``Referer`` of that request is the address that
-was opened. The page's own websocket, for the map, has its token in its path.
+`PAGE`: a token that the page has made up, and behind a dot that of the page which it continues, if any. The
+setting `STACKED` says that the page is laid out for a narrow window. A websocket alone serves an empty view:
+a browser gets a session after the view has loaded a picture with a secret token in its path, from a page of
+the same origin. The ``Referer`` of that request is the address that was opened. The page's own websocket, for
+the map, has its token in its path.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from .browser_connection import PART_LIMIT, BrowserConnection, handled_by
 from .origins import (
     FRAMES,
     PAGE,
+    STACKED,
     add_headers,
     headers_of,
     is_foreign,
@@ -78,6 +80,7 @@ class Visit:
         address: the address without that.
         page: the token of the page around the view; empty where there is none.
         before: that of the page whose session it continues, such as itself before it was loaded again.
+        stacked: whether map, view and panels lie one below the other there.
     """
 
     token: str
@@ -85,6 +88,7 @@ class Visit:
     address: str = "/"
     page: str = ""
     before: str = ""
+    stacked: bool = False
 
 
 class FrontDoor:
@@ -209,11 +213,12 @@ class FrontDoor:
         opened = urlsplit(headers.get("referer", "/"))
         address = urlunsplit((opened.scheme, opened.netloc, opened.path, "", ""))
         settings = opened.query.split("&")
-        query = "&".join(s for s in settings if s.partition("=")[0] != PAGE)
+        query = "&".join(s for s in settings if s.partition("=")[0] not in (PAGE, STACKED))
         # The page adds its own behind those of the address that was opened.
         page = next((s.partition("=")[2] for s in reversed(settings) if s.startswith(f"{PAGE}=")), "")
         tokens = [text if TOKEN.fullmatch(text) else "" for text in page.split(".")]
-        visit = Visit(token, query, address, tokens[0], tokens[1] if len(tokens) == 2 else "")
+        before = tokens[1] if len(tokens) == 2 else ""
+        visit = Visit(token, query, address, tokens[0], before, STACKED in settings)
         if not is_own_picture(headers) or not self._on_visit(visit):
             return connection.respond(HTTPStatus.NOT_FOUND, "")
         return _found(connection, PageFile(PICTURE, "image/svg+xml"))

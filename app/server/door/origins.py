@@ -13,6 +13,7 @@ from websockets.http11 import Request, Response
 __all__ = [
     "FRAMES",
     "PAGE",
+    "STACKED",
     "add_headers",
     "headers_of",
     "is_foreign",
@@ -24,6 +25,9 @@ __all__ = [
 
 PAGE = "page"
 """The setting in the address of viser's page that has the token of the page around it."""
+
+STACKED = "stacked"
+"""The setting there that says that map, view and panels lie one below the other in the window."""
 
 # The page loads its own files alone.
 PAGE_POLICY = "; ".join(

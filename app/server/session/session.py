@@ -116,10 +116,10 @@ class Session:
         self.actions = Actions(
             self, client, self.cache, self.process, self.surveys, self.visit.address, buttons
         )
-        self.layout = Layout(client, self.actions, self.cache.names)
+        self.layout = Layout(client, self.actions, self.cache.names, stacked=self.visit.stacked)
         self.scene_view = SceneView(
             client,
-            self.layout.view_width,
+            self.layout.view_size,
             on_surface=lambda i, j: self.change(lambda s: changes.choose_surface_cell(s, i, j)),
             on_flat_map=lambda i, j: self.change(lambda s: changes.choose_cell(s, i, j)),
             on_drag=lambda pose: self.change(lambda s: changes.drag(s, pose), "gizmo"),

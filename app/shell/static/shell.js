@@ -5,14 +5,17 @@ import { MapPane } from "./map_pane.js";
 import { describe } from "./legend.js";
 import { watchPlaces } from "./places.js";
 import { Visit } from "./visit.js";
-import { split } from "./splitter.js";
+import { narrow, split } from "./splitter.js";
 
 const element = (id) => document.getElementById(id);
 const view = element("view"), canvas = element("map");
 
 const visit = new Visit();
 const opened = location.search.slice(1);
-view.src = `/?${opened ? `${opened}&` : ""}page=${visit.tokens}`;
+view.src = `/?${opened ? `${opened}&` : ""}page=${visit.tokens}${narrow.matches ? "&stacked" : ""}`;
+const stack = () => view.contentDocument?.documentElement.toggleAttribute("data-stacked", narrow.matches);
+view.addEventListener("load", stack);
+narrow.addEventListener("change", stack);
 // viser connects again only while its own document has the focus.
 view.addEventListener("load", () => view.contentWindow.focus());
 

@@ -1,6 +1,7 @@
 /* The bar between map and view: dragged, or moved with arrow keys; where it stands is remembered. */
 const LEAST = 0.15, MOST = 0.8, STEP = 0.02;
-const narrow = matchMedia("(max-width: 1000px)");
+/** Whether map, view and panels lie one below the other. */
+export const narrow = matchMedia("(max-width: 1000px)");
 
 export function split(bar) {
   const style = document.documentElement.style;

@@ -33,7 +33,7 @@ def view_of(server: viser.ViserServer, camera: tuple[float, ...] | None) -> Scen
     looker = SimpleNamespace(image_width=1280, image_height=800)
     client = SimpleNamespace(scene=server.scene, atomic=server.atomic, camera=looker)
     ignored = [lambda *_: None] * 4
-    view = SceneView(client, 0, *ignored)  # pyright: ignore[reportArgumentType]
+    view = SceneView(client, None, *ignored)  # pyright: ignore[reportArgumentType]
     view.camera = camera
     view.show(opened("soda_can"), move_gizmo=True)
     return view
