@@ -50,7 +50,7 @@ robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write th
 	$(BIN)/symgrasp bench robots --out docs/robots.json
 	$(BIN)/python -m docs.robots
 
-opening: $(VENV)/dev.stamp  ## print how long the page takes to show robots, in Chromium (ARGS="pr2 talos": only these)
+opening: $(VENV)/dev.stamp  ## print how long the page takes to open, and to show robots (ARGS="pr2 talos": these)
 	$(BIN)/python -m docs.opening $(ARGS)
 
 grids: $(VENV)/dev.stamp  ## measure coarse and fine grids of every shipped scene, and write docs/grids.md (minutes)

@@ -32,22 +32,24 @@ class SharedCache:
 
     Args:
         first: the scene the page opens with, a shipped name or a file.
+        holds_first: whether a page that is opened without a link begins with the arm at a good grasp.
 
     Raises:
         InputError: that scene is unusable.
 
     Attributes:
         first: the scene the page opens with.
+        holds_first: see above.
         names: the scenes that can be opened by name.
         folders: where the files of an uploaded scene may lie.
     """
 
-    def __init__(self, first: str) -> None:
+    def __init__(self, first: str, *, holds_first: bool = False) -> None:
         self._lock = threading.Lock()
         self._scenes: dict[str, Scene] = {}
         self._with_object: dict[tuple[str, str], tuple[Scene, ObjectChoice]] = {}
         self._maps: OrderedDict[MapKey, MapResult] = OrderedDict()
-        self.first = first
+        self.first, self.holds_first = first, holds_first
         self.names = tuple(dict.fromkeys([first, *shipped_scenes()]))
         own = [] if first in shipped_scenes() else [Path(first).resolve().parent]
         self.folders = (*own, SCENES_DIR)

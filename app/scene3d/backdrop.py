@@ -60,10 +60,7 @@ def add_obstacle(client: viser.ClientHandle, name: str, o: Obstacle, index: int,
         if o.model is not None:
             model = o.model
             set_pose(scene.add_frame(f"{name}/links", show_axes=False), o.T_world_obstacle)
-            poses = model.forward(model.default_values())
-            seen = links = add_links(client, f"{name}/links", model, visuals)
-            for link, node in links.items():
-                set_pose(node, poses[model.link_index(link)])
+            seen = add_links(client, f"{name}/links", model, model.default_values(), visuals)
         bare = [shape_mesh(shape, f"obstacle {o.name}") for link, shape in o.shapes() if link not in seen]
         if bare:  # what cannot be seen otherwise
             mesh = joined(bare)

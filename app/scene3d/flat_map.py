@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import viser
@@ -15,7 +16,7 @@ from .cell_mesh import CellMesh, OnCell, flat_quads
 from .nodes import set_pose
 from .viewpoint import Viewpoint, stand_around
 
-__all__ = ["FLAT_SIZE", "FlatMap", "flat_map_position"]
+__all__ = ["FLAT_SIZE", "FlatMap", "close_up", "flat_map_position"]
 
 
 FLAT_SIZE = (0.33, 0.22)
@@ -24,6 +25,15 @@ FLAT_SIZE = (0.33, 0.22)
 
 MIN_FACING = float(np.cos(np.deg2rad(65)))
 """Cosine of the angle between its front and the camera beyond which the flat map turns to the camera."""
+
+CLOSE_WIDTH = 0.5
+"""Least width (m) of a view that is close to the object."""
+
+ABOVE = 0.12
+"""How far (m) the middle of such a view is above that of the object: hands and arms come from above."""
+
+TOWARDS_MAP = 0.45
+"""Share of the way from the object to the flat map at which the middle of such a view is."""
 
 
 class FlatMap:
@@ -91,3 +101,13 @@ def flat_map_position(state: State, view: Viewpoint) -> Array:
     position = centre + away * (profile.r_max + 0.07 + FLAT_SIZE[0] / 2) * view.right
     position[2] = max(position[2], FLAT_SIZE[1] / 2 + 0.06)
     return position
+
+
+def close_up(state: State, view: Viewpoint) -> Viewpoint:
+    """Return a viewpoint in the direction of another, in which the object and the flat map fill the view."""
+    profile, pose, flat = state.scene.profile, state.T_world_object, flat_map_position(state, view)
+    axis = np.array([[0.0, 0.0, h, 1.0] for h in (profile.h_min, profile.h_max)])
+    ends = (axis @ pose.T)[:, :3]
+    look_at = (1 - TOWARDS_MAP) * ends.mean(axis=0) + TOWARDS_MAP * flat + [0.0, 0.0, ABOVE]
+    edges = flat + np.array([[-0.5], [0.5]]) * FLAT_SIZE[0] * view.right
+    return replace(view, look_at=look_at, width=CLOSE_WIDTH, points=np.concatenate([ends, edges]))

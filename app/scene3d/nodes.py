@@ -20,21 +20,27 @@ def set_pose(node: viser.SceneNodeHandle, pose: Array) -> None:
 
 
 def add_links(
-    client: viser.ClientHandle, root: str, model: RobotModel, given: Visuals
+    client: viser.ClientHandle, root: str, model: RobotModel, values: Array, given: Visuals
 ) -> dict[str, viser.GlbHandle]:
-    """Add the visible links of a robot.
+    """Add the visible links of a robot, each where it is: a browser draws them as soon as they arrive.
 
     Args:
         client: the browser.
         root: path of the node to add them under.
         model: the robot's model.
+        values: the joint values (n,) of the whole robot, in rad or m.
         given: what is known of how robots look; what is missing is read.
 
     Returns:
         Link name → its node.
     """
     visuals = given[model.urdf] if model.urdf in given else link_visuals(model.urdf)
-    return {
-        link: client.scene.add_glb(f"{root}/{k}", glb, cast_shadow=False, receive_shadow=False)
-        for k, (link, glb) in enumerate(visuals.items())
-    }
+    poses = model.forward(values)
+    nodes = {}
+    for k, (link, glb) in enumerate(visuals.items()):
+        pose = poses[model.link_index(link)]
+        nodes[link] = client.scene.add_glb(
+            f"{root}/{k}", glb, wxyz=quat_wxyz(pose), position=pose[:3, 3],
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+    return nodes

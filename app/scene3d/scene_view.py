@@ -14,7 +14,7 @@ from ..render.drawn_poses import drawn_joint_values
 from ..state.page_link import Camera
 from ..state.state import State
 from .backdrop import add_floor, add_lights, add_obstacle
-from .flat_map import FlatMap
+from .flat_map import FlatMap, close_up
 from .ghost_view import GhostView
 from .nodes import set_pose
 from .object_view import ObjectView
@@ -42,6 +42,7 @@ class SceneView:
 
     Attributes:
         camera: the camera to show the next scene from; None for a viewpoint that suits the scene.
+        is_close: whether that viewpoint is close to the object, for the next scene.
         flat_map: the flat map; None before a scene is shown.
     """
 
@@ -65,6 +66,7 @@ class SceneView:
         self._builds = self._ghosts = 0
         self._dark = False
         self.camera: Camera | None = None
+        self.is_close = False
         self._root = self._object_root = ""
         self.flat_map: FlatMap | None = None
 
@@ -111,13 +113,15 @@ class SceneView:
         root = self._root = self._replace(self._root, "/scene")
         self._object_root = ""
         given, self.camera = self.camera, None
-        view = choose_viewpoint(scene, state.T_world_object)
+        values = drawn_joint_values(state)
+        view = choose_viewpoint(scene, state.T_world_object, values if self.is_close else None)
         view = self._viewpoint = view.seen_from(given) if given else view
+        seen, self.is_close = close_up(state, view) if self.is_close else view, False
         with client.atomic():
             client.camera.fov = FIELD_OF_VIEW
             client.camera.up_direction = (0.0, 0.0, 1.0)
-            client.camera.position = np.array(given[:3]) if given else view.camera(self._aspect())
-            client.camera.look_at = np.array(given[3:]) if given else view.look_at
+            client.camera.position = np.array(given[:3]) if given else seen.camera(self._aspect())
+            client.camera.look_at = np.array(given[3:]) if given else seen.look_at
         client.scene.add_frame(root, show_axes=False)
         add_lights(client, root, view)
         self._dark = state.display.dark
@@ -127,7 +131,7 @@ class SceneView:
             add_obstacle(client, f"{root}/obstacle{k}", obstacle, k, visuals)
         self._build_object(state)
         self.robots = {
-            name: RobotView(client, f"{root}/robot{k}", robot, visuals)
+            name: RobotView(client, f"{root}/robot{k}", robot, values[name], visuals)
             for k, (name, robot) in enumerate(scene.robots.items())
         }
         self.tool_path = ToolPath(client, root)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symgrasp.poses import Array
+from symgrasp.poses import Array, translation
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 
@@ -86,7 +86,9 @@ class Viewpoint:
         return self.look_at + distance * towards
 
 
-def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
+def choose_viewpoint(
+    scene: Scene, T_world_object: Array, values: Mapping[str, Array] | None = None
+) -> Viewpoint:
     """Choose a viewpoint with robots and object side by side and the object visible.
 
     Of `AZIMUTHS`, the one wins from which boxes and cylinders hide least of the object and its axis is
@@ -95,6 +97,7 @@ def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
     Args:
         scene: the scene.
         T_world_object: pose (4, 4) of the object.
+        values: robot → its joint values (n,) in rad or m, where links at them may hide the object as well.
     """
     bases = np.array([robot.T_world_base[:3, 3] for robot in scene.robots.values()])
     axis = np.array([[0.0, 0.0, h, 1.0] for h in np.linspace(scene.profile.h_min, scene.profile.h_max, 5)])
@@ -120,9 +123,11 @@ def choose_viewpoint(scene: Scene, T_world_object: Array) -> Viewpoint:
         reach = np.abs((np.concatenate([bases, points, centres]) - look_at) @ right).max() + margin
         return Viewpoint(look_at, direction, float(max(MIN_WIDTH, 2 * reach)), in_view)
 
+    boxes = [box for o in scene.obstacles if (box := _box(o))] + _link_boxes(scene, values or {})
+
     def cost(view: Viewpoint) -> float:
         eye = view.camera(aspect=1.0)
-        hidden = sum(_hides(o, point, eye) for o in scene.obstacles for point in points)
+        hidden = sum(_hides(box, point, eye) for box in boxes for point in points)
         return hidden + 2 * abs(float(T_world_object[:3, 2] @ view.direction))
 
     return min((view(start + a) for a in AZIMUTHS), key=cost)
@@ -150,15 +155,36 @@ def stand_around(scene: Scene, T_world_object: Array) -> bool:
     return len(bases) > 1 and bool(np.linalg.norm((middle[:3] - bases.mean(axis=0))[:2]) < AROUND)
 
 
-def _hides(o: Obstacle, point: Array, eye: Array) -> bool:
-    """Return whether the bounding box of a box or cylinder intersects the line from eye to point."""
+_Box = tuple[Array, Array]
+"""Half of the sizes (3,) of a box, and the pose (4, 4) of its middle in the world."""
+
+
+def _box(o: Obstacle) -> _Box | None:
+    """Return the bounding box of a box or cylinder; None for any other obstacle."""
     if o.kind == "box":
-        half = np.array(o.size) / 2
-    elif o.kind == "cylinder":
-        half = np.array([o.size[0], o.size[0], o.size[1] / 2])
-    else:
-        return False
-    to_local = np.linalg.inv(o.T_world_obstacle)
+        return np.array(o.size) / 2, o.T_world_obstacle
+    if o.kind == "cylinder":
+        return np.array([o.size[0], o.size[0], o.size[1] / 2]), o.T_world_obstacle
+    return None
+
+
+def _link_boxes(scene: Scene, values: Mapping[str, Array]) -> list[_Box]:
+    """Return boxes around the pieces of the links of robots at joint values."""
+    boxes = []
+    for name, q in values.items():
+        robot = scene.robots[name]
+        poses = robot.T_world_base @ robot.model.forward(q)
+        for link, pose in zip(robot.model.link_names, poses, strict=True):
+            for hull in robot.model.hulls(link):
+                low, high = hull.min(axis=0), hull.max(axis=0)
+                boxes.append(((high - low) / 2, pose @ translation((low + high) / 2)))
+    return boxes
+
+
+def _hides(box: _Box, point: Array, eye: Array) -> bool:
+    """Return whether a box intersects the line from eye to point."""
+    half, T_world_box = box
+    to_local = np.linalg.inv(T_world_box)
     start, end = (to_local @ [*p, 1.0] for p in (point, eye))
     step = end[:3] - start[:3]
     step = np.where(np.abs(step) < 1e-12, 1e-12, step)

@@ -15,18 +15,21 @@ from ..compute.warm_up import compute_first_map
 from .door.lobby import open_lobby
 from .kept_pages.stored_pages import stored_pages_folder
 
-__all__ = ["serve"]
+__all__ = ["STORY", "serve"]
+
+STORY = "pick_pour_place"
+"""The scene that the page opens with where none is named: it has several tasks that one grasp serves."""
 
 SIGNAL_INTERVAL = 0.5
 """Time (s) after which Ctrl-C is noticed at the latest: the system may hand the signal to any thread, but
 only the main thread acts on it, once it runs."""
 
 
-def serve(scene: str, host: str, port: int, max_sessions: int = 16) -> None:
+def serve(scene: str | None, host: str, port: int, max_sessions: int = 16) -> None:
     """Serve the page until interrupted; the address is printed once it listens.
 
     Args:
-        scene: the scene to open with, a shipped name or a file.
+        scene: the scene to open with, a shipped name or a file; None for `STORY`, with the arm at a grasp.
         host: address to listen on.
         port: port to listen on; never another one.
         max_sessions: how many browsers may use it at the same time.
@@ -53,12 +56,12 @@ def serve(scene: str, host: str, port: int, max_sessions: int = 16) -> None:
         print("\nsymgrasp: stopped", flush=True)
 
 
-def _warm_cache(scene: str) -> SharedCache:
+def _warm_cache(scene: str | None) -> SharedCache:
     """Return the cache with the first map in it, so that the page opens with its map.
 
     Where code has to be compiled for it, the page is there sooner, and begins with a coarse map.
     """
-    cache = SharedCache(scene)
+    cache = SharedCache(scene or STORY, holds_first=scene is None)
     if is_search_compiled():
         compute_first_map(cache)
     return cache

@@ -72,6 +72,7 @@ class State:
         delta: turn (rad) of the object about its axis.
         result: the newest map, which may be of an earlier pose.
         pick: the picked grasp.
+        holds_first: whether the grasp with the most room is picked as soon as the map is there.
         map_view: how the map is shown, and what was computed for it.
         plan_results: the results of planners, and which part is shown.
         step: index of the plan's task that is shown; None once something else is shown.
@@ -101,6 +102,7 @@ class State:
     delta: float = 0.0
     result: MapResult | None = None
     pick: Pick | None = None
+    holds_first: bool = False
     map_view: MapViewState = field(default_factory=MapViewState)
     plan_results: PlanResults = field(default_factory=PlanResults)
     step: int | None = None

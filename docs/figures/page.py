@@ -120,12 +120,12 @@ def _open(scene: str) -> Iterator[GraspPage]:
 
 
 @contextmanager
-def open_server(scene: str) -> Iterator[str]:
-    """Run the page on a free port; gives its address."""
+def open_server(*scene: str) -> Iterator[str]:
+    """Run the page on a free port, on a scene or the one it begins with; gives its address."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    command = [sys.executable, "-m", "app", scene, "--port", str(port)]
+    command = [sys.executable, "-m", "app", *scene, "--port", str(port)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout

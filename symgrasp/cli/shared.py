@@ -51,8 +51,6 @@ Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 LONGEST_LINE = 300
 """Most characters of a message."""
 
-DEFAULT_SCENE = "bottle_on_table"
-
 
 def add_command(
     commands: Commands, name: str, run: Callable[[argparse.Namespace], int], text: str
@@ -75,11 +73,9 @@ def add_command(
 
 
 def add_scene(command: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Add the argument SCENE; one that is optional has a default."""
+    """Add the argument SCENE; one that is optional is None where it is not given."""
     text = "name of a shipped scene, or a .yaml file"
-    command.add_argument(
-        "scene", metavar="SCENE", help=text, nargs="?" if optional else None, default=DEFAULT_SCENE
-    )
+    command.add_argument("scene", metavar="SCENE", help=text, nargs="?" if optional else None)
     add_packages(command)
 
 

@@ -51,8 +51,11 @@ def browser() -> Iterator[Browser]:
 
 
 def start_app(scene: str, port: int, caches: Path) -> subprocess.Popen[str]:
-    """Start a server, which keeps what its pages show in a folder; it listens on return."""
-    command = [sys.executable, "-m", "app", scene, "--port", str(port)]
+    """Start a server, which keeps what its pages show in a folder; it listens on return.
+
+    Without a scene ("") it begins with its own.
+    """
+    command = [sys.executable, "-m", "app", *filter(None, [scene]), "--port", str(port)]
     environment = os.environ | {"XDG_CACHE_HOME": str(caches)}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     assert process.stdout

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from docs.opening import opened
+from playwright.sync_api import expect
+
+from app.server.serve import STORY
+from docs.opening import VISITS, opened, visits
 
 
 def test_a_robot_is_shown_when_it_is_measured(browser, tmp_path):
@@ -12,3 +15,18 @@ def test_a_robot_is_shown_when_it_is_measured(browser, tmp_path):
         assert seconds > 0
         assert not page.alerts.all()
         assert not page.complaints
+
+
+def test_the_page_begins_with_the_arm_at_a_grasp(open_page):
+    page = open_page("")
+    page.expect_title(STORY)
+    expect(page.text("panda holds it: feasible")).to_be_visible()
+    assert page.shown_map.look["picked"]
+    page.button("Let go").click()
+    expect(page.text("No grasp picked")).to_be_visible()
+
+
+def test_visits_are_measured_from_words_to_map(browser):
+    times = list(visits(browser))
+    assert len(times) == VISITS
+    assert all(0 < visit.words < visit.map for visit in times)

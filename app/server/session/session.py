@@ -25,6 +25,7 @@ from ...files.shown_paths import shown_paths
 from ...panels.layout import Layout
 from ...scene3d.scene_view import SceneView
 from ...state import changes, job_changes, robot_changes
+from ...state.first_grasp import with_first_grasp
 from ...state.page_link import Camera
 from ...state.plans.plan_changes import change_plan_results
 from ...state.plans.plan_results import PlanResults
@@ -212,6 +213,7 @@ class Session:
         before = self.state
         if state is before:
             return
+        state = with_first_grasp(state)
         if before is not None:
             state = remember(before, state, origin, time.monotonic())
         if before is None or state.input_values != before.input_values:
@@ -221,7 +223,7 @@ class Session:
         while (request := state.next_request) is not None:
             cached = self.cache.map(request) if isinstance(request, MapRequest) else None
             if cached:
-                state = replace(state, busy=None, result=cached)
+                state = with_first_grasp(replace(state, busy=None, result=cached))
             else:
                 state, job = self._begin(state, request)
         if state.is_obsolete:
@@ -285,11 +287,13 @@ class Session:
                 link, lambda scene, arm, hand: self.process.mount(scene, arm, hand, progress).scene
             )
             name = link.scene or self.cache.first
-            return link.apply(replace(State.of(scene, name), object_choice=choice)), link.camera
+            holds = self.cache.holds_first and link == Link()
+            opened = replace(State.of(scene, name), object_choice=choice, holds_first=holds)
+            return link.apply(opened), link.camera
 
         def done(result: tuple[State, Camera | None]) -> None:
             state, self._camera = result
-            self.scene_view.camera = self._camera
+            self.scene_view.camera, self.scene_view.is_close = self._camera, state.holds_first
             with self._changed:
                 self._commit(state)
 

@@ -15,6 +15,7 @@ const opened = location.search.slice(1);
 view.src = `/?${opened ? `${opened}&` : ""}page=${visit.tokens}${narrow.matches ? "&stacked" : ""}`;
 const stack = () => view.contentDocument?.documentElement.toggleAttribute("data-stacked", narrow.matches);
 view.addEventListener("load", stack);
+view.addEventListener("load", () => view.classList.add("loaded"));
 narrow.addEventListener("change", stack);
 // viser connects again only while its own document has the focus.
 view.addEventListener("load", () => view.contentWindow.focus());
