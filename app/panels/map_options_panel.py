@@ -31,6 +31,10 @@ class MapOptionsPanel(Panel):
             "Rolls side by side", False, hint="Also show a map of each of the two rolls of the hand."
         )
         self.on(self.rolls_apart, lambda s, v: replace(s, map_view=replace(s.map_view, rolls_apart=v)))
+        self.patterns = gui.add_checkbox(
+            "Patterns", False, hint="Tell the colours of the map apart by patterns as well."
+        )
+        self.on(self.patterns, lambda s, v: replace(s, map_view=replace(s.map_view, patterns=v)))
         self.compare = gui.add_checkbox(
             "Compare", False,
             hint="Also compute the map of the turned object from scratch, and count the cells that differ.",
@@ -44,4 +48,5 @@ class MapOptionsPanel(Panel):
         self.color_by.value = state.map_view.color_by
         self.handprint.value = state.map_view.handprint
         self.rolls_apart.value = state.map_view.rolls_apart
+        self.patterns.value = state.map_view.patterns
         self.compare.value = state.map_view.compare

@@ -32,6 +32,7 @@ from ..render.cell_colors import colored_map
 from ..render.holds import hand_holds
 from ..render.marks import marks_of
 from ..render.palette import OVERLAP, PRINTS
+from ..render.patterns import PLAIN, cell_patterns
 from ..render.prints import apart_text, hand_color, print_index, print_names, shown_prints
 from ..render.weak_cache import cached_with_first
 from ..state.map_view_state import RollChoice
@@ -84,6 +85,7 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | 
         "reasons": [reason.legend for reason in Reason],
         "feasible": int(Reason.FEASIBLE),
         "profile": grid.profile.points.tolist(),
+        "patterns": cell_patterns(color_by),
     }
     if layer is not None:
         head["layer"] = layer
@@ -169,11 +171,15 @@ def _look(state: State) -> dict[str, Any]:
         "marks": [[mark.h, float(wrap(mark.theta)), mark.label] for mark in marks_of(state)],
         "picked": [state.base_cell.row, state.base_cell.column] if state.base_cell else None,
         "holds": [[_hex(PRINTS[holds.color]), holds.spans] for holds in hand_holds(state)],
+        "patterned": state.map_view.patterns,
         "legend": [],
     }
     if state.result:
         colored = colored_map(state.result.map, state.map_view.roll, state.map_view.color_by)
         look["legend"] = [list(swatch) for swatch in colored.swatches]
+        indices = {_hex(color): k for k, color in reversed(list(enumerate(colored.colors)))}
+        patterns = dict(enumerate(cell_patterns(state.map_view.color_by)))
+        look["patterns"] = [patterns.get(indices[swatch.color], PLAIN) for swatch in colored.swatches]
         look["counted"] = _counted(state.result.map, state.map_view.roll)
         if colored.scale:
             scale = colored.scale

@@ -59,6 +59,7 @@ class MapViewState:
         explained: the candidates of the cell that was picked last.
         candidate: index of the candidate shown; None for the default, see `State.candidate`.
         rolls_apart: whether each roll has a map of its own as well.
+        patterns: whether colours of cells have patterns over them, which tell them apart without colour.
         hovered: the cell of the unshifted map that is pointed at.
     """
 
@@ -70,6 +71,7 @@ class MapViewState:
     explained: ExplainResult | None = None
     candidate: int | None = None
     rolls_apart: bool = False
+    patterns: bool = False
     hovered: Cell | None = None
 
     @property
@@ -77,6 +79,7 @@ class MapViewState:
         """Everything that widgets show and can change."""
         return (
             self.roll, self.color_by, self.handprint, self.compare, self.candidate, self.rolls_apart,
+            self.patterns,
         )  # fmt: skip
 
     def missing_request(self, request: MapRequest, delta: float, cell: Cell | None) -> Request | None:
@@ -123,6 +126,7 @@ class MapViewState:
             handprint=self.handprint,
             compare=self.compare,
             rolls_apart=self.rolls_apart,
+            patterns=self.patterns,
         )
 
     def for_another_cell(self) -> MapViewState:

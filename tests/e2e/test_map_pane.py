@@ -198,3 +198,39 @@ def test_the_splitter_is_remembered(open_page):
     after = page.map.bounding_box()
     assert after
     assert abs(after["width"] - before["width"] - 160) < 8
+
+
+def test_patterns_tell_reasons_apart_without_colour(open_page, bottle_map):
+    page = open_page()
+    page.expect_title("bottle_on_table")
+    shown = [Reason.FEASIBLE, Reason.SCENE_COLLISION, Reason.UNREACHABLE]
+    reasons = RollChoice.EITHER.reason(bottle_map)
+
+    def amid(reason: Reason) -> tuple[float, float]:
+        """The pixel of a cell with that reason all around it."""
+        alike = np.lib.stride_tricks.sliding_window_view(reasons == reason, (3, 5)).all(axis=(2, 3))
+        row, column = np.argwhere(alike)[0]
+        return at(page, bottle_map, row + 1, column + 2)
+
+    cells = {reason: amid(reason) for reason in shown}
+
+    def strokes(reason: Reason) -> bool:
+        """Whether the grey values around a cell of that reason differ."""
+        picture = Image.open(io.BytesIO(page.page.screenshot())).convert("L")
+        x, y = cells[reason]
+        around = np.asarray(picture.crop((int(x) - 5, int(y) - 5, int(x) + 6, int(y) + 6)), dtype=int)
+        return int(around.max() - around.min()) > 25
+
+    drawn_over = page.legend.locator("i[style*=background-image]")
+    expect(drawn_over).to_have_count(0)
+    page.frame.get_by_role("tab", name="View").click()
+    page.frame.get_by_label("Patterns").check()
+    expect(drawn_over).not_to_have_count(0)
+    for _ in range(3):
+        page.next_frame()
+    assert [strokes(reason) for reason in shown] == [False, True, True]
+    rows = page.legend.locator("li").filter(has=page.page.locator("i[style*=background-image]"))
+    assert rows.count() == page.legend.locator("li").count() - 1  # all but "feasible"
+    page.frame.get_by_label("Patterns").uncheck()
+    expect(drawn_over).to_have_count(0)
+    assert page.complaints == []

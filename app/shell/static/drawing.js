@@ -1,5 +1,6 @@
 /* How the map is drawn: cells, axes, marks, and the object's profile beside it, sharp at every size. */
 import { TURN, mod } from "./frame.js";
+import { patterned, tile } from "./patterns.js";
 
 const FONT = "11px system-ui, sans-serif";
 const ROOM = { left: 46, bottom: 38, top: 10, right: 12, profile: 64 };
@@ -38,6 +39,14 @@ export function layout(pane) {
     Math.max(20, height - top - bottom - (lying ? profile : 0)), lying);
 }
 
+/** The colours that have a pattern, each with its cells as a picture. */
+export function masks(cells) {
+  return (cells.patterns ?? []).flatMap((name, k) => {
+    if (!name || !cells.index.includes(k)) return [];
+    return [{ name, color: cells.colors[k], cells: texture(cells, cells.index.map((value) => Number(value === k)), ["#000000", "#000000"], 254) }];
+  });
+}
+
 export function draw(pane) {
   const { canvas, frame, cells, look, style } = pane;
   const context = canvas.getContext("2d"), ratio = devicePixelRatio;
@@ -57,7 +66,9 @@ export function draw(pane) {
     context.fillRect(x, y, width, height);
     context.globalAlpha = 0.3;
   }
-  drawCells(context, pane, pane.picture, mod((cells.start - pane.delta + Math.PI) / TURN, 1));
+  const begin = mod((cells.start - pane.delta + Math.PI) / TURN, 1);
+  drawCells(context, pane, pane.picture, begin);
+  if (patterned(look)) drawPatterns(context, pane, begin);
   context.globalAlpha = 1;
   if (pane.prints) drawCells(context, pane, pane.shade, 0);
   if (pane.hovered) outline(context, pane, pane.hovered);
@@ -84,6 +95,26 @@ function drawCells(context, { frame }, picture, begin) {
     }
     context.drawImage(picture, 0, 0, 1, 1);
     context.restore();
+  }
+}
+
+/** Fill the cells of every colour with its pattern, which moves with the map. */
+function drawPatterns(context, pane, begin) {
+  const { canvas, frame } = pane, ratio = devicePixelRatio;
+  const sheet = new OffscreenCanvas(canvas.width, canvas.height), on = sheet.getContext("2d");
+  const [x, y] = frame.toScreen(begin, 0);
+  on.setTransform(ratio, 0, 0, ratio, 0, 0);
+  on.imageSmoothingEnabled = false;
+  for (const { name, color, cells } of pane.masks) {
+    on.globalCompositeOperation = "source-over";
+    on.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+    drawCells(on, pane, cells, begin);
+    on.globalCompositeOperation = "source-in";
+    const fill = on.createPattern(tile(name, color, ratio), "repeat");
+    fill.setTransform(new DOMMatrix().translate(x, y).scale(1 / ratio));
+    on.fillStyle = fill;
+    on.fillRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+    context.drawImage(sheet, 0, 0, canvas.clientWidth, canvas.clientHeight);
   }
 }
 

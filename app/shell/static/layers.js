@@ -38,7 +38,7 @@ export class Layers {
       box.classList.toggle("high", layer.kind === "hand");
       pane.lies = layer.kind === "hand";
       pane.canvas.classList.toggle("slides", layer.kind !== "hand");
-      pane.apply({ ...layer, kind: "look", title: layer.title, dark: look.dark, legend: [] });
+      pane.apply({ ...layer, kind: "look", title: layer.title, dark: look.dark, patterned: look.patterned, legend: [] });
       pane.restyle();
     });
     this.section.hidden = !layers.length;

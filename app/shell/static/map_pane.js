@@ -1,6 +1,6 @@
 /* The map: holds what the server says of it, and does what is done to it. */
 import { Frame, TURN, mod } from "./frame.js";
-import { draw, layout, texture } from "./drawing.js";
+import { draw, layout, masks, texture } from "./drawing.js";
 
 const CLICK = 5; // how far (px) a pointer may move in a click
 const STEP = Math.PI / 720; // that of the slider (rad)
@@ -60,7 +60,10 @@ export class MapPane {
         rolls: new Uint8Array(data, 5 * size, size),
       } : null;
       this.awaited = null;
-      if (this.cells) this.picture = texture(this.cells, this.cells.index, this.cells.colors);
+      if (this.cells) {
+        this.picture = texture(this.cells, this.cells.index, this.cells.colors);
+        this.masks = masks(this.cells);
+      }
     } else if (head.kind === "prints") {
       this.prints = size ? { ...head, index: new Uint8Array(data, 0, size) } : null;
       if (this.prints) this.shade = texture(head, this.prints.index, head.colors, 205);
