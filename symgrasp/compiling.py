@@ -42,6 +42,7 @@ SOURCES = (
     "motion/paths/trees.py",
     "object/manifold.py",
     "planners/*.py",
+    "robot/limits.py",
 )
 """Files of this package that hold compiled functions, or constants that are compiled into them."""
 

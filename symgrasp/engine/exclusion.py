@@ -22,6 +22,7 @@ from symgrasp.compiling import njit
 from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.kinematics import place_arm
 from symgrasp.ik.vectors import STRICT
+from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = [
     "EXCLUDED",
@@ -174,7 +175,7 @@ def _limits_exclude(nodes, one, a, other, b, apart):
             continue
         here = _turn(nodes.q[one, a, j] - limits[2, j])
         there = _turn(nodes.q[other, b, j] - limits[2, j])
-        outside = min(abs(here), abs(there)) - half
+        outside = min(abs(here), abs(there)) - half - LIMIT_TOLERANCE
         aside = here * there > 0.0 or abs(here) + abs(there) >= math.pi  # not through the range
         if outside > BEND * apart * apart and aside:
             return True

@@ -17,6 +17,7 @@ from symgrasp.engine.kinematics import place_frames, place_hand
 from symgrasp.engine.path_checks import check_path_of_arm, check_path_of_hand, write_tool
 from symgrasp.engine.search_types import BLOCKED, FEASIBLE, RETREAT_UNDECIDED
 from symgrasp.ik.branches import branches_near
+from symgrasp.ik.joints import within
 from symgrasp.ik.retreat import RETREAT_TURN
 from symgrasp.ik.vectors import STRICT
 
@@ -126,8 +127,8 @@ def _follow(limits, turns, q, inside, at):
             for j in range(len(at)):
                 # A joint with a range above a full turn takes the value nearest to the present one.
                 near = q[b, j] + 2 * math.pi * np.rint((at[j] - q[b, j]) / (2 * math.pi))
-                if limits[0, j] <= near <= limits[1, j]:
-                    q[b, j] = near
+                if within(limits, j, near):
+                    q[b, j] = min(max(near, limits[0, j]), limits[1, j])
                 turn = max(turn, abs(q[b, j] - at[j]))
             if turn < least:
                 nearest, least = b, turn

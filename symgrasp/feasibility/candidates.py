@@ -171,7 +171,8 @@ class CandidateChecker:
             return None
         # A joint that turns further than once around goes on from where it is, where its limits allow.
         near = choices + 2 * np.pi * np.round((q - choices) / (2 * np.pi))
-        choices = np.where((near >= self.arm.lower) & (near <= self.arm.upper), near, choices)
+        inside = self.arm.value_inside(near)
+        choices = np.where(inside, np.clip(near, self.arm.lower, self.arm.upper), choices)
         turns = np.abs(choices - q)
         nearest = int(turns.max(axis=1).argmin())
         return choices[nearest] if np.all(turns[nearest] <= self._turns) else None

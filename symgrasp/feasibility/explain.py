@@ -279,7 +279,7 @@ def _checked(
 def _violations(arm: Arm, q: Array) -> tuple[LimitViolation, ...]:
     """Return the joints of a configuration (n,) that are outside their limits, furthest first."""
     limits = np.where(q < arm.lower, arm.lower, arm.upper)
-    outside = np.flatnonzero((q < arm.lower) | (q > arm.upper))
+    outside = np.flatnonzero(~arm.value_inside(q))
     found = [LimitViolation(arm.value_names[j], float(q[j]), float(limits[j])) for j in outside]
     return tuple(sorted(found, key=lambda joint: -joint.excess))
 

@@ -14,7 +14,7 @@ import numpy as np
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik.arcs import ARCS, HALVINGS
 from symgrasp.ik.chain import COSINE_TOLERANCE, THREE_PARALLEL, Chain
-from symgrasp.ik.joints import misses, settle
+from symgrasp.ik.joints import misses, onto_limits, settle, within
 from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.ik.pair.polynomial import POLYNOMIAL_NUMBERS
@@ -23,6 +23,7 @@ from symgrasp.ik.parallel import parallel_branches
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
+from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = ["Memory", "branch_count", "branches_at", "branches_near", "new_memory", "solve_range"]
 
@@ -125,6 +126,8 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         for b in range(exists.shape[0]):
             exists[b] = exists[b] and _in_cell(chain, q[b])
             some |= exists[b]
+            if inside[b]:
+                onto_limits(chain.limits, q[b])
         return solvable and some
     if joint[8] == THREE_PARALLEL:
         solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, memory.numbers)
@@ -139,6 +142,8 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
             exists[b] = not misses(chain.forward, q[b], T)
         inside[b] = inside[b] and exists[b]
         exists[b] = exists[b] and _in_cell(chain, q[b])
+        if inside[b]:
+            onto_limits(chain.limits, q[b])
     return solvable
 
 
@@ -158,8 +163,9 @@ def branches_near(chain, k, T, at, most, q, exists, inside, memory):
     if chain.joint[8] != MEETING_PAIR and not chain.joint[9]:
         limits = leeway = memory.near
         for j in range(at.shape[0]):
-            limits[0, j] = max(chain.limits[0, j], at[j] - most)
-            limits[1, j] = min(chain.limits[1, j], at[j] + most)
+            # Further than the tolerance of limits, so that no value is moved onto what is none.
+            limits[0, j] = max(chain.limits[0, j], at[j] - most - 2 * LIMIT_TOLERANCE)
+            limits[1, j] = min(chain.limits[1, j], at[j] + most + 2 * LIMIT_TOLERANCE)
             limits[2, j], limits[3, j], limits[4, j] = at[j], math.cos(at[j]), math.sin(at[j])
             limits[5, j] = math.cos(most) - COSINE_TOLERANCE
     near = Chain(chain.geometry, chain.joint, limits, leeway, chain.forward, chain.fixed)
@@ -170,4 +176,4 @@ def branches_near(chain, k, T, at, most, q, exists, inside, memory):
 def _in_cell(chain, q):
     """Whether the azimuth of a pitched arm, if it is one, is within the cell that is to be reached."""
     j = chain.joint[10]
-    return j < 0 or chain.limits[0, j] <= q[j] <= chain.limits[1, j]
+    return j < 0 or within(chain.limits, j, q[j])

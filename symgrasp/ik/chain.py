@@ -17,8 +17,9 @@ __all__ = [
 ]  # fmt: skip
 
 
-COSINE_TOLERANCE = 1e-9
-"""A joint is known to be outside its limits from its cosine alone where that is off by more than this."""
+COSINE_TOLERANCE = 4e-9
+"""A joint is known to be outside its limits from its cosine alone where that is off by more than this: what
+the tolerance of limits may change it by, and more."""
 
 AXES, R0, P0 = 0, 18, 27
 """Where the parts that all geometries have begin in a row of `Chain.geometry`."""

@@ -7,12 +7,14 @@ import math
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import P0, R0
 from symgrasp.ik.vectors import STRICT, column, dot, minus, plus, rotate, row, transposed_times, vec
+from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = [
     "ROOT_TOLERANCE",
     "miss",
     "misses",
     "nearest_turn",
+    "onto_limits",
     "outside",
     "settle",
     "sine",
@@ -66,8 +68,15 @@ def nearest_turn(limits, joint, value):
 
 @njit(**STRICT)
 def within(limits, joint, value):
-    """Whether a joint value is inside its limits."""
-    return limits[0, joint] <= value <= limits[1, joint]
+    """Whether a joint value is inside its limits, or beyond them by at most `LIMIT_TOLERANCE`."""
+    return limits[0, joint] - LIMIT_TOLERANCE <= value <= limits[1, joint] + LIMIT_TOLERANCE
+
+
+@njit(**STRICT)
+def onto_limits(limits, row):
+    """Move joint values (n,) that are beyond their limits onto them."""
+    for k in range(row.shape[0]):
+        row[k] = min(max(row[k], limits[0, k]), limits[1, k])
 
 
 @njit(**STRICT)

@@ -18,6 +18,7 @@ from symgrasp.poses import Array, from_rotation, inverse, rotation_about
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.handprint import Handprint, handprint
 from symgrasp.robot.joint import Joint
+from symgrasp.robot.limits import LIMIT_TOLERANCE
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.pitch import SAME_PITCH, STEEPEST, pitch_range
 from symgrasp.robot.torso import Torso
@@ -308,7 +309,8 @@ class Arm:
         """Add full turns to joint values (..., n) so that they are inside the limits, where possible.
 
         Each value is brought nearest to the middle of its range, which is inside whenever any full turn
-        is.
+        is. One beyond a limit by at most `LIMIT_TOLERANCE` is inside; where all are, it is moved onto the
+        limit.
 
         Returns:
             The joint values (..., n) with the turns added, and whether all n are inside (...).
@@ -319,13 +321,18 @@ class Arm:
             bounded, 0.5 * (np.where(bounded, self.lower, 0) + np.where(bounded, self.upper, 0)), 0
         )
         q = q + 2 * np.pi * np.round((middle - q) / (2 * np.pi))
-        return q, np.all((q >= self.lower) & (q <= self.upper), axis=-1)
+        inside = self.value_inside(q).all(axis=-1)
+        return np.where(inside[..., None], np.clip(q, self.lower, self.upper), q), inside
+
+    def value_inside(self, q: Array) -> np.ndarray:
+        """Whether values (..., n) are inside their limits, or beyond by at most `LIMIT_TOLERANCE`."""
+        return (q >= self.lower - LIMIT_TOLERANCE) & (q <= self.upper + LIMIT_TOLERANCE)
 
     def in_cell(self, q: Array) -> np.ndarray:
         """Whether values (..., n) grasp in the cell that is meant: not with an azimuth beyond its edge."""
         if not self.pitched:
             return np.ones(q.shape[:-1], dtype=bool)
-        return (q[..., AZIMUTH] >= self.lower[AZIMUTH]) & (q[..., AZIMUTH] <= self.upper[AZIMUTH])
+        return self.value_inside(q)[..., AZIMUTH]
 
     def robot_values(self, q: ArrayLike, opening: float | None = None) -> Array:
         """Return values (N,) of all the robot's joints: this arm at ``q`` (n,), the rest at home.

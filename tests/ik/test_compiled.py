@@ -7,6 +7,7 @@ import pytest
 
 from symgrasp.ik import CompiledIK
 from symgrasp.poses import from_position_quat, pose_error, rotation_about
+from symgrasp.robot.limits import LIMIT_TOLERANCE
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
@@ -139,6 +140,45 @@ def test_recall(name, arms):
         gaps.append(distance(solve_at(ik, arm.tool_pose(q), phi).q, q).min(initial=np.inf))
     assert np.max(gaps) < 1e-3
     assert np.count_nonzero(np.array(gaps) > 1e-6) <= 3
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_recall_at_limits(name, arms):
+    """Rounding puts half of what stands at a limit outside; it counts as inside, and is moved onto the limit.
+
+    Joints that an elbow all but straight blurs by more than the tolerance are an exception.
+    """
+    arm = arms[name]
+    ik = CompiledIK(arm, 1)
+    chance = np.random.default_rng(5)
+    moved, lost = 0, 0
+    for q in samples(arm, 300, 6):
+        limit = np.where(chance.random(arm.dof) < 0.5, arm.lower, arm.upper)
+        q = np.where(chance.random(arm.dof) < 0.3, limit, q)
+        q = np.where(np.abs(q) < 1e-3, arm.lower / 2, q)  # at zero the Panda's elbow lets two joints trade
+        phi = 0.0 if ik.locked is None else float(q[ik.locked])
+        free = np.arange(arm.dof) != ik.locked
+        beyond = np.sign(q) * 0.1 * LIMIT_TOLERANCE * ((q == limit) & free)
+        for pose in (arm.tool_pose(q), arm.tool_pose(q + beyond)):
+            found = solve_at(ik, pose, phi)
+            here = found.q[found.inside]
+            lost += np.abs(here - q).max(axis=1).min(initial=np.inf) > 1e-6
+            assert np.all((here >= arm.lower) & (here <= arm.upper))
+            moved += int(np.any((here == arm.lower) | (here == arm.upper), axis=1).sum())
+    assert moved > 200
+    assert lost <= 3
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_what_is_beyond_a_limit_by_more_than_rounding_is_outside(name, arms):
+    arm = arms[name]
+    ik = CompiledIK(arm, 1)
+    for k, q in enumerate(samples(arm, 100, 7)):
+        j = [j for j in range(arm.dof) if j != ik.locked][k % (arm.dof - (ik.locked is not None))]
+        q[j] = arm.upper[j] + 1e-6
+        phi = 0.0 if ik.locked is None else float(q[ik.locked])
+        found = solve_at(ik, arm.tool_pose(q), phi)
+        assert not found.inside[distance(found.q, q) < 1e-7].any()
 
 
 @pytest.mark.parametrize("name", ARMS)

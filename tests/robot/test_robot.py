@@ -68,6 +68,15 @@ def test_full_turns_are_taken_back_into_the_limits(panda):
     assert not arm.within_limits(outside)[1].any()
 
 
+def test_a_value_beyond_a_limit_by_a_rounding_is_at_it(panda):
+    arm = make_arm(panda)
+    q = np.tile(0.5 * (arm.lower + arm.upper), (3, 1))
+    q[0, 1], q[1, 1], q[2, 1] = arm.upper[1] + 1e-15, arm.upper[1] + 1e-9, arm.upper[1] + 2e-9
+    back, ok = arm.within_limits(q)
+    assert ok.tolist() == [True, True, False]
+    assert back[:2, 1].tolist() == [arm.upper[1]] * 2
+
+
 def test_neighbours_look_through_links_without_a_shape(panda):
     assert frozenset(("panda_link7", "panda_hand")) in panda.neighbours()
     assert panda.mount_links() == {"panda_link0"}

@@ -57,6 +57,7 @@ from symgrasp.ik.pair.geometry import OUTER_LAST, PAIR_PHI
 from symgrasp.ik.pair.polynomial import equations_of, may_reach, product, residual_at, solve_inner
 from symgrasp.ik.roots import size2
 from symgrasp.ik.vectors import STRICT, perpendicular, rotate, subproblem1, times, vec
+from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = ["PAIR_BRANCHES", "STARTS", "VIEWS", "pair_branches"]
 
@@ -181,7 +182,8 @@ def _angle(where, u):
 def _arc_outside(limits, joint, arc):
     """Whether an arc of the whole turn is outside the limits of a joint."""
     middle, half = nearest_turn(limits, joint, angle_in_arc(arc, 0.5)), math.pi / ARCS
-    return middle + half < limits[0, joint] or middle - half > limits[1, joint]
+    beyond = half + LIMIT_TOLERANCE
+    return middle + beyond < limits[0, joint] or middle - beyond > limits[1, joint]
 
 
 @njit(**STRICT)

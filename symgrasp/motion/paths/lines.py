@@ -18,6 +18,7 @@ from symgrasp.ik import Solver
 from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.search import NoMotionError, blockers, prove
 from symgrasp.poses import Array, inverse, pose_error
+from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = ["CLEAR", "Leg", "LineTree", "configurations", "follow"]
 
@@ -139,7 +140,8 @@ def _following_turns(layer: Array, following: Array, limits: Array) -> Array:
     """Return what follows (m, k, n) each configuration: with full turns added towards it, within limits."""
     turns = 2 * np.pi * np.round((layer[:, None] - following[None]) / (2 * np.pi))
     near = following[None] + turns
-    return np.where((near >= limits[0]) & (near <= limits[1]), near, following[None])
+    inside = (near >= limits[0] - LIMIT_TOLERANCE) & (near <= limits[1] + LIMIT_TOLERANCE)
+    return np.where(inside, np.clip(near, *limits), following[None])
 
 
 def _edges(layer: Array, new: Array) -> tuple[np.ndarray, np.ndarray]:
