@@ -7,10 +7,12 @@ through `printable` before it is shown, because names may hold anything.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
-from reprlib import Repr
+from itertools import islice
+from numbers import Integral, Real
 
 __all__ = [
     "LONGEST",
@@ -25,6 +27,7 @@ __all__ = [
     "SurveyError",
     "SymgraspError",
     "UrdfError",
+    "as_written",
     "one_of",
     "printable",
     "shortened",
@@ -39,9 +42,8 @@ _KEPT = 40
 _AMOUNT = re.compile(r"[\d.,]+ [^\W\d_][^'\"]*")
 """A number with its unit."""
 
-_SHORT = Repr()
-_SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 4, 120, 120
-_SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = 8
+_DEEPEST, _MOST_ENTRIES, _LONGEST_TEXT = 4, 8, 120
+"""Levels, entries of a level, and characters of a text that a value is shown with."""
 
 
 class SymgraspError(Exception):
@@ -123,8 +125,8 @@ def one_of(choices: Iterable[str], wrong: object = None) -> str:
     """
     names = sorted(choices)
     similar = get_close_matches(str(wrong), names, n=1)
-    hint = f" (did you mean {similar[0]!r}?)" if similar else ""
-    return "one of " + ", ".join(repr(n) for n in names) + hint
+    hint = f" (did you mean {as_written(similar[0])}?)" if similar else ""
+    return "one of " + ", ".join(map(as_written, names)) + hint
 
 
 def printable(text: str) -> str:
@@ -143,20 +145,64 @@ def shortened(text: str, most: int) -> str:
     return text[: most - 1 - tail] + "…" + text[len(text) - tail :]
 
 
+def as_written(value: object, level: int = 0) -> str:
+    """Return a value as the file formats write it, on one line: null, true, [a list], {a: mapping}, 'a text'.
+
+    Long texts, long lists and what is nested deeply are shortened.
+
+    Args:
+        value: plain data, or what stands for it: tuples and sets are lists, paths are texts.
+        level: how deeply it is nested in what is written.
+    """
+    if value is None or isinstance(value, bool):
+        return "null" if value is None else str(value).lower()
+    if isinstance(value, Mapping | list | tuple | set | frozenset) and level == _DEEPEST and value:
+        return "{…}" if isinstance(value, Mapping) else "[…]"
+    if isinstance(value, Mapping):
+        pairs = [
+            f"{key if _is_plain(key) else as_written(key, level + 1)}: {as_written(own, level + 1)}"
+            for key, own in islice(value.items(), _MOST_ENTRIES)
+        ]
+        return "{" + ", ".join(pairs + ["…"] * (len(value) > _MOST_ENTRIES)) + "}"
+    if isinstance(value, list | tuple | set | frozenset):
+        entries = sorted(value, key=str) if isinstance(value, set | frozenset) else value
+        texts = [as_written(own, level + 1) for own in islice(entries, _MOST_ENTRIES)]
+        return "[" + ", ".join(texts + ["…"] * (len(value) > _MOST_ENTRIES)) + "]"
+    if isinstance(value, Real):
+        return _number(value)
+    text = shortened(str(value), _LONGEST_TEXT)
+    if "'" in text and '"' not in text and "\\" not in text:
+        return f'"{text}"'
+    return "'" + text.replace("'", "''") + "'"
+
+
+def _is_plain(key: object) -> bool:
+    """Whether a key needs no quotes."""
+    return isinstance(key, str) and re.fullmatch(r"\w[\w. -]*", key) is not None
+
+
+def _number(value: Real) -> str:
+    if isinstance(value, Integral):
+        try:
+            return str(int(value))
+        except ValueError:  # of thousands of digits
+            return "a very large number"
+    number = float(value)
+    if math.isfinite(number):
+        text = repr(number)
+        return text if "." in text else text.replace("e", ".0e")  # YAML knows no 1e-9
+    return ".nan" if math.isnan(number) else ".inf" if number > 0 else "-.inf"
+
+
 def _shown(value: object) -> str:
-    """Return a value as people say it: texts of files in quotes, amounts and what is not there in words."""
+    """Return a value as people say it: as files have it, amounts and what is not there in words."""
     if value is None:
         return "nothing"
-    if isinstance(value, bool):
-        return str(value).lower()
     if isinstance(value, (list, tuple, dict)) and not value:
         return "an empty mapping" if isinstance(value, dict) else "an empty list"
     if isinstance(value, str) and _AMOUNT.fullmatch(value):
         return value
-    try:
-        return _SHORT.repr(value)
-    except ValueError:  # an integer of thousands of digits
-        return "a very large number"
+    return as_written(value)
 
 
 def _line(*parts: str) -> str:

@@ -18,7 +18,7 @@ import yaml
 from pydantic import ValidationError
 
 from symgrasp.descriptions.srdf import find_srdf
-from symgrasp.errors import InputError, SceneError
+from symgrasp.errors import InputError, SceneError, as_written
 from symgrasp.files import LARGEST_YAML, SCENES_DIR, TEMPORARY, parse_yaml, read_file
 from symgrasp.references import package_dirs, portable, resolve
 from symgrasp.scene.format import SceneFile, describe_error, xacro_texts
@@ -74,7 +74,7 @@ def scene_yaml(scene: Scene, beside: Mapping[Path, str] | None = None) -> str:
         lines.append(
             "# It needs these files; on another machine, put them beside it and write their names only:"
         )
-        lines += [f"#   {path!r}" for path in dict.fromkeys(elsewhere)]
+        lines += [f"#   {as_written(path)}" for path in dict.fromkeys(elsewhere)]
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
     return "\n".join([*lines, text])
 

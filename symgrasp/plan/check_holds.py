@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from symgrasp.errors import as_written
 from symgrasp.plan.check_poses import TOLERANCE, check_pose, same_pose
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Hold, PlanTask
 from symgrasp.plan.report import Report
@@ -43,7 +44,9 @@ def check_holds(task: PlanTask, where: str, world: BulletWorld, report: Report) 
             return
         report.expect(hold.robot == arm.robot.name, f"{who}: belongs to {arm.robot.name}, not {hold.robot}")
         names = tuple(hold.joints)
-        if not report.expect(names == arm.joint_names, f"{who}: joints {names}, not {arm.joint_names}"):
+        if not report.expect(
+            names == arm.joint_names, f"{who}: joints {as_written(names)}, not {as_written(arm.joint_names)}"
+        ):
             return
         q = np.array([hold.joints[name] for name in arm.joint_names])
         _check_arm(hold, arm, q, who, report)

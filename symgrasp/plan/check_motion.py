@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from symgrasp.errors import as_written
 from symgrasp.plan.check_motion_rows import TOLERANCE, Expect, check_rows
 from symgrasp.plan.check_motion_states import MOST_STATES, RIGID, SegmentStates, check_free, tool_pose
 from symgrasp.plan.motion_record import MotionRecord, SegmentRecord
@@ -40,7 +41,9 @@ def check_motion(
     arms = world.scene.arms
     for name, joints in motion.joint_names.items():
         known = name in arms and arms[name].joint_names == joints
-        if not expect(known, f"motion: joint_names: the scene has no arm {name} with joints {list(joints)}"):
+        if not expect(
+            known, f"motion: joint_names: the scene has no arm {name} with joints {as_written(joints)}"
+        ):
             return
     total = sum(segment.times[-1] for segment in motion.segments)
     text = f"motion: duration is {total:.6f} s, not {motion.duration:.6f} s"
@@ -101,7 +104,7 @@ class _Walk:
         """Check that a segment begins where the one before has ended."""
         task, holding = self._plan.tasks[self._task].name, sorted(self._in_hand)
         ok = self._expect(segment.task_from == task, f"{where}: from {segment.task_from}, not {task}")
-        text = f"{where}: held by {sorted(segment.held_by)}, not {holding}"
+        text = f"{where}: held by {as_written(sorted(segment.held_by))}, not {as_written(holding)}"
         ok &= self._expect(sorted(segment.held_by) == holding, text)
         for name, rows in segment.joints.items():
             arm = self._scene.arms[name]
@@ -152,7 +155,7 @@ class _Walk:
             known = {hold.opening for task in self._plan.tasks for hold in task.holds if hold.arm == name}
             right = any(abs(end - opening) <= TOLERANCE for opening in known)
             ok &= self._expect(
-                right, f"{where}: {name} opens to {end} m, but its grasps take {sorted(known)}"
+                right, f"{where}: {name} opens to {end} m, but its grasps take {as_written(sorted(known))}"
             )
         self._note_holders()
         return ok
@@ -201,7 +204,7 @@ class _Walk:
             self._expect(last.kind in ("lift", "carry"), f"{where}: the object is not lifted")
         elif self._world.object_rests(task.object_pose_turned.array()):
             holders = set()
-        text = f"{where}: held by {sorted(self._in_hand)}, not {sorted(holders)}"
+        text = f"{where}: held by {as_written(sorted(self._in_hand))}, not {as_written(sorted(holders))}"
         self._expect(set(self._in_hand) == holders, text)
         for arm in self._scene.arms.values():
             away = np.abs(self._values[arm.robot.name] - arm.robot.home)[arm.indices].max()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby, pairwise
 
+from symgrasp.errors import as_written
 from symgrasp.plan.check_poses import same_pose
 from symgrasp.plan.plan import Plan, PlanTask
 from symgrasp.plan.report import Report
@@ -19,24 +20,35 @@ def check_order(plan: Plan, scene: Scene, report: Report) -> None:
     arms = {hold.arm for task in plan.tasks for hold in task.holds}
     for k, task in enumerate(plan.tasks):
         given = scene.tasks.get(task.name)
-        if report.expect(given is not None, f"tasks[{k}]: the scene has no task {task.name!r}") and given:
+        if (
+            report.expect(given is not None, f"tasks[{k}]: the scene has no task {as_written(task.name)}")
+            and given
+        ):
             held = tuple(hold.arm for hold in task.holds)
-            report.expect(held == given.arms, f"tasks[{k}] ({task.name}): held by {held}, not {given.arms}")
+            report.expect(
+                held == given.arms,
+                f"tasks[{k}] ({task.name}): held by {as_written(held)}, not {as_written(given.arms)}",
+            )
     names = [task.name for task in plan.tasks]
     if plan.kind == "sequential":
         expected = [t.name for t in scene.tasks.values() if len(t.arms) == 1 and t.arms[0] in arms]
         visits = [(name, list(same)) for name, same in groupby(plan.tasks, key=lambda task: task.name)]
         steps = [name for name, _ in visits]
-        report.expect(_is_subsequence(expected, steps), f"tasks: {names}, but the scene asks for {expected}")
+        report.expect(
+            _is_subsequence(expected, steps),
+            f"tasks: {as_written(names)}, but the scene asks for {as_written(expected)}",
+        )
         extra = [name for name in names if name not in expected]
-        report.expect(not extra, f"tasks: {extra} are not in the sequence {expected}")
-        report.expect(len(arms) == 1, f"tasks: one arm does the sequence, not {sorted(arms)}")
+        report.expect(not extra, f"tasks: {as_written(extra)} are not in the sequence {as_written(expected)}")
+        report.expect(len(arms) == 1, f"tasks: one arm does the sequence, not {as_written(sorted(arms))}")
         _check_regrasps(plan, expected, visits, report)
     elif plan.kind == "bimanual":
         report.expect(len(plan.tasks) == 1 and len(arms) > 1, "tasks: one task with several arms")
     else:
         expected = list(scene.tasks)
-        report.expect(names == expected, f"tasks: {names}, but the scene asks for {expected}")
+        report.expect(
+            names == expected, f"tasks: {as_written(names)}, but the scene asks for {as_written(expected)}"
+        )
         report.expect(len(names) > 1 and len(arms) > 1, "tasks: several tasks with several arms hand over")
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from symgrasp.errors import SymgraspError
+from symgrasp.errors import SymgraspError, as_written
 from symgrasp.plan.algorithms import ALGORITHMS
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.report import Report
@@ -52,10 +52,12 @@ def check_scene(plan: Plan, pinned: Scene | None, report: Report) -> Scene | Non
     except SymgraspError as error:
         report.expect(False, f"scene: {error}")
         return None
-    report.expect(record.name == scene.name, f"scene: name is {scene.name!r}, not {record.name!r}")
+    report.expect(
+        record.name == scene.name, f"scene: name is {as_written(scene.name)}, not {as_written(record.name)}"
+    )
     for path, here, there in _differences(record.content, scene.content, ""):
-        if here not in (None, MISSING):  # keys that later versions added
-            report.expect(False, f"scene: {path} is {here!r}, but read as {there!r}")
+        if here not in (as_written(None), MISSING):  # keys that later versions added
+            report.expect(False, f"scene: {path} is {here}, but read as {there}")
     if pinned is not None:
         found = list(_differences(scene.content, pinned.content, ""))
         for path, here, there in found[:MOST_DIFFERENCES]:
@@ -64,12 +66,17 @@ def check_scene(plan: Plan, pinned: Scene | None, report: Report) -> Scene | Non
         report.expect(more <= 0, f"scene: {more} more differences from {pinned.source}")
     for name, robot in scene.robots.items():
         joints = plan.robots.get(name)
-        report.expect(joints == robot.model.joint_names, f"robots: {name} has {robot.model.joint_names}")
-    report.expect(set(plan.robots) == set(scene.robots), f"robots: the scene has {sorted(scene.robots)}")
+        report.expect(
+            joints == robot.model.joint_names,
+            f"robots: {name} has joints {as_written(robot.model.joint_names)}",
+        )
+    report.expect(
+        set(plan.robots) == set(scene.robots), f"robots: the scene has {as_written(sorted(scene.robots))}"
+    )
     return scene
 
 
-def _differences(a: Any, b: Any, path: str) -> Iterator[tuple[str, object, object]]:
+def _differences(a: Any, b: Any, path: str) -> Iterator[tuple[str, str, str]]:
     """Yield (path, value in a, value in b) for all values in which plain data differs."""
     if isinstance(a, dict) and isinstance(b, dict):
         for key in [*a, *(key for key in b if key not in a)]:
@@ -77,7 +84,7 @@ def _differences(a: Any, b: Any, path: str) -> Iterator[tuple[str, object, objec
             if key in a and key in b:
                 yield from _differences(a[key], b[key], below)
             else:
-                yield below, _shown(a.get(key, MISSING)), _shown(b.get(key, MISSING))
+                yield below, _shown_at(a, key), _shown_at(b, key)
     elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
         for k, (x, y) in enumerate(zip(a, b, strict=True)):
             yield from _differences(x, y, f"{path}[{k}]")
@@ -85,6 +92,10 @@ def _differences(a: Any, b: Any, path: str) -> Iterator[tuple[str, object, objec
         yield path, _shown(a), _shown(b)
 
 
-def _shown(value: object) -> object:
+def _shown_at(mapping: Mapping[str, Any], key: str) -> str:
+    return _shown(mapping[key]) if key in mapping else MISSING
+
+
+def _shown(value: object) -> str:
     """Return a value as a line shows it: many values by their number."""
-    return f"{len(value)} values" if isinstance(value, list | dict) else value
+    return f"{len(value)} values" if isinstance(value, list | dict) else as_written(value)

@@ -21,6 +21,7 @@ from pydantic import (
     model_validator,
 )
 
+from symgrasp.errors import as_written
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.object.profile import MOST_KNOTS
 from symgrasp.poses import Array, from_position_quat, from_position_rpy, quat_wxyz
@@ -388,7 +389,7 @@ class SceneFile(_Strict):
         names = [task.name for task in self.tasks]
         for carry in self.carries():
             if carry.tasks is not None and carry.tasks not in pairwise(names):
-                raise ValueError(f"carry: tasks that follow each other, not {list(carry.tasks)}")
+                raise ValueError(f"carry: tasks that follow each other, not {as_written(carry.tasks)}")
         return self
 
     def carries(self) -> tuple[CarryFile, ...]:
@@ -412,6 +413,17 @@ class SceneFile(_Strict):
 def scene_schema() -> dict[str, Any]:
     """Return the JSON Schema of scene files."""
     return SceneFile.model_json_schema()
+
+
+EXPECTED: Mapping[str, str] = {
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), "a mapping"),
+    **dict.fromkeys(("list_type", "tuple_type"), "a list"),
+    **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
+    **dict.fromkeys(("float_type", "float_parsing"), "a number"),
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "a whole number"),
+    "string_type": "a text",
+}
+"""Type of pydantic's error → what was expected, in the words of the file formats instead of Python's."""
 
 
 def describe_error(error: ValidationError, content: Any) -> tuple[str, object, str]:
@@ -448,5 +460,6 @@ def describe_error(error: ValidationError, content: Any) -> tuple[str, object, s
         )
     if first["type"] == "too_short":
         return field, first["input"], f"at least {first.get('ctx', {})['min_length']} of them"
-    expected = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    expected = EXPECTED.get(first["type"])
+    expected = expected or first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return field or "file", first["input"], expected

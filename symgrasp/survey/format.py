@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, StrictBool, Tag, model_validator
 
+from symgrasp.errors import as_written
 from symgrasp.scene.format import WHOLE, HandFile, MapSettings, ObjectFile
 
 __all__ = [
@@ -197,7 +198,7 @@ class SurveyFile(_Strict):
     def _axes_that_go_together(self) -> SurveyFile:
         names = [axis.name for axis in self.axes]
         if len(set(names)) < len(names):
-            raise ValueError(f"axes: names that differ, not {names}")
+            raise ValueError(f"axes: names that differ, not {as_written(names)}")
         kinds = [axis.of for axis in self.axes]
         if "direction_deg" in kinds and "tilt_deg" not in kinds:
             raise ValueError("axes: tilt_deg along with direction_deg")

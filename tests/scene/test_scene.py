@@ -219,7 +219,7 @@ BAD = [
     (lambda c: c.update(object={"name": "o", "mesh": "can.stl", "tolerance": 0}), SceneError,
      "object.tolerance", "greater than 0"),
     (lambda c: c.update(object={"name": "o", "mesh": "can.stl", "flip": 1}), SceneError,
-     "object.flip", "boolean"),
+     "object.flip", "true or false"),
     (lambda c: c.update(object={"name": "o", "mesh": "no.stl"}), SceneError,
      "object.mesh", "existing mesh file"),
     (lambda c: c.update(object={"name": "o", "library": "beer"}), SceneError,

@@ -64,7 +64,7 @@ def test_files_beside_the_servers_scene_may_be_used_and_are_named_in_the_saved_o
     scene = read_scene("mine.yaml", text, (tmp_path, SCENES_DIR)).scene
     assert scene.obstacles[-1].path == tmp_path / "rock.obj"
     saved = scene_yaml(scene)
-    assert saved.splitlines()[2] == f"#   {str(tmp_path / 'rock.obj')!r}"
+    assert saved.splitlines()[2] == f"#   '{tmp_path / 'rock.obj'}'"
     assert read_scene("again.yaml", saved.encode(), (tmp_path, SCENES_DIR)).scene.sha256 == scene.sha256
     with pytest.raises(
         SymgraspError, match=r"mine\.yaml: obstacles\[\d\]\.mesh: 'rock\.obj': expected a file"
