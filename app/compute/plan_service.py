@@ -28,7 +28,7 @@ from symgrasp.planners.planning import (
     plan_sequential,
     sequential_plans,
 )
-from symgrasp.progress import Progress, part_of
+from symgrasp.progress import Progress, part_of, rising
 from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -215,7 +215,7 @@ class PlanService:
         """
         self.close()
         scene = with_poses(request.scene, request.poses)
-        results, progress = self._maps.maps(request.maps, cached, progress)
+        results, progress = self._maps.maps(request.maps, cached, rising(progress))
         maps = {key: result.map for key, result in results.items()}
         try:
             if request.method == "hill_climb":

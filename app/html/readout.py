@@ -81,7 +81,8 @@ def status_html(state: State) -> str:
     name = escape(state.scene.file.object.name)
     doing = "Ready."
     if state.busy and state.is_waiting:
-        doing = f"{state.busy.label} … {100 * state.busy.share:.0f} %"
+        share = f"{100 * state.busy.share:.0f} %"
+        doing = f"{state.busy.label} … {'done, to be shown' if share == '100 %' else share}"
         if state.busy.compiling:
             doing = "Compiling, once on this machine: half a minute …"
             if state.is_preliminary:

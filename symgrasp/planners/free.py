@@ -19,6 +19,10 @@ from symgrasp.robot.configuration import ArmConfiguration
 __all__ = ["FreePlacement", "FreePlacements", "Step"]
 
 
+HALFWAY = 100
+"""After so many placements the progress is at a half: how many there will be is not known beforehand."""
+
+
 class Step(NamedTuple):
     """A task with everything decided.
 
@@ -69,7 +73,7 @@ class FreePlacements:
     Args:
         search: the search for placements.
         finders: find the configurations of each task, in order.
-        progress: called now and then; may raise `Cancelled`.
+        progress: called with a share that rises with what was tried, see `HALFWAY`; may raise `Cancelled`.
 
     Attributes:
         tried: how many placements were tried so far.
@@ -89,7 +93,7 @@ class FreePlacements:
         bound = np.inf
         while True:
             if self._progress:
-                self._progress(1.0)  # how many there are is not known beforehand; lets the caller cancel
+                self._progress(self.tried / (self.tried + HALFWAY))
             if waiting and -waiting[0].loss >= bound:
                 attempt = heapq.heappop(waiting)
                 if self._is_listed(attempt.holding, listed):

@@ -83,7 +83,7 @@ def plan_sequential(
     """
     if method != "first":
         plans = sequential_plans if method == "best" else regrasp_plans
-        return _best(plans(scene, arm, maps, progress))
+        return _best(plans(scene, arm, maps, progress), progress)
     name, tasks = _tasks_alone(scene, arm)
     with open_world(scene) as world:
         visits = _visits(world, tasks, maps, progress)
@@ -106,9 +106,9 @@ def sequential_plans(
     """
     _, tasks = _tasks_alone(scene, arm)
     with open_world(scene) as world:
-        visits = _visits(world, tasks, maps, progress)
+        visits = _visits(world, tasks, maps, part_of(progress, 0, 2))
         scene = _with_supports(world, tasks)
-        for entries, _ in holdings(world, visits, progress):
+        for entries, _ in holdings(world, visits, part_of(progress, 1, 2)):
             yield write_plan(scene, "sequential", Planner(algorithm="best"), entries)
 
 
@@ -176,15 +176,15 @@ def plan_bimanual(
         SceneError: no task needs several arms.
     """
     if method == "exact":
-        return _best(bimanual_plans(scene, task, maps, progress))
+        return _best(bimanual_plans(scene, task, maps, progress), progress)
     the_task = _task_together(scene, task)
     pitched = [name for name in the_task.arms if scene.arm(name).pitched]
     if pitched:
         expected = "arms of 6 or 7 joints for hill climbing, which knows no pitch"
         raise SceneError(scene.source, f"task {the_task.name}: arms", pitched, expected)
     with open_world(scene) as world:
-        (visit,) = _visits(world, [the_task], maps, progress)
-        entry, planner = climb(world, visit, seed, limits or Climb(), progress, trace)
+        (visit,) = _visits(world, [the_task], maps, part_of(progress, 0, 2))
+        entry, planner = climb(world, visit, seed, limits or Climb(), part_of(progress, 1, 2), trace)
         scene = _with_supports(world, [the_task])
     return write_plan(scene, "bimanual", planner, [entry])
 
@@ -201,9 +201,9 @@ def bimanual_plans(
     """
     the_task = _task_together(scene, task)
     with open_world(scene) as world:
-        visits = _visits(world, [the_task], maps, progress)
+        visits = _visits(world, [the_task], maps, part_of(progress, 0, 2))
         scene = _with_supports(world, [the_task])
-        for entries, planner in holdings(world, visits, progress):
+        for entries, planner in holdings(world, visits, part_of(progress, 1, 2)):
             yield write_plan(scene, "bimanual", planner, entries)
 
 
@@ -226,7 +226,7 @@ def plan_handover(
         NoPlanError: no grasps exist on this grid.
         SceneError: the object moves between two tasks that share no arm, or there is one task or arm only.
     """
-    return _best(handover_plans(scene, maps, progress))
+    return _best(handover_plans(scene, maps, progress), progress)
 
 
 def handover_plans(
@@ -244,9 +244,9 @@ def handover_plans(
             if not set(before.arms) & set(after.arms) and not world.object_rests(before.T_world_object):
                 expected = f"an arm of task {before.name!r}: the object does not stand on anything there"
                 raise SceneError(scene.source, f"task {after.name}: arms", list(after.arms), expected)
-        visits = _visits(world, tasks, maps, progress)
+        visits = _visits(world, tasks, maps, part_of(progress, 0, 2))
         scene = _with_supports(world, tasks)
-        for entries, planner in holdings(world, visits, progress):
+        for entries, planner in holdings(world, visits, part_of(progress, 1, 2)):
             yield write_plan(scene, "handover", planner, entries)
 
 
@@ -267,9 +267,12 @@ def _with_supports(world: BulletWorld, tasks: Sequence[Task]) -> Scene:
     return scene
 
 
-def _best(plans: Plans) -> Plan:
+def _best(plans: Plans, progress: Progress | None) -> Plan:
     with closing(plans):
-        return next(plans)
+        plan = next(plans)
+    if progress:
+        progress(1.0)
+    return plan
 
 
 def tasks_of_plan(scene: Scene, kind: str, arm: str | None = None, task: str | None = None) -> list[Task]:

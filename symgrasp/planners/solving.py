@@ -23,7 +23,7 @@ from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch, hold_runs, turn_groups
 from symgrasp.planners.sequential import first_common_grasp
 from symgrasp.planners.stations import SharedTorso
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.scene.parts import Task
 from symgrasp.world import BulletWorld
 
@@ -291,11 +291,13 @@ def climb(
     """
     # Algorithm 3 knows no torso: it places the hands at one value of each after the other.
     reason = NoPlanError(f"no value of a torso serves all arms of task {visit.task.name}")
-    for samples in product(*(range(len(next(iter(shared.values())))) for shared in visit.torsos)):
+    choices = list(product(*(range(len(next(iter(shared.values())))) for shared in visit.torsos)))
+    for k, samples in enumerate(choices):
         at = zip(visit.torsos, samples, strict=True)
         fixed = {arm: maps[t] for shared, t in at for arm, maps in shared.items()}
         try:
-            return _climb(world, visit, {**visit.maps, **fixed}, seed, limits, progress, trace)
+            part = part_of(progress, k, len(choices))
+            return _climb(world, visit, {**visit.maps, **fixed}, seed, limits, part, trace)
         except NoPlanError as error:
             reason = error
     raise reason

@@ -48,6 +48,12 @@ def test_the_readout_says_how_and_why_not():
     assert "No grasp picked" in grasp_html(state)
 
 
+def test_what_is_computed_but_not_drawn_yet_is_not_left_at_its_last_percent():
+    busy = job_changes.started(opened(), 1, "Planning")
+    assert "Planning … 99 %" in status_html(job_changes.progressed(busy, 1, 0.99, late=True))
+    assert "Planning … done, to be shown" in status_html(job_changes.progressed(busy, 1, 1.0, late=True))
+
+
 def test_the_joints_of_a_plan_are_read_out_as_the_plan_has_them():
     state = with_plan("log_two_robots", "bimanual")
     for hold in state.shown_task.holds:

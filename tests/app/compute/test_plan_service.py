@@ -1,0 +1,58 @@
+"""Planners as the page calls them: their progress rises as they go on, and they can be cancelled anywhere."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import pytest
+
+from app.compute.map_service import MapService
+from app.compute.plan_service import PlanRequest, PlanService
+from app.state.plans.plan_results import PlanKind
+from symgrasp.errors import Cancelled
+from tests.conftest import load_small
+
+CASES: list[tuple[str, PlanKind, str, str]] = [
+    ("pick_pour_place", "sequential", "best", "panda"),
+    ("pick_pour_place", "sequential", "first", "panda"),
+    ("pick_pour_place", "sequential", "regrasp", "panda"),
+    ("log_two_robots", "bimanual", "exact", "lift"),
+    ("log_two_robots", "bimanual", "hill_climb", "lift"),
+    ("log_four_robots", "bimanual", "exact", "lift"),
+    ("handover_between_robots", "handover", "", ""),
+]
+
+
+def request_of(name: str, kind: PlanKind, method: str, who: str) -> PlanRequest:
+    return PlanRequest(load_small(name, 16, 24, 8), kind, method, who, seed=39)
+
+
+@pytest.mark.parametrize("case", CASES, ids="-".join)
+def test_progress_rises_and_is_over_when_the_plans_are_there(case):
+    shares: list[float] = []
+    request = request_of(*case)
+    with closing(MapService()) as maps, closing(PlanService(maps, ())) as service:
+        assert service.plan(request, {}, shares.append).plans
+    assert shares == sorted(shares)
+    assert 0.0 <= shares[0] < 0.2
+    assert shares[-1] <= 1.0
+    # What comes after the maps moves as well, where it is more than one search.
+    after = {share for share in shares if share > len(request.maps) / (len(request.maps) + 1)}
+    assert len(after) > 5 or case[2] in ("first", "regrasp", "hill_climb")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("case", CASES, ids="-".join)
+def test_a_planner_ends_where_it_is_cancelled_and_plans_again(case, share):
+    request, told = request_of(*case), []
+
+    def progress(now: float) -> None:
+        told.append(now)
+        if now >= share:
+            raise Cancelled
+
+    with closing(MapService()) as maps, closing(PlanService(maps, ())) as service:
+        with pytest.raises(Cancelled):
+            service.plan(request, {}, progress)
+        assert [now >= share for now in told] == [False] * (len(told) - 1) + [True]  # it went on no further
+        assert service.plan(request, {}, lambda _: None).plans
