@@ -15,6 +15,7 @@ from ..state.page_link import Camera
 from ..state.state import State
 from .backdrop import add_floor, add_lights, add_obstacle
 from .flat_map import FlatMap, close_up
+from .following import followed, points_to_follow
 from .ghost_view import GhostView
 from .nodes import set_pose
 from .object_view import ObjectView
@@ -65,6 +66,7 @@ class SceneView:
         self._scene: Scene | None = None
         self._builds = self._ghosts = 0
         self._dark = False
+        self._followed: tuple[object, ...] = ()
         self.camera: Camera | None = None
         self.is_close = False
         self._root = self._object_root = ""
@@ -101,6 +103,7 @@ class SceneView:
                 set_pose(self.base_gizmo, state.robot.T_world_base)
             if self.flat_map:
                 self.flat_map.show(state)
+            self._follow(state)
 
     def camera_moved(self, camera: Camera) -> None:
         """Turn the flat map to the camera where it can no longer be read from there."""
@@ -113,6 +116,7 @@ class SceneView:
         root = self._root = self._replace(self._root, "/scene")
         self._object_root = ""
         given, self.camera = self.camera, None
+        self._followed = _shown_of_plan(state) if given or self.is_close else ()
         values = drawn_joint_values(state)
         view = choose_viewpoint(scene, state.T_world_object, values if self.is_close else None)
         view = self._viewpoint = view.seen_from(given) if given else view
@@ -163,6 +167,17 @@ class SceneView:
         self.flat_map = FlatMap(self.client, f"{root}/flat_map", state, self._viewpoint, self.on_flat_map)
         self._scene = state.scene
 
+    def _follow(self, state: State) -> None:
+        """Move the camera where what is shown of a plan has changed and would be out of view."""
+        before, self._followed = self._followed, _shown_of_plan(state)
+        if state.shown_task is None or self._followed == before:
+            return
+        camera = self.client.camera
+        now = tuple(float(v) for v in (*camera.position, *camera.look_at))
+        after = followed(now, points_to_follow(state), camera.image_width / max(camera.image_height, 1))
+        if after != now:
+            camera.position, camera.look_at = np.array(after[:3]), np.array(after[3:])
+
     def _replace(self, old: str, new: str) -> str:
         """Remove a node and return an unused path for its successor: browsers keep the pose of a path."""
         if old:
@@ -176,6 +191,11 @@ class SceneView:
         width, height = self._first_size or (camera.image_width, camera.image_height)
         self._first_size = None
         return width / max(height, 1)
+
+
+def _shown_of_plan(state: State) -> tuple[object, ...]:
+    """Return what differs where something else of a plan is shown."""
+    return state.scene, state.step, state.plan, state.plan_results.position
 
 
 def _same_bodies(a: Scene, b: Scene) -> bool:

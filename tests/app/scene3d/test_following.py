@@ -1,0 +1,117 @@
+"""The camera follows what is played and planned, and leaves alone who looks elsewhere meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.scene3d.following import KEPT, followed, points_to_follow
+from app.scene3d.scene_view import SceneView
+from app.scene3d.viewpoint import FIELD_OF_VIEW
+from app.server.door.viser_server import quiet_server
+from app.state.page_link import Camera
+from app.state.plans.plan_changes import show_step
+from tests.app.state.states import opened, with_plan
+
+SIZE = (468, 800)
+"""What 1280 x 800 leaves between the panels."""
+
+NUMBERS = st.floats(-3.0, 3.0)
+POINTS = st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=1, max_size=6).map(np.array)
+CAMERAS = st.tuples(*[NUMBERS] * 6).filter(lambda c: np.hypot(c[0] - c[3], c[1] - c[4]) > 0.1)
+
+
+def seen(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
+    """Where points (n, 3) are in the view: from -1 to 1 across and upwards; NaN behind the camera."""
+    eye, target = np.array(camera[:3]), np.array(camera[3:])
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    x, y, depth = np.stack([right, np.cross(right, forward), forward]) @ (points - eye).T
+    half = np.tan(FIELD_OF_VIEW / 2)
+    depth = np.where(depth > 0, depth, np.nan)
+    return np.stack([x / (depth * half * aspect), y / (depth * half)], axis=-1)
+
+
+@given(CAMERAS, POINTS, st.floats(0.4, 2.5))
+def test_all_is_in_view_afterwards_and_the_direction_stays(camera, points, aspect):
+    after = followed(camera, points, aspect)
+    assert (np.abs(seen(after, points, aspect)) <= KEPT + 1e-6).all()
+    before, now = (np.array(c[3:]) - c[:3] for c in (camera, after))
+    assert np.allclose(np.cross(before, now), 0, atol=1e-6 * np.linalg.norm(before) * np.linalg.norm(now))
+    assert before @ now > 0
+    assert followed(after, points, aspect) == pytest.approx(after, abs=1e-6)
+
+
+@given(CAMERAS, POINTS, st.floats(0.4, 2.5))
+def test_a_camera_that_sees_all_is_left_where_it_is(camera, points, aspect):
+    inside = (np.abs(seen(camera, points, aspect)) < KEPT - 1e-6).all()
+    near = ((points - camera[:3]) @ (np.array(camera[3:]) - camera[:3])).min() < 0.2 * np.linalg.norm(
+        np.array(camera[3:]) - camera[:3]
+    )
+    if inside and not near:
+        assert followed(camera, points, aspect) is camera
+
+
+@pytest.fixture
+def camera() -> Any:
+    return SimpleNamespace(image_width=SIZE[0], image_height=SIZE[1])
+
+
+@pytest.fixture
+def view(camera) -> Iterator[SceneView]:
+    server: viser.ViserServer = quiet_server()
+    client = SimpleNamespace(scene=server.scene, atomic=server.atomic, camera=camera)
+    ignored = [lambda *_: None] * 4
+    yield SceneView(client, SIZE, *ignored)  # pyright: ignore[reportArgumentType]
+    server.stop()
+
+
+def pose(camera: Any) -> Camera:
+    return (*camera.position, *camera.look_at)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("pick_pour_place", "sequential"),
+        ("handover_between_robots", "handover"),
+        ("log_two_robots", "bimanual"),
+    ],
+)
+def test_every_task_of_a_plan_is_in_view(view, camera, name, kind):
+    view.show(opened(name), move_gizmo=True)
+    state = with_plan(name, kind)
+    assert state.plan
+    for step in range(len(state.plan.plan.tasks)):
+        camera.position, camera.look_at = np.array([9.0, 9.0, 2.0]), np.array([9.0, 5.0, 1.0])  # elsewhere
+        state = show_step(state, step)
+        view.show(state, move_gizmo=True)
+        points = points_to_follow(state)
+        assert len(points) > 5
+        assert (np.abs(seen(pose(camera), points, SIZE[0] / SIZE[1])) <= KEPT + 1e-6).all()
+
+
+def test_who_looks_elsewhere_while_nothing_changes_is_not_turned_back(view, camera):
+    state = with_plan("pick_pour_place", "sequential")
+    view.show(state, move_gizmo=True)
+    elsewhere = np.array([9.0, 9.0, 2.0]), np.array([9.0, 5.0, 1.0])
+    camera.position, camera.look_at = elsewhere
+    view.show(state, move_gizmo=True)
+    assert (camera.position, camera.look_at) == elsewhere
+    view.show(opened("pick_pour_place"), move_gizmo=True)  # no plan is shown
+    assert (camera.position, camera.look_at) == elsewhere
+
+
+def test_a_page_that_comes_back_is_seen_from_where_it_was(view, camera):
+    left = (9.0, 9.0, 2.0, 9.0, 5.0, 1.0)
+    view.camera = left
+    view.show(with_plan("pick_pour_place", "sequential"), move_gizmo=True)
+    assert pose(camera) == left
