@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import secrets
 import sys
 import tempfile
 import webbrowser
@@ -10,16 +12,44 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 from symgrasp.errors import SymgraspError
 
-__all__ = ["in_notebook", "page_module", "page_package", "show_html", "show_picture"]
+__all__ = ["LivePage", "in_notebook", "page_module", "page_package", "show_html", "show_picture"]
 
 _FOLDER = Path(__file__).resolve().parent.parent
 _NAME = "symgrasp_app" if (_FOLDER / "symgrasp_app").is_dir() else "app"
 
 FRAME_HEIGHT = 480
 """Height (px) of a 3D view in a notebook."""
+
+
+LIVE_HEIGHT = 700
+"""Height (px) of the live page in a notebook."""
+
+# The document stays where nobody answers: on another machine, later on, or where scripts do not run.
+LIVE = """<script>(() => {{
+  const frame = document.getElementById({name}).querySelector("iframe"), probe = new Image();
+  probe.onload = () => {{
+    frame.removeAttribute("srcdoc");
+    frame.height = {height};
+    frame.src = {address};
+  }};
+  probe.src = {probe};
+}})()</script>"""
+
+
+class LivePage(NamedTuple):
+    """A page that a server shows.
+
+    Attributes:
+        address: of the page.
+        probe: address of a picture that can be loaded from everywhere as long as the server runs.
+    """
+
+    address: str
+    probe: str
 
 
 def page_package() -> str:
@@ -81,18 +111,24 @@ def show_picture(png: bytes, name: str) -> None:
         print(f"{name}: {_written(png, name, '.png').as_uri()}")
 
 
-def show_html(document: str, name: str) -> None:
+def show_html(document: str, name: str, live: LivePage | None = None) -> None:
     """Display an HTML document in a notebook; elsewhere write it to a file, print where, and open it.
 
     Args:
         document: the document; it needs no other file.
         name: what it shows, for the file.
+        live: takes the place of the document in a notebook while its server can be reached.
     """
     if in_notebook():
         from IPython.display import HTML, display
 
         frame = f'<iframe srcdoc="{escape(document)}" width="100%" height="{FRAME_HEIGHT}"></iframe>'
-        display(HTML(f"<div>{frame}</div>"))
+        place, script = secrets.token_hex(8), ""
+        if live:
+            texts = (json.dumps(text) for text in (place, *live))
+            texts = dict(zip(("name", "address", "probe"), texts, strict=True))
+            script = LIVE.format(height=LIVE_HEIGHT, **texts)
+        display(HTML(f'<div id="{place}">{frame}</div>{script}'))
     else:
         address = _written(document.encode(), name, ".html").as_uri()
         print(f"{name} in 3D: {address}")

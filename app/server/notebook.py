@@ -1,4 +1,4 @@
-"""The 3D view of a map or a plan as one HTML document, for notebooks and scripts."""
+"""What notebooks and scripts show: the 3D view of a map or a plan as one HTML document, and the live page."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import replace
 from html import escape
 
 from symgrasp.errors import printable
+from symgrasp.feasibility.create import create_map
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.page import LivePage
 from symgrasp.plan.plan import Plan
 from symgrasp.scene.scene import Scene
 
@@ -18,9 +20,10 @@ from ..state.plans.plan_changes import show_results, show_step
 from ..state.plans.plan_results import PlanResults
 from ..state.requests import MapRequest, MapResult
 from ..state.state import State
+from .embedded import live_page
 from .snapshot import snapshot_html
 
-__all__ = ["map_document", "plan_document"]
+__all__ = ["map_document", "map_page", "plan_document", "scene_map"]
 
 ASPECT = 1.6
 """Ratio of width to height that the camera is placed for."""
@@ -36,11 +39,31 @@ def map_document(m: FeasibilityMap, scene: Scene) -> str:
         m: the map, of a task of the scene.
         scene: the scene; the object is shown in the map's pose.
     """
+    state = _showing(m, scene)
+    return _drawn(replace(state, result=MapResult(state.request, m)))
+
+
+def map_page(m: FeasibilityMap, scene: Scene) -> LivePage:
+    """Return the live page of a scene that shows a map of one of its tasks, see `map_document`.
+
+    Raises:
+        SymgraspError: the scene cannot be served.
+        OSError: the server cannot be started.
+    """
+    return live_page(_showing(m, scene))
+
+
+def scene_map(scene: Scene) -> FeasibilityMap:
+    """Compute the map that shows a scene: of its first task and that task's first arm."""
+    return create_map(scene)
+
+
+def _showing(m: FeasibilityMap, scene: Scene) -> State:
+    """Return a state of the scene with the task, the arm and the pose of a map, but without the map."""
     grid = m.manifold
     scene = scene.with_settings(heights=grid.heights, angles=grid.angles)
     scene = scene.with_task(replace(scene.task(m.task), T_world_object=m.T_world_object))
-    state = changes.choose_arm(changes.choose_task(State.of(scene, scene.name), m.task), m.arm)
-    return _drawn(replace(state, result=MapResult(state.request, m)))
+    return changes.choose_arm(changes.choose_task(State.of(scene, scene.name), m.task), m.arm)
 
 
 def plan_document(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], FeasibilityMap]) -> str:

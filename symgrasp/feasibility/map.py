@@ -284,9 +284,11 @@ class FeasibilityMap:
     def show(self) -> None:
         """Show the picture of the map, and the object and the arm in 3D.
 
-        A notebook displays both. Elsewhere they are written to files in the system's temporary folder,
-        whose addresses are printed, and the 3D view is opened in a browser. A map that was loaded
-        from a file does not know its scene, so its picture is all there is.
+        A notebook displays both, and while its kernel runs on the machine of the browser the live page in
+        place of the 3D view: the scene with the map of this task and arm, to be played with. Elsewhere they
+        are written to files in the system's temporary folder, whose addresses are printed, and the 3D view
+        is opened in a browser. A map that was loaded from a file does not know its scene, so its picture is
+        all there is.
         """
         name = f"{self.scene}, {self.task} with {self.arm}"
         page.show_picture(self._repr_png_(), name)
@@ -294,11 +296,18 @@ class FeasibilityMap:
             print(f"{name}: no 3D view, because the map does not know its scene")
             return
         try:
-            document = page.page_module("server.notebook").map_document(self, self.shown_in)
+            notebook = page.page_module("server.notebook")
+            document = notebook.map_document(self, self.shown_in)
         except (ImportError, SymgraspError) as error:
             print(f"{name}: no 3D view: {error}")
-        else:
-            page.show_html(document, name)
+            return
+        live = None
+        if page.in_notebook():
+            try:
+                live = notebook.map_page(self, self.shown_in)
+            except (OSError, SymgraspError) as error:
+                print(f"{name}: no live page: {error}")
+        page.show_html(document, name, live)
 
     def _meta(self) -> dict[str, Any]:
         return {

@@ -16,6 +16,7 @@ from symgrasp.errors import SceneError, one_of
 from symgrasp.files import LARGEST_YAML, parse_yaml, read_file
 from symgrasp.object.manifold import Manifold
 from symgrasp.object.profile import Profile
+from symgrasp.page import page_module
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.building import SceneBuilder, check_settings
 from symgrasp.scene.format import (
@@ -283,6 +284,14 @@ class Scene:
                 if entry["name"] == arm:
                     entry["hand"] = hand
         return Scene.from_content(content, self.source)
+
+    def show(self) -> None:
+        """Show the scene with the map of its first task and that task's first arm; see `FeasibilityMap.show`.
+
+        Raises:
+            SymgraspError: the package of the page is not installed.
+        """
+        page_module("server.notebook").scene_map(self).show()
 
     def with_settings(self, **changes: float | str) -> Scene:
         """Return the scene with other map settings; robots and object are shared.

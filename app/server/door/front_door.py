@@ -6,7 +6,7 @@ passes; those that become websockets are read at a limited rate. The door refuse
 
 * requests from a page of another origin (the ``Origin`` header names another host),
 * on a loopback address, requests for another host's name (DNS rebinding),
-* to be shown inside another page,
+* to be shown inside another page, but for one that knows the key of a server in a notebook,
 * more browsers at once than were allowed, and connections that do not say in time what they want.
 
 The page that is served is the project's own; it shows viser's in a frame, whose address has the setting
@@ -25,6 +25,7 @@ import socket
 import sys
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
@@ -35,15 +36,18 @@ from websockets.http11 import Request, Response
 from ...shell.files import PageFile, page_file
 from .browser_connection import PART_LIMIT, BrowserConnection, handled_by
 from .origins import (
+    EMBEDDED,
     FRAMES,
     PAGE,
     STACKED,
     add_headers,
     headers_of,
+    is_embedded,
     is_foreign,
     is_loopback,
     is_own_frame,
     is_own_picture,
+    is_same,
     is_view,
 )
 
@@ -99,6 +103,7 @@ class FrontDoor:
         on_visit: called when a browser loads its picture; returns whether its token is valid.
         max_browsers: how many browsers may be in at the same time.
         on_map: called with the websocket of a page's map and the token of the page; handles it.
+        key: the secret with which other pages may show this one in a frame; none may if it is empty.
 
     Raises:
         OSError: the address cannot be listened on.
@@ -111,7 +116,9 @@ class FrontDoor:
         on_visit: Callable[[Visit], bool],
         max_browsers: int,
         on_map: Callable[[BrowserConnection, str], Awaitable[None]] | None = None,
+        key: str = "",
     ) -> None:
+        self._key = key
         self._on_visit, self._max_browsers, self._on_map = on_visit, max_browsers, on_map
         self._loopback = is_loopback(host)
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -160,7 +167,7 @@ class FrontDoor:
             handle,
             sock=self._socket,
             process_request=answer,
-            process_response=add_headers,
+            process_response=partial(add_headers, key=self._key),
             server_header=None,
             logger=_quiet_logger(),
             create_connection=BrowserConnection,
@@ -182,7 +189,11 @@ class FrontDoor:
         path = request.path.partition("?")[0]
         if is_foreign(headers, loopback=self._loopback):
             return connection.respond(HTTPStatus.FORBIDDEN, "It may only be opened by its own address.\n")
-        if headers.get("sec-fetch-dest") in FRAMES and not (is_view(request) and is_own_frame(headers)):
+        if self._key and is_same(path, f"/{EMBEDDED}/{self._key}"):
+            return _found(connection, PageFile(PICTURE, "image/svg+xml"))
+        embedded = headers.get("sec-fetch-dest") == "iframe" and is_embedded(request, self._key)
+        own = is_view(request) and is_own_frame(headers)
+        if headers.get("sec-fetch-dest") in FRAMES and not (own or embedded):
             return connection.respond(HTTPStatus.FORBIDDEN, "It may not be shown inside another page.\n")
         if path.startswith(FILES):
             return _found(connection, page_file(path.removeprefix(FILES)))
@@ -196,7 +207,8 @@ class FrontDoor:
                 f"This server is in use by {self._max_browsers} browsers, which is all it takes at a time "
                 "(symgrasp app --max-sessions). Close one of them, or load this page again later.\n",
             )
-        alone = headers.get("sec-fetch-dest") == "document"  # no link may choose the token
+        # No link may choose the token.
+        alone = headers.get("sec-fetch-dest") == "document" or (embedded and not own)
         if path == "/" and (alone or not is_view(request)) and "upgrade" not in headers:
             return _found(connection, page_file("index.html"))
         return None
@@ -213,7 +225,7 @@ class FrontDoor:
         opened = urlsplit(headers.get("referer", "/"))
         address = urlunsplit((opened.scheme, opened.netloc, opened.path, "", ""))
         settings = opened.query.split("&")
-        query = "&".join(s for s in settings if s.partition("=")[0] not in (PAGE, STACKED))
+        query = "&".join(s for s in settings if s.partition("=")[0] not in (PAGE, STACKED, EMBEDDED))
         # The page adds its own behind those of the address that was opened.
         page = next((s.partition("=")[2] for s in reversed(settings) if s.startswith(f"{PAGE}=")), "")
         tokens = [text if TOKEN.fullmatch(text) else "" for text in page.split(".")]

@@ -34,7 +34,12 @@ STYLE = "font:13px/1.5 system-ui,sans-serif;margin:12px"
 
 @contextmanager
 def open_lobby(
-    cache: SharedCache, host: str, port: int, max_sessions: int = 16, folder: Path | None = None
+    cache: SharedCache,
+    host: str,
+    port: int,
+    max_sessions: int = 16,
+    folder: Path | None = None,
+    key: str = "",
 ) -> Iterator[Lobby]:
     """Serve the page on a port while the ``with`` block runs.
 
@@ -43,12 +48,13 @@ def open_lobby(
         host, port: the address to listen on.
         max_sessions: how many browsers may use it at the same time.
         folder: where what pages show is stored for later servers; nowhere if None.
+        key: see `FrontDoor`.
 
     Raises:
         OSError: the port cannot be listened on.
     """
     with closing(Lobby(cache, folder)) as lobby:
-        server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions, lobby.show_map))
+        server = quiet_server(FrontDoor(host, port, lobby.visited, max_sessions, lobby.show_map, key))
         server.on_client_connect(lobby.connected)
         server.on_client_disconnect(lobby.disconnected)
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+import secrets
 from collections.abc import Mapping
 from urllib.parse import urlsplit
 
@@ -11,15 +12,18 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 __all__ = [
+    "EMBEDDED",
     "FRAMES",
     "PAGE",
     "STACKED",
     "add_headers",
     "headers_of",
+    "is_embedded",
     "is_foreign",
     "is_loopback",
     "is_own_frame",
     "is_own_picture",
+    "is_same",
     "is_view",
 ]
 
@@ -28,6 +32,9 @@ PAGE = "page"
 
 STACKED = "stacked"
 """The setting there that says that map, view and panels lie one below the other in the window."""
+
+EMBEDDED = "embedded"
+"""The setting in an address that has the key with which a notebook may show the page in a frame."""
 
 # The page loads its own files alone.
 PAGE_POLICY = "; ".join(
@@ -113,6 +120,18 @@ def is_view(request: Request) -> bool:
     return path == "/" and any(setting.partition("=")[0] == PAGE for setting in query.split("&"))
 
 
+def is_same(given: str, secret: str) -> bool:
+    """Return whether a text is a secret one, in a time that does not tell how much of it is."""
+    return secrets.compare_digest(given.encode(errors="replace"), secret.encode())
+
+
+def is_embedded(request: Request, key: str) -> bool:
+    """Return whether a request is for the page or its view, and has the key; never where the key is empty."""
+    path, _, query = request.path.partition("?")
+    given = [value for name, _, value in (s.partition("=") for s in query.split("&")) if name == EMBEDDED]
+    return path == "/" and bool(key) and len(given) == 1 and is_same(given[0], key)
+
+
 def headers_of(request: Request) -> dict[str, str]:
     """Return the headers of a request, names in lower case; repeated ones become one that no page sends."""
     headers: dict[str, str] = {}
@@ -122,14 +141,18 @@ def headers_of(request: Request) -> dict[str, str]:
     return headers
 
 
-def add_headers(_: ServerConnection, request: Request, response: Response) -> None:
-    """Add to a response what keeps other pages from using it."""
+def add_headers(_: ServerConnection, request: Request, response: Response, key: str = "") -> None:
+    """Add to a response what keeps other pages from using it; whoever has the key may frame the page."""
     host = headers_of(request).get("host", "")
     framed = is_view(request)
     policy = VIEW_POLICY if framed else PAGE_POLICY
+    embedded = is_embedded(request, key)
+    if embedded:
+        policy = policy.rpartition("; frame-ancestors")[0]
     response.headers["Content-Security-Policy"] = policy.format(
         host=host if HOST.fullmatch(host) else "invalid"
     )
-    response.headers["X-Frame-Options"] = "SAMEORIGIN" if framed else "DENY"
+    if not embedded:
+        response.headers["X-Frame-Options"] = "SAMEORIGIN" if framed else "DENY"
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Referrer-Policy"] = "same-origin"

@@ -133,6 +133,54 @@ def test_the_view_is_shown_inside_the_page_alone(port):
         assert "'unsafe-eval'" not in head
 
 
+@pytest.fixture
+def embedded(visits) -> Iterator[tuple[int, str]]:
+    """The port of a server that notebooks may show in a frame, and the key for it."""
+    key = "k" * 32
+    server = quiet_server(FrontDoor("127.0.0.1", any_port(), visits, 2, key=key))
+    yield server.get_port(), key
+    server.stop()
+
+
+def test_who_has_the_key_may_show_the_page_in_a_frame(embedded):
+    port, key = embedded
+    inside = {"Sec_Fetch_Dest": "iframe", "Sec_Fetch_Site": "cross-site"}
+    for path in (f"/?task=pick&embedded={key}", f"/?embedded={key}&page=x"):
+        answer = ask(port, path, **inside)
+        head = answer.partition(b"\r\n\r\n")[0].decode().lower()
+        assert head.startswith("http/1.1 200 ")
+        assert "x-frame-options" not in head
+        assert "frame-ancestors" not in head
+        assert "default-src 'none'; script-src " in head
+        assert b'<iframe id="view"' in answer  # not the view alone, with a token that another page has chosen
+    own = {"Sec_Fetch_Dest": "iframe", "Sec_Fetch_Site": "same-origin"}
+    view = ask(port, f"/?embedded={key}&page=x", **own).partition(b"\r\n\r\n")
+    assert view[0].startswith(b"HTTP/1.1 200 ")
+    assert b"frame-ancestors" not in view[0]
+    assert b'<iframe id="view"' not in view[2]
+    assert ask(port, f"/embedded/{key}", Sec_Fetch_Dest="image", Sec_Fetch_Site="cross-site").startswith(
+        b"HTTP/1.1 200 "
+    )
+
+
+@pytest.mark.parametrize(
+    "query",
+    ["", "embedded=", "embedded=guess", "embedded={key}x", "embedded={key}&embedded={key}", "x={key}"],
+)
+@pytest.mark.parametrize("inside", ["iframe", "embed", "object"])
+def test_who_has_not_may_not(embedded, port, query, inside):
+    open_port, key = embedded
+    asked = f"/?{query.format(key=key)}"
+    for door in (open_port, port):  # the other has no key
+        head = ask(door, asked, Sec_Fetch_Dest=inside, Sec_Fetch_Site="cross-site").lower()
+        assert head.startswith(b"http/1.1 403 ")
+        assert b"x-frame-options: deny" in head
+        assert b"frame-ancestors 'none'" in head
+    assert ask(port, f"/embedded/{key}").startswith(b"HTTP/1.1 404 ")
+    assert ask(open_port, "/embedded/").startswith(b"HTTP/1.1 404 ")
+    assert ask(port, "/embedded/").startswith(b"HTTP/1.1 404 ")
+
+
 def test_a_link_opens_the_page_whatever_its_settings(port):
     """A link may choose what the view shows, but not the token that ties map and view together."""
     assert PAGE not in Link.model_fields

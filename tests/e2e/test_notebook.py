@@ -1,0 +1,95 @@
+"""What a notebook shows: the live page while its kernel runs, and the 3D view for whoever reads it later."""
+
+from __future__ import annotations
+
+import http.server
+import os
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+from playwright.sync_api import Browser, expect
+
+from tests.conftest import ROOT
+from tests.e2e.page import WAIT
+
+CELL = """import symgrasp as sg
+scene = sg.load_scene("soda_can").with_settings(heights=12, angles=24, redundancy=4)
+scene.show()
+sg.create_map(scene).shift(0.5).show()"""
+
+
+@contextmanager
+def shown_by(thread: ThreadPoolExecutor, tmp_path: Path) -> Iterator[list[str]]:
+    """The HTML that a cell shows, while the kernel of its notebook runs."""
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)])
+    client = NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(tmp_path)}})
+    kernel = client.setup_kernel(env=os.environ | {"PYTHONPATH": str(ROOT)})
+    thread.submit(kernel.__enter__).result()
+    try:
+        thread.submit(client.execute_cell, notebook.cells[0], 0).result()
+        outputs = [output.get("data", {}) for output in notebook.cells[0].outputs]
+        assert sum("image/png" in data for data in outputs) == 2
+        yield [data["text/html"] for data in outputs if "text/html" in data]
+    finally:
+        thread.submit(kernel.__exit__, None, None, None).result()
+
+
+@contextmanager
+def served(html: str) -> Iterator[str]:
+    """The address of a page of another host that has this HTML in it, as the server of notebooks does."""
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.end_headers()
+            self.wfile.write(f"<!DOCTYPE html><body>{html}</body>".encode())
+
+        def log_message(self, format: str, *args: object) -> None:
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://localhost:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.fixture
+def thread() -> Iterator[ThreadPoolExecutor]:
+    with ThreadPoolExecutor(1) as thread:  # an event loop of Playwright runs in this one
+        yield thread
+
+
+def test_a_notebook_shows_the_live_page_and_later_the_3d_view(browser: Browser, thread, tmp_path):
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(WAIT)
+    try:
+        page = context.new_page()
+        with shown_by(thread, tmp_path) as (scene, turned), served(scene) as address:
+            page.goto(address)
+            live = page.frame_locator("iframe")
+            expect(live.locator("#title")).to_have_text("soda_can · pick · panda")
+            expect(live.locator("#nothing")).to_be_hidden()
+            # A click on the map is one in the scene: both are of one session.
+            live.get_by_test_id("map").click(position={"x": 120, "y": 120})
+            panel = live.frame_locator("#view")
+            expect(panel.get_by_text("panda").filter(has_text="hold")).to_be_visible()
+            with served(turned) as other:
+                page.goto(other)
+                expect(live.locator("#turn")).to_contain_text("turned by 0.00°")
+                expect(live.locator("#title")).to_have_text("soda_can · pick · panda")
+                expect(live.locator("#nothing")).to_be_hidden()
+        assert not list(tmp_path.iterdir())
+        with served(scene) as address:
+            page.goto(address)
+            view = page.frame_locator("iframe")
+            expect(view.locator("canvas").first).to_be_visible()
+            expect(page.locator("iframe")).to_have_attribute("height", "480")
+    finally:
+        context.close()
