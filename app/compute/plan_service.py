@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -303,21 +304,25 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
     """Run the hill climbing, and the complete search on the same maps to compare."""
     steps: list[ClimbStep] = []
     climbed = exact = refusal = None
+    seconds, begun = 0.0, time.perf_counter()
     try:
         first = part_of(progress, 0, 2)
         plan = plan_bimanual(
             scene, request.name, maps, "hill_climb", request.seed, progress=first, trace=steps
         )
+        seconds = time.perf_counter() - begun
         climbed = plan_result(plan, scene)
     except NoPlanError as error:
-        refusal = Refusal(str(error))
+        seconds, refusal = time.perf_counter() - begun, Refusal(str(error))
     try:
         exact_plan = plan_bimanual(scene, request.name, maps, progress=part_of(progress, 1, 2))
         exact = plan_result(exact_plan, scene)
     except NoPlanError as error:
         refusal = Refusal(str(error))
     arms = request.tasks[0].arms
-    climb = ClimbReplay(request.name, arms, request.seed, tuple(steps), climbed, exact) if steps else None
+    climb = None
+    if steps:
+        climb = ClimbReplay(request.name, arms, request.seed, tuple(steps), climbed, exact, seconds)
     if climbed:
         return PlanOutcome(request.kind, (climbed,), climb=climb)
     return PlanOutcome(request.kind, refusal=refusal, climb=climb)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import viser
 
@@ -35,6 +36,7 @@ class Keyboard(Panel):
         change, plans = actions.change, actions.plans
         self.command("Undo", lambda: change(undo), "Z", "cmd/ctrl")
         self.command("Redo", lambda: change(redo), "Z", "cmd/ctrl+shift")
+        self.command("Take the tour", lambda: change(lambda s: replace(s, tour=s.tour + 1)))
         self.command("Cancel or compute again", actions.stop_or_retry, "escape")
         self._tasks: dict[str, viser.CommandHandle] = {}
         self.command("Next arm", lambda: change(next_arm), "M")

@@ -14,11 +14,9 @@ from ..compute.cache import SharedCache
 from ..compute.warm_up import compute_first_map
 from .door.lobby import open_lobby
 from .kept_pages.stored_pages import stored_pages_folder
+from .session.tour import STORY
 
-__all__ = ["STORY", "serve"]
-
-STORY = "pick_pour_place"
-"""The scene that the page opens with where none is named: it has several tasks that one grasp serves."""
+__all__ = ["serve"]
 
 SIGNAL_INTERVAL = 0.5
 """Time (s) after which Ctrl-C is noticed at the latest: the system may hand the signal to any thread, but

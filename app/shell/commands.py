@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -151,6 +151,38 @@ class Move(_Deed, frozen=True, tag="move"):
         return plan_changes.move_hand(state, self.step, self.hand, self.row, self.column)
 
 
+class Slid(_Deed, frozen=True, tag="slid"):
+    """Slides the maps of all tasks of a sequence by a share of their δ."""
+
+    share: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+
+    @property
+    def key(self) -> str | None:
+        """Key of the newest share."""
+        return "slid"
+
+    @property
+    def origin(self) -> str:
+        """A drag of the map."""
+        return "map, all tasks"
+
+    def applied(self, state: State) -> State:
+        """Return the state with the maps slid, where a sequence is shown."""
+        if state.plan_results.kind != "sequential":
+            return state
+        return plan_changes.change_plan_results(state, lambda results: results.slid(self.share))
+
+
+class Act(_Deed, frozen=True, tag="act"):
+    """Does what a step of the tour needs of the page beside the map; see `app.server.session.tour`."""
+
+    name: Literal["story", "log", "compare", "alone", "plan", "climb", "replay", "motion", "play"]
+
+    def applied(self, state: State) -> State:
+        """Return the state as it is: actions are more than changes."""
+        return state
+
+
 class Show(_Deed, frozen=True, tag="show"):
     """Shows a task of the plan by its index."""
 
@@ -210,7 +242,7 @@ class Place(_Deed, frozen=True, tag="place"):
         return survey_changes.choose_place(state, self.index)
 
 
-Command = Pick | Turn | Hover | Slide | Move | Show | AsPlanned | Press | Release | Leave | Place
+Command = Pick | Turn | Hover | Slide | Slid | Act | Move | Show | AsPlanned | Press | Release | Leave | Place
 
 _decoder = msgspec.json.Decoder(Command)
 

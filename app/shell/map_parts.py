@@ -36,6 +36,7 @@ from ..render.patterns import PLAIN, cell_patterns
 from ..render.prints import apart_text, hand_color, print_index, print_names, shown_prints
 from ..render.weak_cache import cached_with_first
 from ..state.map_view_state import RollChoice
+from ..state.requests import CompareRequest
 from ..state.state import State
 from .layers import Layer, LayerKind, layers_of
 
@@ -171,6 +172,11 @@ def _look(state: State) -> dict[str, Any]:
         "marks": [[mark.h, float(wrap(mark.theta)), mark.label] for mark in marks_of(state)],
         "picked": [state.base_cell.row, state.base_cell.column] if state.base_cell else None,
         "holds": [[_hex(PRINTS[holds.color]), holds.spans] for holds in hand_holds(state)],
+        "scene": state.scene_name,
+        "compared": _compared(state),
+        "compares": state.map_view.compare,
+        "plan": _plan(state),
+        "tour": state.tour,
         "patterned": state.map_view.patterns,
         "legend": [],
     }
@@ -185,6 +191,29 @@ def _look(state: State) -> dict[str, Any]:
             scale = colored.scale
             look["scale"] = [scale.label, scale.high, [_hex(c) for c in scale.colors[::36]]]
     return look
+
+
+def _compared(state: State) -> list[int] | None:
+    """Return how many cells differ from a map computed from scratch for this turn, and of how many."""
+    comparison = state.map_view.comparison
+    if comparison is None or comparison.request != CompareRequest(state.request, state.delta):
+        return None
+    return [comparison.differing, comparison.map.reason.size]
+
+
+def _plan(state: State) -> dict[str, Any]:
+    """Say which plan is shown, and how far it is played."""
+    results = state.plan_results
+    motion, climb = results.plan and results.plan.motion, results.climb
+    return {
+        "kind": results.kind,
+        "slide": results.slide,
+        "playing": results.playing,
+        "position": results.position,
+        "duration": motion.duration if motion else None,
+        "positions": len(climb.steps) if climb else None,
+        "seconds": climb.seconds if climb else None,
+    }
 
 
 def _age(state: State) -> str:

@@ -68,6 +68,7 @@ def open_scene(state: State, scene: Scene, name: str) -> State:
         survey=state.survey,
         display=replace(state.display, drag_handles=False, base_handles=False, symmetry_error=False),
         history=state.history,
+        tour=state.tour,
     )
 
 

@@ -83,6 +83,7 @@ class State:
         display: display options of the page.
         link: the link that was made last.
         press: number of the press of the pointer under way on the page; 0 for none.
+        tour: how often the tour was asked for from the palette.
         history: what can be undone and redone.
     """
 
@@ -113,6 +114,7 @@ class State:
     display: Display = field(default_factory=Display)
     link: PageLink | None = None
     press: int = 0
+    tour: int = 0
     history: History[State] = field(default_factory=History)
 
     @staticmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from playwright.sync_api import expect
 
-from app.server.serve import STORY
+from app.server.session.tour import STORY
 from docs.opening import VISITS, opened, visits
 
 

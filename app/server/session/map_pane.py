@@ -51,10 +51,11 @@ class MapPane:
 
     Args:
         change: applies a change to the state of the session, see `SessionApi`.
+        act: does what a `commands.Act` of that name asks for.
     """
 
-    def __init__(self, change: Callable[[Change, str], None]) -> None:
-        self._change = change
+    def __init__(self, change: Callable[[Change, str], None], act: Callable[[str], None]) -> None:
+        self._change, self._act = change, act
         self._lock = threading.Lock()
         self._parts: dict[str, bytes] = {}
         self._link: _Link | None = None
@@ -86,7 +87,10 @@ class MapPane:
             with suppress(ConnectionClosed):
                 while True:
                     command = commands.decode(await connection.recv())
-                    self._change(command.applied, command.origin)
+                    if isinstance(command, commands.Act):
+                        self._act(command.name)
+                    else:
+                        self._change(command.applied, command.origin)
         finally:
             sending.cancel()
             with self._lock:

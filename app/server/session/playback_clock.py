@@ -26,7 +26,7 @@ class PlaybackClock:
         """
         if state is None or not state.plan_results.playing:
             return None
-        return max(0.0, INTERVAL - (now - self._last)) if self._last is not None else 0.0
+        return max(0.0, _interval(state) - (now - self._last)) if self._last is not None else 0.0
 
     def advanced(self, state: State, now: float) -> State:
         """Return the state with its playback advanced to a time (s), if a frame is due."""
@@ -34,7 +34,15 @@ class PlaybackClock:
             self._last = None
         elif self._last is None:  # it has just begun
             self._last = now
-        elif now - self._last >= INTERVAL:
+        elif now - self._last >= _interval(state):
             state = played(state, now - self._last)
             self._last = now
         return state
+
+
+def _interval(state: State) -> float:
+    """Return the time (s) between two frames: that of a step of a climb, if it is longer than usual."""
+    results = state.plan_results
+    if results.playing == "climb" and results.climb:
+        return max(INTERVAL, 1 / results.climb.speed)
+    return INTERVAL

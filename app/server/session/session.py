@@ -43,6 +43,7 @@ from .actions import Actions, camera_of
 from .map_pane import MapPane
 from .playback_clock import PlaybackClock
 from .survey_actions import SurveyActions
+from .tour import tour_acts
 
 __all__ = ["Session"]
 
@@ -94,7 +95,7 @@ class Session:
         self._writing = False
         self._closed = False
         self._playback = PlaybackClock()
-        self.map_pane = MapPane(self.change)
+        self.map_pane = MapPane(self.change, lambda name: tour_acts(self.actions)[name]())
         self.process = ComputeProcess(
             pool,
             cache.keep,

@@ -6,7 +6,7 @@ const FONT = "11px system-ui, sans-serif";
 const ROOM = { left: 46, bottom: 38, top: 10, right: 12, profile: 64 };
 const STRIP = { ...ROOM, bottom: 17, top: 4 }; // of several maps below each other
 const NAMED = 64; // height (px) from which on an upward axis has its name
-const GREY = [236, 238, 241];
+const GREY = [236, 238, 241], UNVISITED = "#f7f8fa";
 
 /** A canvas with one pixel a cell, lowest θ left and highest h on top. */
 export function texture({ heights, angles }, index, colors, alpha = 255) {
@@ -70,6 +70,10 @@ export function draw(pane) {
   drawCells(context, pane, pane.picture, begin);
   if (patterned(look)) drawPatterns(context, pane, begin);
   context.globalAlpha = 1;
+  if (pane.visited !== null) {
+    const left = cells.index.map((_, k) => Number(k >= pane.visited));
+    drawCells(context, pane, texture(cells, left, [UNVISITED, UNVISITED], 254), begin);
+  }
   if (pane.prints) drawCells(context, pane, pane.shade, 0);
   if (pane.hovered) outline(context, pane, pane.hovered);
   for (const mark of look.marks) drawMark(context, pane, mark);

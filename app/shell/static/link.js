@@ -3,7 +3,7 @@ const FIRST_PAUSE = 200, LONGEST_PAUSE = 3000, INTERVAL = 25;
 /** Commands of which only the newest counts, sent at most every INTERVAL ms. */
 const VALUES = {
   turn: () => "turn", hover: () => "hover", leave: () => "hover",
-  slide: ({ step }) => `slide ${step}`, move: ({ step, hand }) => `move ${step} ${hand}`,
+  slid: () => "slid", slide: ({ step }) => `slide ${step}`, move: ({ step, hand }) => `move ${step} ${hand}`,
 };
 
 export class Link {

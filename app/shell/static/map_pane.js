@@ -24,6 +24,7 @@ export class MapPane {
     this.strip = false; // one of several below each other: axes without names
     this.lies = true; // a long object lies along the longer side
     this.fixed = false; // cannot be turned
+    this.visited = null; // number of cells, row by row, that are shown; all of them if null
     new ResizeObserver(() => this.redraw()).observe(canvas);
     matchMedia("(resolution: 1dppx)").addEventListener("change", () => this.redraw());
     const listen = (name, act) => canvas.addEventListener(name, act.bind(this));

@@ -4,6 +4,7 @@ import { Layers } from "./layers.js";
 import { MapPane } from "./map_pane.js";
 import { describe } from "./legend.js";
 import { watchPlaces } from "./places.js";
+import { Tour } from "./tour.js";
 import { Visit } from "./visit.js";
 import { narrow, split } from "./splitter.js";
 
@@ -43,6 +44,7 @@ const layers = new Layers(element, {
   send: (command) => link.send(command),
   say,
 });
+const tour = new Tour(element, pane, (command) => link.send(command));
 const arrived = [];
 const link = new Link(`/map/${visit.token}`, {
   message: (head, data) => {
@@ -59,6 +61,7 @@ const link = new Link(`/map/${visit.token}`, {
     pane.restyle();
     layers.restyle();
     describe(element, pane);
+    tour.seen(head);
   },
   closed: () => {
     element("title").setAttribute("aria-busy", "true");

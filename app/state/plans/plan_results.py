@@ -50,6 +50,9 @@ FADE = 0.4
 STEPS_PER_SECOND = 10.0
 """Speed of the replay of a climb."""
 
+SHORTEST_REPLAY = 3.0
+"""Shortest duration (s) of the replay of a climb; with few steps it shows each for longer."""
+
 LONGEST_REPLAY = 12.0
 """Longest duration (s) of the replay of a climb; with more steps it skips some."""
 
@@ -114,6 +117,7 @@ class ClimbReplay:
         steps: every position of the hands; at least one.
         found: the plan of the hill climbing, None where it failed.
         exact: the plan of the complete search, None where there is none.
+        seconds: that the hill climbing took on maps that were there (s).
     """
 
     task: str
@@ -122,11 +126,13 @@ class ClimbReplay:
     steps: tuple[ClimbStep, ...]
     found: PlanResult | None
     exact: PlanResult | None
+    seconds: float
 
     @property
     def speed(self) -> float:
         """Steps per second of the replay."""
-        return max(STEPS_PER_SECOND, len(self.steps) / LONGEST_REPLAY)
+        count = len(self.steps)
+        return max(min(STEPS_PER_SECOND, count / SHORTEST_REPLAY), count / LONGEST_REPLAY)
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+from typing import get_args, get_type_hints
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from app.scene3d.ghost import ghost
-from app.shell.commands import LONGEST, decode
+from app.server.session.tour import tour_acts
+from app.shell.commands import LONGEST, Act, decode
 from app.state import changes
 from app.state.history import DRAG_PAUSE
 from app.state.state import State
 from app.state.undo import remember, undo
 from symgrasp.reason import Reason
-from tests.app.state.states import opened
+from tests.app.state.states import opened, with_plan
 from tests.app.surveyed import BASES, surveyed
 
 
@@ -130,3 +133,28 @@ def test_what_follows_a_release_is_another_step():
         state = remember(state, deed.applied(state), deed.origin, time)
     assert (undo(state).delta, undo(undo(state)).delta) == (0.1, 0.0)
     assert undo(state).press == state.press == 0
+
+
+def test_all_maps_of_a_sequence_slide_by_a_share_of_their_turns():
+    planned = with_plan("pick_pour_place", "sequential")
+    half = done(planned, do="slid", share=0.5)
+    assert [half.plan_results.turn(k) for k in range(3)] == [
+        pytest.approx(planned.plan_results.turn(k) / 2) for k in range(3)
+    ]
+    assert done(opened(), do="slid", share=0.5).plan_results.slide == opened().plan_results.slide
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.5, "all", None])
+def test_a_share_that_is_none_is_refused(share):
+    with pytest.raises(ValueError):
+        decode(json.dumps({"do": "slid", "share": share}))
+
+
+def test_the_page_may_ask_for_every_step_of_the_tour_and_nothing_else():
+    with pytest.raises(ValueError):
+        decode(json.dumps({"do": "act", "name": "save"}))
+    for name in get_args(get_type_hints(Act)["name"]):
+        deed = decode(json.dumps({"do": "act", "name": name}))
+        assert isinstance(deed, Act)
+        assert name in tour_acts(Mock())
+    assert len(tour_acts(Mock())) == len(get_args(get_type_hints(Act)["name"]))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from app.html.motion import motion_html
 from app.server.session.playback_clock import INTERVAL, PlaybackClock
 from app.state import changes
 from app.state.plans import plan_changes
-from app.state.plans.plan_results import FADE, SECONDS_PER_TASK
+from app.state.plans.plan_results import FADE, SECONDS_PER_TASK, SHORTEST_REPLAY
 from tests.app.state.states import with_plan
 
 
@@ -36,6 +38,22 @@ def test_a_play_goes_on_by_the_time_that_has_passed(clock):
     assert state.plan_results.position == pytest.approx(0.5 / SECONDS_PER_TASK)
     state = clock.advanced(state, 10.5 + INTERVAL)
     assert state.plan_results.position == pytest.approx((0.5 + INTERVAL) / SECONDS_PER_TASK)
+
+
+def test_a_climb_of_few_steps_shows_each_for_longer(clock):
+    state = with_plan("log_two_robots", "bimanual", "hill_climb")
+    climb = state.plan_results.climb
+    assert climb
+    few = replace(climb, steps=climb.steps[:1] * 4)
+    results = replace(state.plan_results, climb=few)
+    state = plan_changes.play_climb(replace(state, plan_results=results))
+    state = clock.advanced(state, 0.0)
+    frames = []
+    for now in np.arange(0.0, SHORTEST_REPLAY + 0.01, INTERVAL):
+        state = clock.advanced(state, float(now))
+        frames.append(state.plan_results.frame)
+    shown = [frames.count(k) * INTERVAL for k in (0, 1, 2)]
+    assert shown == pytest.approx([SHORTEST_REPLAY / 4] * 3, abs=INTERVAL)
 
 
 def test_a_play_that_has_ended_begins_anew_where_play_is_pressed(clock):
