@@ -12,9 +12,11 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.planners.configurations import ConfigurationFinder
 from symgrasp.planners.holding import Holding, HoldingSearch
+from symgrasp.planners.sequential import surface_margin
 from symgrasp.planners.stations import Turn
 from symgrasp.progress import Progress
 from symgrasp.robot.configuration import ArmConfiguration
+from symgrasp.robot.posture import ease
 
 __all__ = ["FreePlacement", "FreePlacements", "Step"]
 
@@ -125,6 +127,9 @@ class FreePlacements:
     def _choose_turns(self, holding: Holding) -> Iterator[tuple[float, list[Step] | None]]:
         """Choose a free turn for group after group of tasks.
 
+        What is free may be a configuration in which an arm stands less easily than at the witness of its
+        cell, which the score is of. Then turns are tried on that might reach more.
+
         Yields:
             The score (m) with None whenever it falls, and at last the score with the steps; nothing more
             where a group has no free turn.
@@ -132,17 +137,24 @@ class FreePlacements:
         reached = holding.score
         steps: list[Step] = []
         for group, members in enumerate(self._search.groups):
+            best: tuple[float, list[Step]] | None = None
             for turn in self._search.turns(holding.cells, group, reached):
+                if best and min(turn.margin, reached) <= best[0]:
+                    break
                 if turn.margin < reached:
                     reached = turn.margin
                     yield reached, None
                 found = [self._step(k, holding.cells, turn) for k in members]
                 free = [step for step in found if step]
                 if len(free) == len(members):
-                    steps += free
-                    break
-            else:
+                    own = min(reached, *(_margin(step) for step in free))
+                    best = max(best or (own, free), (own, free), key=lambda b: b[0])
+            if best is None:
                 return
+            if best[0] < reached:
+                reached = best[0]
+                yield reached, None
+            steps += best[1]
         yield reached, steps
 
     def _step(self, k: int, grasps: Sequence[Cell], turn: Turn) -> Step | None:
@@ -163,6 +175,14 @@ class FreePlacements:
         for a, b in finder.excluding(cells, torso):
             self._search.rule_out(k, (finder.arms[a].name, cells[a]), (finder.arms[b].name, cells[b]))
         return None
+
+
+def _margin(step: Step) -> float:
+    """Return the smallest margin (m) of the arms of a step, as easily as they stand in it if that counts."""
+    return min(
+        float(surface_margin(m, None if m.ease is None else ease(c.arm, c.q))[cell])
+        for c, cell, m in zip(step.configurations, step.cells, step.maps, strict=True)
+    )
 
 
 def _near(a: Sequence[Cell], b: Sequence[Cell], angles: int) -> bool:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from symgrasp.errors import InputError
 from symgrasp.feasibility.cell import Cell
@@ -107,16 +108,21 @@ def common_grasps(maps: Sequence[FeasibilityMap]) -> list[CommonGrasp]:
     return sorted(found, key=lambda g: (-g.margin, -g.clearance))
 
 
-def surface_margin(m: FeasibilityMap) -> Array:
+def surface_margin(m: FeasibilityMap, ease: ArrayLike | None = None) -> Array:
     """Return (R, H, A) how far (m) the hand may be off on the surface, either way, 0 where infeasible.
 
     Angles count by the arc that they cover at the cell's radius. Where the arm stands near a limit or a
-    singular pose only a part counts, the ease of the map.
+    singular pose only a part counts, its ease.
+
+    Args:
+        m: the map.
+        ease: how easily the arm stands in the cells; that of the map if None.
     """
     radius = m.manifold.profile.radius(m.manifold.h)
     along, around = np.moveaxis(m.cell_margins, -1, 0)
     margin = np.minimum(along, around * radius[None, :, None])
-    return margin if m.ease is None else margin * m.ease
+    ease = m.ease if ease is None else ease
+    return margin if ease is None else margin * ease
 
 
 def check_same_grid(maps: Sequence[FeasibilityMap]) -> None:

@@ -21,6 +21,7 @@ from symgrasp.feasibility.create import create_map
 from symgrasp.object.manifold import grasp_to_tool
 from symgrasp.plan.plan import LARGEST_PLAN, Plan, plan_schema
 from symgrasp.plan.verify import verify
+from symgrasp.planners import planning
 from symgrasp.planners.configurations import ConfigurationFinder
 from symgrasp.planners.conflicts import ConflictError, Shared
 from symgrasp.planners.gaps import PrintGaps
@@ -177,6 +178,7 @@ def test_arms_that_always_meet(monkeypatch):
 def test_other_configurations_than_the_witnesses_are_tried(monkeypatch):
     scene = load_small("log_two_robots", 20, 24, 6)
     conflict = ConfigurationFinder.conflict
+    monkeypatch.setattr(planning, "_rated", lambda world, m: m)  # or an easier placement may come first
     first = plan_bimanual(scene)
     refused = [[hold.joints[n] for n in hold.joints] for hold in first.tasks[0].holds]
 

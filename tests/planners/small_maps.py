@@ -81,8 +81,9 @@ class Picky(ConfigurationFinder):
         self.seed = seed
 
     def find(self, cells, torso=None, *, every=True):
-        free = np.random.default_rng([self.seed, *chain(*cells)]).random() < 0.05
-        return [ArmConfiguration(arm, np.zeros(7), 0.0) for arm in self.arms] if free else None
+        rng = np.random.default_rng([self.seed, *chain(*cells)])
+        free = rng.random() < 0.05
+        return [ArmConfiguration(arm, np.full(7, rng.random()), 0.0) for arm in self.arms] if free else None
 
     def excluding(self, cells, torso):
         return iter(())

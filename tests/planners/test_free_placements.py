@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice, product
 
 import numpy as np
@@ -15,6 +16,7 @@ from symgrasp.planners.bimanual import Climb, hill_climb, print_overlap
 from symgrasp.planners.free import FreePlacements
 from symgrasp.planners.gaps import OVERLAP, PrintGaps
 from symgrasp.planners.holding import HoldingSearch
+from symgrasp.planners.sequential import surface_margin
 from symgrasp.planners.stations import SharedTorso
 from tests.conftest import load_small
 from tests.planners.small_maps import Picky, apart, difference, margin_at, random_maps, score, small, together
@@ -39,6 +41,25 @@ def test_the_best_that_is_free(seed, density):
         assert finder.find(found.steps[0].cells)
     elif found:
         assert apart(found.steps[0].cells) == OVERLAP
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, 0.3]))
+@settings(max_examples=60, deadline=None)
+def test_what_counts_is_how_easily_arms_stand_in_the_end(seed, density):
+    """Of all placements none reaches more in the configurations that are free, whatever the witnesses are."""
+    maps = [replace(m, ease=np.ones(m.feasible.shape)) for m in random_maps(seed, 2, density)]
+    finder = Picky(maps, seed)
+    best = -1.0
+    for cells in product(*([Cell(*map(int, c)) for c in np.argwhere(m.feasible)] for m in maps)):
+        if apart(cells) >= 0 and (found := finder.find(cells)):
+            eased = [surface_margin(m)[c] * own.q[0] for m, c, own in zip(maps, cells, found, strict=True)]
+            best = max(best, min(apart(cells), *eased))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("symgrasp.planners.free.ease", lambda arm, q: q[0])
+        placement = next(iter(FreePlacements(together(maps), [finder])), None)
+    if best >= 0:
+        assert placement
+        assert placement.score == pytest.approx(best)
 
 
 @given(

@@ -10,8 +10,10 @@ import pytest
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import create_map
 from symgrasp.planners.configurations import ConfigurationFinder
+from symgrasp.planners.planning import plan_handover
 from symgrasp.planners.sequential import common_grasps, surface_margin
 from symgrasp.robot.posture import EASY_SLACK, ease, limit_slack
+from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 from tests.conftest import load_small
 from tests.plan.test_plan import bimanual, handover, sequential
@@ -25,6 +27,13 @@ def bottle():
 @pytest.mark.parametrize("make", [sequential, bimanual, handover])
 def test_best_plans_stand_off_the_limits(make):
     slacks = [hold.limit_slack for task in make().tasks for hold in task.holds]
+    assert min(slacks) > EASY_SLACK / 2
+
+
+def test_of_two_hands_that_are_close_neither_stands_at_a_limit():
+    """Where the witnesses of both arms meet, what takes their place counts in the ranking of grasps."""
+    plan = plan_handover(Scene.load("pr2_handover"))
+    slacks = [hold.limit_slack or 0.0 for task in plan.tasks for hold in task.holds]
     assert min(slacks) > EASY_SLACK / 2
 
 
