@@ -27,7 +27,13 @@ LIFT = 0.2
 
 
 def check_motion(
-    plan: Plan, motion: MotionRecord, world: BulletWorld, expect: Expect, progress: Progress | None = None
+    plan: Plan,
+    motion: MotionRecord,
+    world: BulletWorld,
+    expect: Expect,
+    progress: Progress | None = None,
+    *,
+    strict: bool = False,
 ) -> None:
     """Check every statement of a motion, up to the first segment that cannot be followed.
 
@@ -37,6 +43,7 @@ def check_motion(
         world: a world of its scene; robots and object are put along the motion.
         expect: notes a statement, and what is wrong where it does not hold.
         progress: called with the finished share; may raise `Cancelled`.
+        strict: let no clearance be overstated at all.
     """
     arms = world.scene.arms
     for name, joints in motion.joint_names.items():
@@ -48,7 +55,7 @@ def check_motion(
     total = sum(segment.times[-1] for segment in motion.segments)
     text = f"motion: duration is {total:.6f} s, not {motion.duration:.6f} s"
     expect(abs(total - motion.duration) <= TOLERANCE, text)
-    walk = _Walk(plan, world, expect)
+    walk = _Walk(plan, world, expect, strict)
     for k, segment in enumerate(motion.segments):
         if progress:
             progress(k / len(motion.segments))
@@ -63,11 +70,12 @@ class _Walk:
     Args:
         plan: the plan.
         world: a world of its scene.
-        expect: see `check_motion`.
+        expect, strict: see `check_motion`.
     """
 
-    def __init__(self, plan: Plan, world: BulletWorld, expect: Expect) -> None:
+    def __init__(self, plan: Plan, world: BulletWorld, expect: Expect, strict: bool) -> None:
         self._plan, self._world, self._scene, self._expect = plan, world, world.scene, expect
+        self._strict = strict
         self._values = {name: robot.home.copy() for name, robot in self._scene.robots.items()}
         self._opening: dict[str, float] = {}
         self._in_hand: dict[str, Array] = {}  # arm that holds the object → T_tool_object
@@ -89,7 +97,9 @@ class _Walk:
             return False
         if not check_rows(segment, self._values, self._scene, where, self._expect):
             return False
-        states = SegmentStates(self._scene, segment, self._values, self._T, self._in_hand, self._grasps)
+        states = SegmentStates(
+            self._scene, segment, self._values, self._T, self._in_hand, self._grasps, self._strict
+        )
         self._states += check_free(states, self._world, MOST_STATES - self._states, where, self._expect)
         last = states.values(states.rows[-1:])
         self._T = states.objects(last)[0][0]

@@ -59,6 +59,7 @@ class SegmentStates:
         T_start: pose (4, 4) of the object there.
         in_hand: arm that holds the object → T_tool_object (4, 4).
         grasps: arm → T_object_tool (4, 4) of its grasps of the plan.
+        strict: whether its clearance may not be overstated at all.
     """
 
     scene: Scene
@@ -67,6 +68,7 @@ class SegmentStates:
     T_start: Array
     in_hand: Mapping[str, Array]
     grasps: Mapping[str, Sequence[Array]]
+    strict: bool = False
 
     @property
     def rows(self) -> Array:
@@ -249,6 +251,7 @@ class _NearBodies:
         self, states: SegmentStates, world: BulletWorld, values: Mapping[str, Array], objects: Array
     ) -> None:
         self._world, self._clearance = world, states.segment.clearance
+        self._tolerance = 0.0 if states.strict else CLEARANCE_TOLERANCE
         scene, kind = states.scene, states.segment.kind
         self._holding = [scene.arms[name] for name in states.in_hand]
         self._taking = {scene.arms[name]: on for name, on in states.on_line(values, objects).items()}
@@ -279,11 +282,11 @@ class _NearBodies:
         for c in world.all_pairs_within(reach, touching):
             gap = reach - c.depth - world.margin_for(c.reason)
             moved = self._group.get(c.a) != self._group.get(c.b)
-            if moved and gap < self._clearance - CLEARANCE_TOLERANCE:
+            if moved and gap < self._clearance - self._tolerance:
                 yield c, gap
         for c in world.object_contacts(reach) if self._carried else ():
             gap = reach - c.depth
-            if gap < (-SUNK if c.b in self._resting else self._clearance) - CLEARANCE_TOLERANCE:
+            if gap < (-SUNK if c.b in self._resting else self._clearance) - self._tolerance:
                 yield c, gap
 
 

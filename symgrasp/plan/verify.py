@@ -69,7 +69,7 @@ def verify(
             for done, (k, task, hold) in enumerate(holds, start=len(plan.tasks)):
                 check_margins(hold, task, places[k], world, report, part_of(progress, done, parts))
         if plan.motion is not None and not report.failures:
-            check_motion(plan, plan.motion, world, report.expect)
+            check_motion(plan, plan.motion, world, report.expect, strict=strict)
     if progress:
         progress(1.0)
     return report

@@ -32,7 +32,7 @@ from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 
-__all__ = ["Held", "with_configurations", "write_plan", "write_task"]
+__all__ = ["ERROR", "Held", "rounded_down", "with_configurations", "write_plan", "write_task"]
 
 
 ERROR = 1e-5
@@ -102,7 +102,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
         delta=delta,
         object_pose_turned=Pose.of(turned),
         holds=tuple(entries),
-        balance={robot: _at_most(margin - ERROR) for robot, margin in margins.items()},
+        balance={robot: rounded_down(margin - ERROR) for robot, margin in margins.items()},
     )
 
 
@@ -130,7 +130,7 @@ def with_configurations(
                 update = {"joints": joints, **_of_configuration(world, arm, q, arms)}
                 holds.append(hold.model_copy(update=update))
             margins = support_margins(scene, turned, held)
-            balance = {robot: _at_most(margin - ERROR) for robot, margin in margins.items()}
+            balance = {robot: rounded_down(margin - ERROR) for robot, margin in margins.items()}
             tasks.append(task.model_copy(update={"holds": tuple(holds), "balance": balance}))
     return plan.model_copy(update={"tasks": tuple(tasks)})
 
@@ -138,13 +138,13 @@ def with_configurations(
 def _of_configuration(world: BulletWorld, arm: Arm, q: Array, holders: Sequence[Arm]) -> dict[str, float]:
     """Return what a hold states of its arm's joint values (n,), at which the arm stands in the world."""
     return {
-        "clearance": _at_most(world.clearance(arm, CLEARANCE_LIMIT + ERROR, holders) - ERROR),
-        "limit_slack": _at_most(float(limit_slack(arm, q)) - LAST_DIGIT),
-        "conditioning": _at_most(float(conditioning(arm, q)) - LAST_DIGIT),
+        "clearance": rounded_down(world.clearance(arm, CLEARANCE_LIMIT + ERROR, holders) - ERROR),
+        "limit_slack": rounded_down(float(limit_slack(arm, q)) - LAST_DIGIT),
+        "conditioning": rounded_down(float(conditioning(arm, q)) - LAST_DIGIT),
     }
 
 
-def _at_most(value: float) -> float:
+def rounded_down(value: float) -> float:
     """Return a number rounded down to six digits, not below zero: no plan states more than there is."""
     return max(0.0, math.floor(1e6 * value + 1e-6) / 1e6)
 

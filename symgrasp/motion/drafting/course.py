@@ -14,6 +14,7 @@ from symgrasp.motion.bodies.state import State
 from symgrasp.motion.drafting.ways import Grip
 from symgrasp.motion.paths.search import STATED, NoMotionError, Proof, blockers, prove
 from symgrasp.motion.segments import Kind, Opening, Segment
+from symgrasp.plan.writing import ERROR, rounded_down
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm
 
@@ -139,7 +140,7 @@ class Course:
                 held_by=held_by,
                 task_from=tasks[0],
                 task_to=tasks[1],
-                clearance=float(proof.clearance.min()),
+                clearance=rounded_down(float(proof.clearance.min()) - ERROR),
                 room=float(proof.room.min()),
                 tilt_room=tilt,
             )
