@@ -30,6 +30,8 @@ from ..state.requests import (
     MapRequest,
     MapResult,
     Maps,
+    Probability,
+    ProbabilityRequest,
 )
 from ..state.surveys.survey import Stand, SurveyRequest
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, Part, ProgressReport
@@ -122,6 +124,10 @@ class ComputeProcess:
     def explain(self, request: ExplainRequest, progress: Progress) -> ExplainResult:
         """Compute the result of every candidate of a cell."""
         return self._call("explain", progress, request)
+
+    def probability(self, request: ProbabilityRequest, progress: Progress) -> Probability:
+        """Compute how probable the grasps of a map are."""
+        return self._call("probability", progress, request)
 
     def read_scene(self, name: str, content: bytes, folder: Path | None, progress: Progress) -> UploadedScene:
         """Read an uploaded scene; see `UploadService.read_scene`."""

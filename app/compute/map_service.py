@@ -14,6 +14,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import rotation_z
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
+from symgrasp.survey.success import success_map
 from symgrasp.world import RESTING_DEPTH, BulletWorld, open_world
 
 from ..state.requests import (
@@ -24,9 +25,14 @@ from ..state.requests import (
     MapRequest,
     MapResult,
     Maps,
+    Probability,
+    ProbabilityRequest,
 )
 
-__all__ = ["MapService"]
+__all__ = ["DRAWS", "MapService"]
+
+DRAWS = 100
+"""Of how many poses a map is computed for the probabilities of grasps."""
 
 
 class MapService:
@@ -109,6 +115,12 @@ class MapService:
         maker, the_map = self._maker_for(request.map.scene), request.map
         explanation = maker.explain(the_map.arm, the_map.moved_task(), request.cell, progress=progress)
         return ExplainResult(request, explanation)
+
+    def probability(self, request: ProbabilityRequest, progress: Progress) -> Probability:
+        """Compute how probable the grasps of a map are."""
+        maker, the_map = self._maker_for(request.map.scene), request.map
+        found = success_map(maker, the_map.arm, the_map.moved_task(), request.noise, DRAWS, progress=progress)
+        return Probability(request, found.feasible.sum(axis=0), len(found.feasible))
 
     def _maker_for(self, scene: Scene) -> MapMaker:
         """Return the present map maker if it is for the same robots, obstacles and object, else a new one."""

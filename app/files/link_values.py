@@ -13,12 +13,13 @@ from pydantic import PlainSerializer, PlainValidator
 from symgrasp.errors import one_of
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.object.manifold import ROLLS
+from symgrasp.survey.success import PoseNoise
 
 from ..state.map_view_state import RollChoice
 from ..state.object_pose import ObjectPose
 from ..state.page_link import Camera
 
-__all__ = ["CameraView", "Colors", "Names", "Number", "Pose", "Rolls", "Side", "Switch"]
+__all__ = ["CameraView", "Colors", "Names", "Noise", "Number", "Pose", "Rolls", "Side", "Switch"]
 
 LARGEST = 1e5
 """Largest absolute value of a number in a link (cm, degrees; m of the camera)."""
@@ -67,6 +68,17 @@ def _numbers(text: str) -> tuple[float, ...]:
     return tuple(map(_number, values))
 
 
+def _noise(text: str) -> PoseNoise:
+    values = [_number(part) for part in text.split(",")]
+    if len(values) != 2 or min(values) < 0:
+        raise ValueError(text, "two numbers of at least 0 with a comma between them")
+    return PoseNoise(values[0] / 1e3, np.deg2rad(values[1]).item())
+
+
+def _noise_text(noise: PoseNoise) -> str:
+    return ",".join(map(_number_text, (1e3 * noise.position, np.rad2deg(noise.tilt))))
+
+
 def _pose(text: str) -> ObjectPose:
     x, y, z, *angles = _numbers(text)
     return ObjectPose(x / 100, y / 100, z / 100, *np.deg2rad(angles).tolist())
@@ -101,6 +113,9 @@ Number = Annotated[float, *_text(_number, _number_text)]
 
 Pose = Annotated[ObjectPose, *_text(_pose, _pose_text)]
 """x, y, z (cm), lean, direction of the lean, spin (degrees)."""
+
+Noise = Annotated[PoseNoise, *_text(_noise, _noise_text)]
+"""How uncertain the object's pose is: position (mm) and tilt (degrees)."""
 
 CameraView = Annotated[Camera, *_text(_numbers, lambda values: ",".join(f"{v:.3f}" for v in values))]
 

@@ -26,11 +26,11 @@ from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
 from ..state import changes
-from ..state.map_view_state import RollChoice
+from ..state.map_view_state import NOISE, RollChoice
 from ..state.object_pose import ObjectPose
 from ..state.page_link import Camera
 from ..state.state import State
-from .link_values import CameraView, Colors, Names, Number, Pose, Rolls, Side, Switch
+from .link_values import CameraView, Colors, Names, Noise, Number, Pose, Rolls, Side, Switch
 
 __all__ = ["Link"]
 
@@ -57,6 +57,7 @@ class Link(BaseModel):
         at: task → pose of the object.
         turn: turn of the object about its axis (degrees).
         roll, view: which rolls the map shows, and what its colours stand for.
+        noise: how uncertain the object's pose is where they stand for probabilities (mm, degrees).
         board, gizmo, dark: `Display.flat_map`, `Display.drag_handles` and `Display.dark`.
         camera: see `Camera`; the page's own if None.
         h, theta: the picked grasp (cm, degrees); none is picked if h is None.
@@ -76,6 +77,7 @@ class Link(BaseModel):
     turn: Number = 0.0
     roll: Rolls = RollChoice.EITHER
     view: Colors = ColorBy.REASON
+    noise: Noise = NOISE
     board: Switch = True
     gizmo: Switch = False
     dark: Switch = False
@@ -146,6 +148,7 @@ class Link(BaseModel):
             "hand": state.scene.replaceable_hands, "task": state.task, "arm": state.arm,
             "tasks": None if list(tasks) == list(known) else tasks, "arms": arms, "at": at,
             "turn": np.rad2deg(state.delta), "roll": view.roll, "view": view.color_by,
+            "noise": view.noise,
             "board": display.flat_map, "gizmo": display.drag_handles, "dark": display.dark,
             "camera": camera,
         }  # fmt: skip
@@ -202,7 +205,9 @@ class Link(BaseModel):
                 raise InputError("link", "arm", self.arm, one_of(arms, self.arm))
             state = changes.choose_arm(state, self.arm)
         state = changes.switched(state, flat_map=self.board, drag_handles=self.gizmo, dark=self.dark)
-        state = replace(state, map_view=replace(state.map_view, roll=self.roll, color_by=self.view))
+        state = replace(
+            state, map_view=replace(state.map_view, roll=self.roll, color_by=self.view, noise=self.noise)
+        )
         state = changes.turn(state, np.deg2rad(self.turn))
         if self.h is None:
             return state

@@ -12,17 +12,18 @@ from dataclasses import asdict, replace
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeFloat, ValidationError
 
 from symgrasp.errors import InputError, one_of
 from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.survey.success import PoseNoise
 
 from ..choices.object_choice import ObjectChoice, from_library, object_options
 from ..choices.robot_choice import OWN_ROBOT, UploadedRobot, robot_options
 from ..choices.uploaded_scene import UploadedScene
 from ..state import changes
 from ..state.display import Display
-from ..state.map_view_state import RollChoice
+from ..state.map_view_state import NOISE, RollChoice
 from ..state.object_pose import ObjectPose
 from ..state.page_link import Camera
 from ..state.plans.plan_results import PlanResults
@@ -58,6 +59,7 @@ class StoredPage(BaseModel):
         poses: task → x, y, z (m), lean, its direction and spin (rad), of the tasks that were moved.
         grasp: the picked grasp.
         roll, color_by, handprint, compare: as in `MapViewState`.
+        noise: position (m) and tilt (rad) of `MapViewState.noise`.
         sequence_method, hands_method, seed, position: as in `PlanResults`.
         plan: the plan that is chosen, as a plan file.
         planned: whether a task of it is shown.
@@ -80,6 +82,7 @@ class StoredPage(BaseModel):
     grasp: StoredGrasp | None
     roll: RollChoice
     color_by: ColorBy
+    noise: tuple[NonNegativeFloat, NonNegativeFloat] = (NOISE.position, NOISE.tilt)
     handprint: bool
     compare: bool
     sequence_method: str
@@ -115,6 +118,7 @@ class StoredPage(BaseModel):
             grasp=StoredGrasp(h=pick.h, theta=pick.theta, roll=pick.roll) if pick else None,
             roll=view.roll,
             color_by=view.color_by,
+            noise=(view.noise.position, view.noise.tilt),
             handprint=view.handprint,
             compare=view.compare,
             sequence_method=results.sequence_method,
@@ -183,6 +187,7 @@ class StoredPage(BaseModel):
         state = changes.choose_arm(changes.choose_task(state, self.task), self.arm)
         on = {name: value for name, value in self.display.items() if name in Display.__dataclass_fields__}
         view = replace(state.map_view, roll=self.roll, color_by=self.color_by, handprint=self.handprint)
+        view = replace(view, noise=PoseNoise(*self.noise))
         state = replace(
             state,
             display=Display(**on | {"symmetry_error": False}),  # the mesh is not stored

@@ -6,6 +6,7 @@ import numpy as np
 
 from symgrasp.object.manifold import ROLLS
 from symgrasp.plan.plan import Grasp
+from symgrasp.survey.success import CONFIDENCE, interval
 
 from ..state.state import State
 from .escaping import escape
@@ -49,6 +50,7 @@ def grasp_html(state: State) -> str:
         return f'<div class="sg"><b>{where}</b><br>waits for the map</div>'
     where += f", roll {np.rad2deg(ROLLS[state.cell.roll]):.0f}°"
     why = ", ".join(filter(None, [escape(state.map.why(state.cell)), state.map.holds(state.cell)]))
+    where += _probability_text(state)
     witness = state.map.witness(state.cell)
     if witness is None and state.explanation and state.shown_candidate:
         best = "The best" if state.candidate == 0 else "One"
@@ -74,6 +76,17 @@ def grasp_html(state: State) -> str:
         f"room for {least}{100 * margin.along:.1f} cm along and {np.rad2deg(margin.around):.1f}° around"
         f"<br>Joints {joints}; fingers {100 * witness.opening:.1f} cm apart</div>"
     )
+
+
+def _probability_text(state: State) -> str:
+    """Say how probable the picked grasp is, and how far the draws tell; nothing where that is not known."""
+    found = state.probability
+    if found is None or state.base_cell is None:
+        return ""
+    count = int(found.feasible[state.base_cell])
+    low, high = interval([count], found.draws)
+    of = f"{100 * low:.0f} to {100 * high:.0f} % at {100 * CONFIDENCE:.0f} % confidence"
+    return f", feasible at {count} of {found.draws} poses ({of})"
 
 
 def status_html(state: State) -> str:

@@ -77,8 +77,8 @@ class ObjectView:
         if state.display.symmetry_error and state.object_choice and state.object_choice.measurement:
             colors = deviation_colors(state.object_choice.measurement, self.grid)
             self.surface.set_colors(on_surface(state, colors))
-        elif state.result:
-            self.surface.set_colors(cell_colors(state, state.result.map))
+        elif state.base_map:
+            self.surface.set_colors(cell_colors(state, state.base_map))
         self.pick.visible = state.pick is not None
         if state.pick:
             self.pick.position = self.grid.contact(state.pick.h, state.pick.theta)

@@ -48,7 +48,7 @@ UNKNOWN = 0xFFFF
 
 def map_parts(state: State) -> dict[str, bytes]:
     """Return the messages that show the map of a state, by their kind."""
-    m, view = state.result and state.result.map, state.map_view
+    m, view = state.base_map, state.map_view
     layers = layers_of(state)
     parts = {
         "cells": _cells(m, view.roll, view.color_by) if m else _message("cells", {"heights": 0, "angles": 0}),
@@ -180,13 +180,13 @@ def _look(state: State) -> dict[str, Any]:
         "patterned": state.map_view.patterns,
         "legend": [],
     }
-    if state.result:
-        colored = colored_map(state.result.map, state.map_view.roll, state.map_view.color_by)
+    if state.base_map:
+        colored = colored_map(state.base_map, state.map_view.roll, state.map_view.color_by)
         look["legend"] = [list(swatch) for swatch in colored.swatches]
         indices = {_hex(color): k for k, color in reversed(list(enumerate(colored.colors)))}
         patterns = dict(enumerate(cell_patterns(state.map_view.color_by)))
         look["patterns"] = [patterns.get(indices[swatch.color], PLAIN) for swatch in colored.swatches]
-        look["counted"] = _counted(state.result.map, state.map_view.roll)
+        look["counted"] = _counted(state.base_map, state.map_view.roll)
         if colored.scale:
             scale = colored.scale
             look["scale"] = [scale.label, scale.high, [_hex(c) for c in scale.colors[::36]]]

@@ -10,10 +10,23 @@ import numpy as np
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.survey.success import PoseNoise
 
-from .requests import CompareRequest, Comparison, ExplainRequest, ExplainResult, MapRequest, Request
+from .requests import (
+    CompareRequest,
+    Comparison,
+    ExplainRequest,
+    ExplainResult,
+    MapRequest,
+    Probability,
+    ProbabilityRequest,
+    Request,
+)
 
-__all__ = ["MapViewState", "RollChoice"]
+__all__ = ["NOISE", "MapViewState", "RollChoice"]
+
+NOISE = PoseNoise(position=0.005, tilt=np.deg2rad(2.0).item())
+"""How uncertain the object's pose is at first: by 5 mm and 2°."""
 
 
 class RollChoice(Enum):
@@ -61,6 +74,8 @@ class MapViewState:
         rolls_apart: whether each roll has a map of its own as well.
         patterns: whether colours of cells have patterns over them, which tell them apart without colour.
         hovered: the cell of the unshifted map that is pointed at.
+        noise: how uncertain the object's pose is where the colours show probabilities.
+        probability: the newest result of that.
     """
 
     roll: RollChoice = RollChoice.EITHER
@@ -73,6 +88,8 @@ class MapViewState:
     rolls_apart: bool = False
     patterns: bool = False
     hovered: Cell | None = None
+    noise: PoseNoise = NOISE
+    probability: Probability | None = None
 
     @property
     def input_values(self) -> tuple[object, ...]:
@@ -80,6 +97,7 @@ class MapViewState:
         return (
             self.roll, self.color_by, self.handprint, self.compare, self.candidate, self.rolls_apart,
             self.patterns,
+            self.noise,
         )  # fmt: skip
 
     def missing_request(self, request: MapRequest, delta: float, cell: Cell | None) -> Request | None:
@@ -97,7 +115,14 @@ class MapViewState:
             explain = ExplainRequest(request, cell)
             if self.explained is None or self.explained.request != explain:
                 return explain
+        if self.color_by is ColorBy.PROBABILITY and self.probability_of(request) is None:
+            return ProbabilityRequest(request, self.noise)
         return None
+
+    def probability_of(self, request: MapRequest) -> Probability | None:
+        """Return how probable the grasps of a map are, if that is shown and known."""
+        found = self.probability if self.color_by is ColorBy.PROBABILITY else None
+        return found if found and found.request == ProbabilityRequest(request, self.noise) else None
 
     def with_compare(self, compare: bool) -> MapViewState:
         """Turn the comparison with a recomputed map on or off."""
@@ -108,8 +133,10 @@ class MapViewState:
         count = len(self.explained.explanation.candidates) if self.explained else 0
         return replace(self, candidate=int(np.clip(candidate, 0, count - 1)) if count else None)
 
-    def with_result(self, result: Comparison | ExplainResult) -> MapViewState:
+    def with_result(self, result: Comparison | ExplainResult | Probability) -> MapViewState:
         """Store a result about the map."""
+        if isinstance(result, Probability):
+            return replace(self, probability=result)
         if isinstance(result, Comparison):
             return replace(self, comparison=result if self.compare else None)
         # A candidate without an explanation was restored by an undo: keep it.
@@ -117,7 +144,7 @@ class MapViewState:
 
     def without_results(self) -> MapViewState:
         """Drop what was computed."""
-        return replace(self, comparison=None, explained=None, hovered=None)
+        return replace(self, comparison=None, explained=None, hovered=None, probability=None)
 
     def for_another_scene(self) -> MapViewState:
         """Return it for another scene: both rolls, the same display options, nothing computed."""
@@ -127,6 +154,7 @@ class MapViewState:
             compare=self.compare,
             rolls_apart=self.rolls_apart,
             patterns=self.patterns,
+            noise=self.noise,
         )
 
     def for_another_cell(self) -> MapViewState:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.explain import Explanation
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import Array
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+from symgrasp.survey.success import PoseNoise
 
 from .cached import cached
 from .object_pose import ObjectPose, with_poses
@@ -25,6 +28,8 @@ __all__ = [
     "MapRequest",
     "MapResult",
     "Maps",
+    "Probability",
+    "ProbabilityRequest",
     "Request",
 ]
 
@@ -146,7 +151,24 @@ class ExplainRequest:
         return False
 
 
-Request = MapRequest | CompareRequest | ExplainRequest
+@dataclass(frozen=True)
+class ProbabilityRequest:
+    """A map of which is to be known how probable its grasps are.
+
+    Attributes:
+        map: the map.
+        noise: how the object's pose is uncertain.
+    """
+
+    map: MapRequest
+    noise: PoseNoise
+
+    def differs_only_in_pose(self, other: object) -> bool:
+        """Return False: it takes as long as many maps, and is not waited for where another is wanted."""
+        return False
+
+
+Request = MapRequest | CompareRequest | ExplainRequest | ProbabilityRequest
 """What a state may need computed; it is started without an action of a person."""
 
 
@@ -171,6 +193,21 @@ class ExplainResult:
 
     request: ExplainRequest
     explanation: Explanation
+
+
+@dataclass(frozen=True, eq=False)
+class Probability:
+    """How probable the grasps of a map are.
+
+    Attributes:
+        request: what it answers.
+        feasible: (R, H, A) at how many draws of the pose each cell of the unshifted map is feasible.
+        draws: how many there were.
+    """
+
+    request: ProbabilityRequest
+    feasible: np.ndarray
+    draws: int
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from state to state, in `app.state.changes`, `app.state.job_changes`, `app.state
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.explain import CandidateResult, Explanation
@@ -31,7 +31,7 @@ from .map_view_state import MapViewState
 from .object_pose import ObjectPose, with_poses
 from .page_link import PageLink
 from .plans.plan_results import PlanKind, PlanResult, PlanResults
-from .requests import Busy, ExplainRequest, MapRequest, MapResult, Request
+from .requests import Busy, ExplainRequest, MapRequest, MapResult, Probability, Request
 from .surveys.survey import Places, SurveyRequest, SurveyState
 
 __all__ = ["Pick", "State"]
@@ -139,7 +139,8 @@ class State:
         """All values that a link contains, except the camera."""
         return (
             self.scene, self.scene_name, self.object_choice, self.task, self.arm, self.poses, self.delta,
-            self.map_view.roll, self.pick, self.map_view.color_by, self.display,
+            self.map_view.roll, self.pick, self.map_view.color_by, self.map_view.noise,
+            self.display,
         )  # fmt: skip
 
     # -- scene and object -------------------------------------------------------------------
@@ -255,10 +256,22 @@ class State:
 
     # -- the map and the picked grasp -------------------------------------------------------
 
+    @property
+    def probability(self) -> Probability | None:
+        """How probable the grasps of the map are, where that is shown and known."""
+        return self.map_view.probability_of(self.request) if self.is_current else None
+
+    @cached
+    def base_map(self) -> FeasibilityMap | None:
+        """The newest map before it is shifted by δ, with the probabilities that are shown."""
+        if self.result is None or self.probability is None:
+            return self.result and self.result.map
+        return replace(self.result.map, probability=self.probability.feasible / self.probability.draws)
+
     @cached
     def map(self) -> FeasibilityMap | None:
         """The newest map, shifted by δ."""
-        return self.result.map.shift(self.delta) if self.result else None
+        return self.base_map.shift(self.delta) if self.base_map else None
 
     @property
     def contacts(self) -> tuple[str, ...]:

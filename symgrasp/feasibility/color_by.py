@@ -25,6 +25,7 @@ class ColorBy(StrEnum):
     ALONG = "margin along"
     AROUND = "margin around"
     OPENING = "hand opening"
+    PROBABILITY = "probability"
 
     @property
     def unit(self) -> str:
@@ -32,7 +33,8 @@ class ColorBy(StrEnum):
         return _UNITS.get(self, "")
 
 
-_UNITS = {ColorBy.CLEARANCE: "mm", ColorBy.ALONG: "mm", ColorBy.AROUND: "°", ColorBy.OPENING: "mm"}
+_UNITS = {ColorBy.CLEARANCE: "mm", ColorBy.ALONG: "mm", ColorBy.AROUND: "°", ColorBy.OPENING: "mm",
+          ColorBy.PROBABILITY: "%"}  # fmt: skip
 
 FEASIBLE = (0x5F, 0xBF, 0x77)
 INFEASIBLE = (0xA3, 0x1D, 0x2A)
@@ -146,13 +148,17 @@ def _colored(color_by: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap
         )
     known = ~np.isnan(values)
     high = _nice(float(values[known].max())) if known.any() else 1.0
+    swatches = (Swatch(_hex(NONE), "not feasible", rest),)
+    if color_by is ColorBy.PROBABILITY:
+        high, unknown = 100.0, int(np.count_nonzero(~known))
+        swatches = (Swatch(_hex(NONE), "not computed yet", unknown),) if unknown else ()
     steps = 1 + np.round(np.clip(np.where(known, values, 0.0) / high, 0, 1) * (STEPS - 1))
     at = np.linspace(0, len(SCALE) - 1, STEPS)
     ramp = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=-1)
     colors = np.vstack([[NONE], np.round(ramp)]).astype(np.uint8)
     scale = Scale(f"{color_by} ({color_by.unit})", high, colors[1:])
     index = np.where(known, steps, 0).astype(np.uint8)
-    return ColoredMap(index, colors, (Swatch(_hex(NONE), "not feasible", rest),), scale)
+    return ColoredMap(index, colors, swatches, scale)
 
 
 def _nice(value: float) -> float:

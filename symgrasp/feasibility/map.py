@@ -77,6 +77,8 @@ class FeasibilityMap:
             it asks for none.
         preliminary: whether cells have the reasons of coarser ones, of which few configurations were tried;
             then there are no witnesses.
+        probability: (R, H, A) how probable it is that a cell is feasible where the object's pose is
+            uncertain, see `symgrasp.survey.success`; None where that was not asked for. It is not saved.
     """
 
     scene: str
@@ -102,6 +104,7 @@ class FeasibilityMap:
     certified: np.ndarray | None = None
     refined: Refined | None = None
     preliminary: bool = False
+    probability: Array | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
@@ -220,10 +223,9 @@ class FeasibilityMap:
             name: np.roll(getattr(self, name), -k, axis=2)
             for name in ("reason", "q", "sample", "branch", "clearance", "pair", "depth", "proven")
         }
-        if self.ease is not None:
-            rolled["ease"] = np.roll(self.ease, -k, axis=2)
-        if self.certified is not None:
-            rolled["certified"] = np.roll(self.certified, -k, axis=2)
+        for name in ("ease", "certified", "probability"):
+            if (cells := getattr(self, name)) is not None:
+                rolled[name] = np.roll(cells, -k, axis=2)
         if self.refined is not None:
             rolled["refined"] = self.refined.shift(manifold, k)
         turned = self.T_world_object @ rotation_z(delta)
@@ -242,12 +244,15 @@ class FeasibilityMap:
             proven=self.proven & ~drop,
             certified=None if self.certified is None else self.certified & ~drop,
             refined=self.refined and self.refined.masked(~drop),
+            probability=None,
         )
 
     def values(self, color_by: ColorBy) -> Array:
         """Return the values (R, H, A) that colours stand for, in their unit; NaN where there is none."""
         if color_by is ColorBy.CLEARANCE:
             return 1e3 * self.clearance
+        if color_by is ColorBy.PROBABILITY:  # also of cells that are infeasible where the object should be
+            return np.full(self.reason.shape, np.nan) if self.probability is None else 100 * self.probability
         if color_by is ColorBy.ALONG:
             found = 1e3 * self.margins[..., 0]
         elif color_by is ColorBy.AROUND:

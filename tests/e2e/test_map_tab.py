@@ -110,6 +110,30 @@ def _is_svg(content: bytes) -> bool:
     return ElementTree.fromstring(content).tag.endswith("svg")
 
 
+def test_how_probable_grasps_are_is_computed_cancelled_and_read_out(open_page, bottle_map):
+    page = open_page()
+    pick(page, bottle_map, Reason.FEASIBLE)
+    expect(page.text("panda holds it")).to_be_visible()
+    expect(page.text("Ready.")).to_be_visible()
+    page.tab("View")
+    page.choose("Colours show", "probability")
+    expect(page.legend).to_contain_text("not computed yet")
+    expect(page.around("probability (%)")).to_be_visible()
+    page.button("Cancel").click()
+    expect(page.text("Stopped.")).to_be_visible()
+    page.number("Off by (mm)", 1)  # another question is asked at once
+    expect(page.text("Computing how probable grasps are")).to_be_visible()
+    expect(page.legend).not_to_contain_text("not computed yet", timeout=240_000)
+    expect(page.text("Ready.")).to_be_visible()
+    page.tab("Grasp")
+    expect(page.text("of 100 poses (")).to_be_visible()
+    shoot(page, "probability")
+    before = page.picture()
+    page.slide("Rotation (°)", 30)
+    page.wait_for_picture(lambda picture: np.array_equal(picture, np.roll(before, -4 * 30, axis=1)))
+    assert page.complaints == []
+
+
 def test_the_candidates_of_a_cell(open_page, bottle_map):
     page = open_page()
     parked = page.settled_view()

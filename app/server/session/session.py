@@ -29,7 +29,7 @@ from ...state.first_grasp import with_first_grasp
 from ...state.page_link import Camera
 from ...state.plans.plan_changes import change_plan_results
 from ...state.plans.plan_results import PlanResults
-from ...state.requests import CompareRequest, ExplainRequest, MapRequest, Request
+from ...state.requests import CompareRequest, ExplainRequest, MapRequest, ProbabilityRequest, Request
 from ...state.resumed import resumed
 from ...state.state import State
 from ...state.surveys import survey_changes
@@ -251,6 +251,9 @@ class Session:
             assert state.result  # a comparison is requested only while its map is shown
             label, shown = f"Recomputing the map of {request.map.task}", state.result.map
             run = lambda progress: process.compare(request, shown, progress)  # noqa: E731
+        elif isinstance(request, ProbabilityRequest):
+            label = "Computing how probable grasps are"
+            run = lambda progress: process.probability(request, progress)  # noqa: E731
         else:
             assert isinstance(request, ExplainRequest)
             label = "Trying every way to hold it here"

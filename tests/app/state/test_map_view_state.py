@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from PIL import Image
 from trimesh import transform_points
 
-from app.compute.map_service import MapService
+from app.compute.map_service import DRAWS, MapService
 from app.html.candidates import candidate_html, candidate_text, candidates_html, reason_grid
 from app.html.readout import comparison_html, grasp_html
 from app.render.cell_colors import cell_colors
@@ -25,15 +25,24 @@ from app.render.map_picture import map_picture, picture_name
 from app.render.prints import shown_prints
 from app.scene3d.ghost import body_mesh, ghost
 from app.state import changes, job_changes
-from app.state.map_view_state import RollChoice
-from app.state.requests import CompareRequest, Comparison, ExplainRequest, ExplainResult
+from app.state.map_view_state import NOISE, RollChoice
+from app.state.requests import (
+    CompareRequest,
+    Comparison,
+    ExplainRequest,
+    ExplainResult,
+    Probability,
+    ProbabilityRequest,
+)
 from app.state.state import State
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.feasibility.create import MapMaker
 from symgrasp.poses import rotation_z
 from symgrasp.reason import Reason
-from symgrasp.world import BodyName, BulletWorld, Collision
+from symgrasp.survey.success import success_map
+from symgrasp.world import BodyName, BulletWorld, Collision, open_world
 from tests.app.state.states import opened
 from tests.conftest import load_small
 from tests.world.link_pose import link_pose
@@ -337,3 +346,61 @@ def test_names_in_candidates_are_escaped(service):
     hostile = with_view(hit, explained=replace(hit.map_view.explained, explanation=explanation))
     assert "<img src=x>" not in candidate_html(hostile)
     assert "&lt;img src=x&gt;" in candidate_html(hostile)
+
+
+# -- how probable grasps are -----------------------------------------------------------------
+
+
+def probable(state: State, share: float) -> Probability:
+    """The answer that a cell is feasible at a share of ten draws, counted from the first column."""
+    feasible = np.full(state.result.map.reason.shape, round(10 * share))
+    feasible[:, :, 0] = 10
+    return Probability(ProbabilityRequest(state.request, state.map_view.noise), feasible, 10)
+
+
+def test_probabilities_are_asked_for_where_they_are_shown_and_shift_with_the_map():
+    state = opened()
+    assert state.next_request is None
+    state = with_view(state, color_by=ColorBy.PROBABILITY)
+    request = ProbabilityRequest(state.request, state.map_view.noise)
+    assert state.next_request == request
+    assert np.isnan(state.map.values(ColorBy.PROBABILITY)).all()
+    busy = job_changes.started(state, 1, "", request)
+    assert changes.moved(busy, x=0.5).next_request == changes.moved(busy, x=0.5).request  # a map goes first
+    found = job_changes.result_arrived(busy, 1, probable(state, 0.3))
+    assert found.next_request is None
+    step = 2 * np.pi / found.map.manifold.angles
+    turned = changes.turn(found, 3 * step)
+    assert turned.next_request is None  # it is the same on the object
+    values = turned.map.values(ColorBy.PROBABILITY)
+    assert np.array_equal(np.argwhere(values[0] == 100)[:, 1], np.full(len(values[0]), values.shape[2] - 3))
+    assert values.min() == pytest.approx(30)
+    assert with_view(found, color_by=ColorBy.REASON).map.probability is None
+    less = with_view(found, noise=replace(found.map_view.noise, position=0.001))
+    assert less.next_request == ProbabilityRequest(state.request, less.map_view.noise)
+    assert less.map.probability is None
+    assert with_view(less, noise=found.map_view.noise).next_request is None
+
+
+def test_the_draws_of_a_picked_grasp_are_read_out():
+    state = with_view(opened(), color_by=ColorBy.PROBABILITY)
+    state = job_changes.result_arrived(
+        job_changes.started(state, 1, "", state.next_request), 1, probable(state, 0.3)
+    )
+    row, column = cell_with(state, Reason.FEASIBLE)
+    text = grasp_html(changes.choose_cell(state, row, column))
+    count = 10 if column == 0 else 3
+    assert f"feasible at {count} of 10 poses (" in text
+    assert "7 to 65 % at 95 % confidence" in text or column == 0
+
+
+def test_probabilities_are_those_of_the_library(service):
+    state = with_view(opened(), color_by=ColorBy.PROBABILITY)
+    shares: list[float] = []
+    found = service.probability(state.next_request, shares.append)
+    assert found.draws == DRAWS
+    assert shares == sorted(shares)
+    with open_world(state.scene) as world:
+        own = success_map(MapMaker(world), state.arm, state.request.moved_task(), NOISE, DRAWS)
+    assert np.array_equal(found.feasible / found.draws, own.probability)
+    assert 0 < (found.feasible > 0).sum() != (found.feasible == DRAWS).sum() > 0
