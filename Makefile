@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench surveys motions robots opening grids cells
+.PHONY: app test figures schemas bench surveys motions robots opening previews grids cells
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -52,6 +52,9 @@ robots: $(VENV)/dev.stamp  ## measure every robot of the catalogue, and write th
 
 opening: $(VENV)/dev.stamp  ## print how long the page takes to open, and to show robots (ARGS="pr2 talos": these)
 	$(BIN)/python -m docs.opening $(ARGS)
+
+previews: $(VENV)/dev.stamp  ## print how long the page takes to preview the grasp that is pointed at, in Chromium
+	$(BIN)/python -m docs.previews
 
 grids: $(VENV)/dev.stamp  ## measure coarse and fine grids of every shipped scene, and write docs/grids.md (minutes)
 	$(BIN)/python -m docs.grids

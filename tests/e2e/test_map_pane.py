@@ -183,6 +183,30 @@ def test_a_long_object_lies_in_a_wide_pane_and_all_works_by_touch(browser: Brows
         context.close()
 
 
+def test_two_fingers_zoom(browser: Browser, start_server, bottle_map):
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, has_touch=True)
+    try:
+        page = GraspPage(context.new_page(), start_server("bottle_on_table"))
+        page.expect_title("bottle_on_table")
+        feasible = np.argwhere(RollChoice.EITHER.reason(bottle_map) == Reason.FEASIBLE)
+        row, column = min(feasible.tolist(), key=lambda cell: abs(cell[1] - bottle_map.manifold.angles / 2))
+        x, y = at(page, bottle_map, row, column)
+        touch = context.new_cdp_session(page.page)
+        for kind, apart in (("touchStart", 8), ("touchMove", 30), ("touchMove", 90), ("touchEnd", 0)):
+            fingers = [{"x": x + side * apart, "y": y, "id": k} for k, side in enumerate((-1, 1))]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers if apart else []})
+        page.next_frame()
+        expect(page.text("No grasp picked")).to_be_visible()  # fingers that zoom do nothing else
+        expect(page.slider_box("Rotation (°)")).to_have_value("0")
+        page.page.touchscreen.tap(x + 14, y)  # in another column before
+        grid = bottle_map.manifold
+        picked = f"h = {round(100 * grid.h[row], 2):g} cm, θ = {round(np.rad2deg(grid.theta[column]), 2):g}°"
+        expect(page.text(picked)).to_be_visible()
+        assert page.complaints == []
+    finally:
+        context.close()
+
+
 def test_the_splitter_is_remembered(open_page):
     page = open_page()
     bar, before = page.page.get_by_role("separator").bounding_box(), page.map.bounding_box()

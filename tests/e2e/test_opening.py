@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 from playwright.sync_api import expect
 
 from app.server.session.tour import STORY
 from docs.opening import VISITS, opened, visits
+from docs.previews import previews
 
 
 def test_a_robot_is_shown_when_it_is_measured(browser, tmp_path):
@@ -30,3 +33,9 @@ def test_visits_are_measured_from_words_to_map(browser):
     times = list(visits(browser))
     assert len(times) == VISITS
     assert all(0 < visit.words < visit.map for visit in times)
+
+
+def test_previews_are_measured_until_they_are_drawn(browser):
+    times = list(islice(previews(browser), 3))
+    assert len(times) == 3
+    assert all(seconds > 0 for seconds in times)

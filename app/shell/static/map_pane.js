@@ -197,7 +197,10 @@ export class MapPane {
     this.drag = null;
     const apart = (at) => Math.hypot(at[0] - other[0], at[1] - other[1]);
     this.pointers.set(id, now);
-    this.frame.zoom(apart(now) / Math.max(1, apart(before)), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
+    const between = (at) => [(at[0] + other[0]) / 2, (at[1] + other[1]) / 2];
+    this.frame.zoom(apart(now) / Math.max(1, apart(before)), ...between(before));
+    const [u0, v0] = this.frame.toMap(...between(before)), [u1, v1] = this.frame.toMap(...between(now));
+    this.frame.pan(u0 - u1, v0 - v1); // what is between the fingers goes with them
     this.redraw();
   }
 
