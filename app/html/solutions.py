@@ -43,7 +43,7 @@ def solutions_html(state: State, target: Callable[[str], str]) -> str:
         cells = "".join(f'<span role="cell">{escape(text)}</span>' for text in texts)
         now = ' class="sg-now" aria-selected="true"' if k == results.index else ""
         rows.append(f'<label for="{target(str(k))}" role="row"{now}>{cells}</label>')
-    style = f"--columns: 2.2em repeat({len(columns)}, auto)"
+    style = f"--columns: repeat({len(columns) + 1}, auto)"
     return (
         f'<div class="sg-solutions" role="table" aria-label="solutions" style="{style}">{"".join(rows)}</div>'
     )

@@ -7,11 +7,15 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 import yaml
 from playwright.sync_api import Locator, expect
 
+from app.files.scene_files import scene_yaml
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
+from symgrasp.planners.planning import plan_sequential
+from symgrasp.scene.scene import Scene
 from tests.e2e.page import GraspPage
 
 SCREENSHOTS = Path(__file__).parent / "screenshots"
@@ -115,6 +119,26 @@ def test_a_sequence_is_planned_played_changed_and_explained(open_page):
     assert page.complaints == []
 
 
+CUT = """list => [...list.querySelectorAll("[role=cell], [role=columnheader]")].filter(cell => {
+  const [inner, outer] = [cell, list].map(element => element.getBoundingClientRect());
+  return inner.left < outer.left - 1 || inner.right > outer.left + list.clientWidth + 1
+    || cell.scrollWidth > cell.clientWidth + 1;
+}).map(cell => cell.textContent)"""
+"""Texts of the list of solutions that are cut at its sides."""
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=str)
+def test_no_column_of_the_solutions_is_cut(open_page, size):
+    page = open_page("log_four_robots", size=size)
+    page.tab("Hands")
+    page.button("All arms together").click()
+    solutions = shown(page, ".sg-solutions")
+    expect(solutions.locator("label[role=row]")).to_have_count(10)
+    assert solutions.evaluate(CUT) == []
+    shoot(page, f"solutions_{size[0]}")
+    assert page.complaints == []
+
+
 def test_hands_climb_are_compared_and_hand_over(open_page):
     page = open_page(scene="log_two_robots")
     page.tab("Hands")
@@ -185,6 +209,26 @@ def test_a_plan_goes_out_in_every_format_and_comes_back_verified(open_page, tmp_
     assert Plan.load(download(other, "JSON", tmp_path)) == plan
     assert other.frame.evaluate("window.hacked") is None
     assert page.complaints == other.complaints == []
+
+
+def test_plans_and_scenes_are_opened_as_what_they_are_through_either_button(open_page, tmp_path):
+    page = open_page(scene="soda_can")
+    plan = plan_sequential(Scene.load("pick_pour_place"))
+    plan.save(tmp_path / "plan.json")
+    page.tab("Files")
+    with page.page.expect_file_chooser() as chooser:
+        page.button("Open a scene (YAML or ZIP)").click()
+    chooser.value.set_files(tmp_path / "plan.json")
+    expect(chosen(page, "Scene")).to_have_value("plan.json (upload)")
+    page.tab("Sequence")
+    expect(page.text("One grasp for 3 tasks: h = ")).to_be_visible()
+    expect(page.text("plan.json holds: ")).to_be_visible()
+    (tmp_path / "scene.yaml").write_text(scene_yaml(Scene.load("soda_can")))
+    open_plan(page, tmp_path / "scene.yaml")
+    expect(chosen(page, "Scene")).to_have_value("scene.yaml (upload)")
+    page.expect_title("soda_can")
+    expect(page.alerts).to_have_count(0)
+    assert page.complaints == []
 
 
 def test_a_motion_is_found_scrubbed_played_and_downloaded(open_page, tmp_path):
