@@ -164,3 +164,30 @@ def test_both_rolls_are_shown_side_by_side_on_demand(open_page):
     page.tab("Grasp")
     expect(page.text(re.compile("roll 180°"))).not_to_have_count(0)
     assert page.complaints == []
+
+
+def test_labels_of_hands_cover_no_other_label_and_no_mark(open_page):
+    page = open_page()
+    width, height, long = 360.0, 90.0, 62.0
+    rng = np.random.default_rng(0)
+    rooms = rng.uniform([0, 0], [width, height], (40, 4, 2))
+    rooms[:10] = rooms[:10, :1] + rng.normal(0, 4, (10, 4, 2))  # hands near each other
+    rooms = np.clip(rooms, 0, [width, height])
+    cases = [[{"x": x, "y": y, "wide": long} for x, y in marks] for marks in rooms.tolist()]
+    placed = page.page.evaluate(
+        """async ([cases, room]) => {
+          const { placeLabels } = await import("/shell/drawing.js");
+          return cases.map((marks) => placeLabels(marks, room).map(({ x, y }) => [x, y]));
+        }""",
+        [cases, {"x": 0, "y": 0, "width": width, "height": height}],
+    )
+    for marks, labels in zip(rooms, np.array(placed), strict=True):
+        low, high = labels - np.array([3, 8]), labels + np.array([long + 3, 8])
+        assert (low >= 0).all()
+        assert (high <= [width, height]).all()
+        for k in range(4):
+            others = [j for j in range(4) if j != k]
+            for a, b in [(low[others], high[others]), (marks[others] - 6, marks[others] + 6)]:
+                assert not ((low[k] < b) & (a < high[k])).all(axis=1).any()
+        beside = np.abs(labels[:, 1] - marks[:, 1]) < 1
+        assert beside.any()

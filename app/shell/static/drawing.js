@@ -5,6 +5,7 @@ import { patterned, tile } from "./patterns.js";
 const FONT = "11px system-ui, sans-serif";
 const ROOM = { left: 46, bottom: 38, top: 10, right: 12, profile: 64 };
 const STRIP = { ...ROOM, bottom: 17, top: 4 }; // of several maps below each other
+const RING = 6; // radius (px) of a mark
 const NAMED = 64; // height (px) from which on an upward axis has its name
 const GREY = [236, 238, 241], UNVISITED = "#f7f8fa";
 
@@ -76,7 +77,7 @@ export function draw(pane) {
   }
   if (pane.prints) drawCells(context, pane, pane.shade, 0);
   if (pane.hovered) outline(context, pane, pane.hovered);
-  for (const mark of look.marks) drawMark(context, pane, mark);
+  drawMarks(context, pane);
   context.restore();
   context.strokeStyle = style.line;
   context.lineWidth = 1;
@@ -137,27 +138,61 @@ function outline(context, pane, cell) {
   }
 }
 
-function drawMark(context, { frame, cells, style }, [h, theta, label]) {
-  const [x, y] = frame.toScreen((theta + Math.PI) / TURN, (h - cells.low) / (cells.high - cells.low));
-  for (const [color, wide] of [[style.halo, 5.5], [style.mark, 2.5]]) {
-    context.strokeStyle = color;
-    context.lineWidth = wide;
-    context.beginPath();
-    context.arc(x, y, 6, 0, TURN);
-    context.stroke();
-  }
-  if (!label) return;
+function drawMarks(context, { frame, cells, style, look }) {
   context.font = FONT;
-  const wide = context.measureText(label).width, right = x + 12 + wide < frame.x + frame.width;
-  const at = right ? x + 11 : x - 11 - wide;
-  context.fillStyle = style.back;
-  context.globalAlpha = 0.85;
-  context.fillRect(at - 3, y - 8, wide + 6, 16);
-  context.globalAlpha = 1;
-  context.fillStyle = style.ink;
+  const marks = look.marks.map(([h, theta, label]) => {
+    const [x, y] = frame.toScreen((theta + Math.PI) / TURN, (h - cells.low) / (cells.high - cells.low));
+    return { x, y, label, wide: label ? context.measureText(label).width : 0 };
+  });
+  for (const { x, y } of marks) {
+    for (const [color, wide] of [[style.halo, 5.5], [style.mark, 2.5]]) {
+      context.strokeStyle = color;
+      context.lineWidth = wide;
+      context.beginPath();
+      context.arc(x, y, RING, 0, TURN);
+      context.stroke();
+    }
+  }
   context.textAlign = "left";
   context.textBaseline = "middle";
-  context.fillText(label, at, y);
+  placeLabels(marks, frame).forEach(({ x, y }, k) => {
+    const { label, wide } = marks[k];
+    if (!label) return;
+    context.fillStyle = style.back;
+    context.globalAlpha = 0.85;
+    context.fillRect(x - 3, y - 8, wide + 6, 16);
+    context.globalAlpha = 1;
+    context.fillStyle = style.ink;
+    context.fillText(label, x, y);
+  });
+}
+
+/** Return where the labels of marks are written: beside them, or above or below that, and over no other label or
+ * mark as long as there is room.
+ * @param {{x: number, y: number, wide: number}[]} marks in pixels, with the width of the label, 0 for none
+ * @param {{x: number, y: number, width: number, height: number}} room that the labels stay in
+ */
+export function placeLabels(marks, room) {
+  const taken = marks.map(({ x, y }) => [x - RING - 2, y - RING - 2, x + RING + 2, y + RING + 2]);
+  const box = ({ x, y }, wide) => [x - 3, y - 8, x + wide + 3, y + 8];
+  const meets = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+  return marks.map(({ x, y, wide }, own) => {
+    if (!wide) return { x, y };
+    const right = { x: x + 11, y }, left = { x: x - 11 - wide, y };
+    const sides = right.x + wide + 3 <= room.x + room.width ? [right, left] : [left, right];
+    const places = [...sides];
+    for (let off = 2; off < room.height; off += 2) {
+      for (const up of [-off, off]) places.push(...sides.map((side) => ({ x: side.x, y: y + up })));
+    }
+    const inside = places.filter((place) => {
+      const [low, top, high, bottom] = box(place, wide);
+      return low >= room.x && high <= room.x + room.width && top >= room.y && bottom <= room.y + room.height;
+    });
+    const free = inside.find((place) => !taken.some((other, k) => k !== own && meets(box(place, wide), other)));
+    const chosen = free ?? sides[0];
+    taken.push(box(chosen, wide));
+    return chosen;
+  });
 }
 
 // -- axes -----------------------------------------------------------------------------------------
