@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
-from itertools import combinations, islice
+from itertools import chain, combinations, islice
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from symgrasp.planners.planning import (
     handover_plans,
     plan_bimanual,
     plan_sequential,
+    regrasp_plans,
     sequential_plans,
 )
 from symgrasp.progress import Progress, part_of, rising
@@ -137,11 +139,13 @@ class MotionRequest:
         scene: the scene as loaded.
         poses: task → base pose, of the tasks that were moved.
         plans: the plans, best first.
+        more: whether the further plans of the last planner follow on these.
     """
 
     scene: Scene
     poses: Mapping[str, ObjectPose]
     plans: tuple[Plan, ...]
+    more: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,11 +156,13 @@ class MotionOutcome:
         index: which of the plans that were asked for it is.
         plan: the plan with its motion.
         failures: why those before it have none.
+        listed: further plans of the last planner, up to that one.
     """
 
     index: int
     plan: Plan
     failures: tuple[str, ...]
+    listed: tuple[PlanResult, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,11 +200,13 @@ class PlanService:
         self._maps, self._folders = maps, folders
         self._plans: Plans | None = None
         self._scene: Scene | None = None
+        self._ahead: deque[Plan] = deque()  # plans that were tried, but are not listed yet
         self._listed = 0
         self._progress: Progress | None = None
 
     def close(self) -> None:
         """End the planner, which holds a physics world."""
+        self._ahead.clear()
         if self._plans:
             self._plans.close()
             self._plans = None
@@ -221,8 +229,8 @@ class PlanService:
         try:
             if request.method == "hill_climb":
                 return _climb(request, scene, maps, progress)
-            if request.method in ("first", "regrasp"):
-                plan = plan_sequential(scene, request.name, maps, request.method, progress)
+            if request.method == "first":
+                plan = plan_sequential(scene, request.name, maps, "first", progress)
                 return PlanOutcome(request.kind, (plan_result(plan, scene),))
             self._progress, self._scene = progress, scene
             self._plans, self._listed = self._start_planner(request, scene, maps), 0
@@ -245,12 +253,17 @@ class PlanService:
         Raises:
             NoPlanError: none has one; says why.
         """
+        self._progress = progress
         failures: list[Failure] = []
         scene = with_poses(request.scene, request.poses)
-        with closing(moving_plans(scene, request.plans, failures, progress=progress)) as found:
+        plans = chain(request.plans, self._not_listed() if request.more else ())
+        with closing(moving_plans(scene, plans, failures, progress=progress)) as found:
             for plan, motion in found:
-                reasons = tuple(failure.reason for failure in failures)
-                return MotionOutcome(len(failures), with_motion(plan, motion), reasons)
+                index, reasons = len(failures), tuple(failure.reason for failure in failures)
+                count = max(index + 1 - len(request.plans), 0)
+                listed = tuple(plan_result(self._ahead.popleft(), scene) for _ in range(count))
+                self._listed += count
+                return MotionOutcome(index, with_motion(plan, motion), reasons, listed)
         raise NoPlanError("no motion: " + "; ".join(failures_in_words(failures)))
 
     def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
@@ -279,18 +292,28 @@ class PlanService:
             if not self._listed:
                 self._progress(SEARCH * share)
 
+        if request.method == "regrasp":
+            return regrasp_plans(scene, request.name, maps, report_progress)
         if request.kind == "sequential":
             return sequential_plans(scene, request.name, maps, report_progress)
         if request.kind == "bimanual":
             return bimanual_plans(scene, request.name, maps, report_progress)
         return handover_plans(scene, maps, report_progress)
 
+    def _not_listed(self) -> Iterator[Plan]:
+        """Yield the plans that follow on those that are listed; they stay to be listed later."""
+        yield from tuple(self._ahead)
+        for plan in self._plans or ():
+            self._ahead.append(plan)
+            yield plan
+
     def _next_plans(self) -> tuple[tuple[PlanResult, ...], bool]:
         if self._plans is None or self._scene is None:
             return (), False
         assert self._progress
         plans: list[PlanResult] = []
-        for plan in islice(self._plans, PLANS_PER_BATCH):
+        for plan in islice(self._not_listed(), PLANS_PER_BATCH):
+            self._ahead.popleft()
             plans.append(plan_result(plan, self._scene))
             self._listed += 1
             self._progress(SEARCH + (1 - SEARCH) * len(plans) / PLANS_PER_BATCH)

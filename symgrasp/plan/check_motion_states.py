@@ -12,7 +12,7 @@ from symgrasp.plan.motion_record import SegmentRecord
 from symgrasp.poses import Array, inverse, pose_error
 from symgrasp.scene.balance import load_of_hand, support_margin
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BodyName, BulletWorld, Collision
+from symgrasp.world import BodyName, BulletWorld, Collision, near_links
 
 __all__ = ["RIGID", "SegmentStates", "check_free", "tool_pose"]
 
@@ -214,14 +214,12 @@ def _check_balance(
         if robot.support is None:
             continue
         own = [arm for arm in holders if scene.arms[arm].robot is robot]
-        margins = []
-        for k, pose in enumerate(poses):
-            loads = [
-                load_of_hand(scene, scene.arms[arm], holders, pose, (inverse(pose) @ hands[arm][k])[2, 3])
-                for arm in own
-            ]
-            alone = len(own) == len(holders)  # then it carries the whole object, once
-            margins.append(support_margin(robot, values[name][k], loads[:1] if alone else loads))
+        loads = [
+            load_of_hand(scene, scene.arms[arm], holders, poses, (inverse(poses) @ hands[arm])[:, 2, 3])
+            for arm in own
+        ]
+        alone = len(own) == len(holders)  # then it carries the whole object, once
+        margins = support_margin(robot, values[name], loads[:1] if alone else loads)
         k = int(np.argmin(margins))
         text = f"{where}: state {k}: {name} falls, its centre of mass is {-1e3 * margins[k]:.3f} mm outside"
         ok &= expect(margins[k] >= -BALANCE_TOLERANCE, text)
@@ -271,6 +269,10 @@ class _NearBodies:
             world.set_object(pose)
             self._resting |= {c.b for c in world.object_contacts(TOUCHING)}
 
+        pairs = [(a, b) for a, b in world.link_pairs() if self._group[a] != self._group[b]]
+        self._reach = self._clearance + world.margin
+        self._links = near_links(world, values, pairs, self._reach)
+
     def too_close(self, k: int) -> Iterator[tuple[Collision, float]]:
         """Yield the pairs that are closer than they may be in state k, with their distance (m).
 
@@ -278,8 +280,8 @@ class _NearBodies:
         """
         world = self._world
         touching = [*self._holding, *(arm for arm, on in self._taking.items() if on[k])]
-        reach = self._clearance + world.margin
-        for c in world.all_pairs_within(reach, touching):
+        reach = self._reach
+        for c in world.all_pairs_within(reach, self._links[k], touching):
             gap = reach - c.depth - world.margin_for(c.reason)
             moved = self._group.get(c.a) != self._group.get(c.b)
             if moved and gap < self._clearance - self._tolerance:

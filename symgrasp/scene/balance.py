@@ -25,7 +25,7 @@ class Load(NamedTuple):
 
     Attributes:
         mass: in kg.
-        point: (3,) where it acts, in the world.
+        point: (..., 3) where it acts, in the world.
     """
 
     mass: float
@@ -33,7 +33,7 @@ class Load(NamedTuple):
 
 
 def load_of_hand(
-    scene: Scene, arm: Arm, holders: Sequence[str], T_world_object: Array, height: float
+    scene: Scene, arm: Arm, holders: Sequence[str], T_world_object: Array, height: float | Array
 ) -> Load:
     """Return the load of an arm's robot that one hand accounts for.
 
@@ -41,8 +41,8 @@ def load_of_hand(
         scene: the scene.
         arm: the arm whose hand it is.
         holders: names of all arms that hold the object; the arm alone if it is not among them.
-        T_world_object: pose (4, 4) of the object.
-        height: of the grasp on the object (m).
+        T_world_object: poses (..., 4, 4) of the object.
+        height: (...,) of the grasp on the object (m).
     """
     names = holders if arm.name in holders else (arm.name,)
     own = [name for name in names if scene.arm(name).robot.name == arm.robot.name]
@@ -50,7 +50,8 @@ def load_of_hand(
         height, share = scene.profile.centre_of_mass, 1.0
     else:
         share = 1.0 / len(names)
-    return Load(scene.object_mass * share, (T_world_object @ [0.0, 0.0, height, 1.0])[:3])
+    along = np.asarray(height)[..., None] * T_world_object[..., :3, 2]
+    return Load(scene.object_mass * share, T_world_object[..., :3, 3] + along)
 
 
 def support_margins(
@@ -82,25 +83,27 @@ def support_margins(
             loads.append(load_of_hand(scene, arm, holders, T_world_object, float(height)))
         if len(own) == len(held):
             loads = loads[:1]  # the whole object, once
-        margins[name] = support_margin(robot, values, loads)
+        margins[name] = float(support_margin(robot, values, loads))
     return margins
 
 
-def support_margin(robot: Robot, values: Array, loads: Sequence[Load]) -> float:
-    """Return how far (m) the centre of mass is inside the edges of a robot's support; negative outside.
+def support_margin(robot: Robot, values: Array, loads: Sequence[Load]) -> Array:
+    """Return how far (...,) (m) the centre of mass is inside the edges of a robot's support.
+
+    It is negative outside.
 
     Args:
         robot: a robot with a support.
-        values: (N,) values of all its joints.
+        values: (..., N) values of all its joints.
         loads: what it carries.
     """
     mass, centre = robot.model.masses()
     links = robot.T_world_base @ robot.model.forward(values)
-    points = np.einsum("lij,lj->li", links[:, :3, :3], centre) + links[:, :3, 3]
+    points = np.einsum("...lij,lj->...li", links[..., :3, :3], centre) + links[..., :3, 3]
     total = mass.sum() + sum(load.mass for load in loads)
     middle = (mass @ points + sum(load.mass * load.point for load in loads)) / total
     edges = support_edges(robot)
-    return float((edges[:, 2] - edges[:, :2] @ middle[:2]).min())
+    return (edges[:, 2] - middle[..., :2] @ edges[:, :2].T).min(axis=-1)
 
 
 def support_edges(robot: Robot) -> Array:

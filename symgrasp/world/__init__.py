@@ -9,6 +9,7 @@ from symgrasp.world.bullet import BulletWorld
 from symgrasp.world.collision import BodyName, Collision, NearBodies
 from symgrasp.world.hand_pairs import own_pairs
 from symgrasp.world.home import check_homes, with_free_homes
+from symgrasp.world.near_links import near_links
 from symgrasp.world.opening import open_world
 from symgrasp.world.placing import placed, stands_free
 from symgrasp.world.self_pairs import checked_self_pairs
@@ -17,6 +18,6 @@ from symgrasp.world.tasks import RESTING_DEPTH, check_tasks, object_contact, pre
 
 __all__ = [
     "RESTING_DEPTH", "BodyName", "BulletWorld", "Collision", "NearBodies", "Shape", "check_homes",
-    "check_tasks", "checked_self_pairs", "object_contact", "open_world", "own_pairs", "placed", "prepared",
-    "stands_free", "with_free_homes",
+    "check_tasks", "checked_self_pairs", "near_links", "object_contact", "open_world", "own_pairs", "placed",
+    "prepared", "stands_free", "with_free_homes",
 ]  # fmt: skip

@@ -19,7 +19,8 @@ from symgrasp.scene.scene import Scene
 from symgrasp.world.bodies import SceneBodies
 from symgrasp.world.client import pybullet, xyzw
 from symgrasp.world.collision import BodyName, Collision, NearBodies
-from symgrasp.world.queries import Query, arm_queries, body_query, parked_queries
+from symgrasp.world.hand_pairs import own_pairs
+from symgrasp.world.queries import Query, arm_queries, body_query, outer_queries, parked_queries
 from symgrasp.world.shapes import Shape, link_shapes
 
 __all__ = ["BulletWorld"]
@@ -68,6 +69,7 @@ class BulletWorld:
             self._values: dict[str, Array] = {}  # joint values of each robot, as set last
             self._queries = {arm.name: arm_queries(self.bodies, scene, arm) for arm in scene.arms.values()}
             self._parked_queries = {name: parked_queries(self.bodies, name) for name in scene.robots}
+            self._outer_queries = outer_queries(self.bodies, scene)
             self.set_object(scene.task().T_world_object)
             for name in scene.robots:
                 self.park(name)
@@ -349,23 +351,32 @@ class BulletWorld:
         """
         return self.margin if reason in MARGIN_REASONS else 0.0
 
-    def all_pairs_within(self, distance: float, touching: Sequence[Arm] = ()) -> list[Collision]:
-        """Return the pairs of bodies, of all robots, that are closer than a distance.
+    def link_pairs(self) -> Iterator[tuple[BodyName, BodyName]]:
+        """Yield the pairs of links, of one robot or of two, that must not collide."""
+        for name, other in itertools.combinations_with_replacement(self.bodies.robots, 2):
+            links = (self.bodies.link_indices(robot) for robot in (name, other))
+            pairs = own_pairs(self.scene, name) if name == other else itertools.product(*links)
+            for a, b in pairs:
+                yield BodyName(name, a), BodyName(other, b)
+
+    def all_pairs_within(
+        self, distance: float, links: Iterable[tuple[BodyName, BodyName]], touching: Sequence[Arm] = ()
+    ) -> list[Collision]:
+        """Return the pairs of bodies that are closer than a distance: robots to all else, and some links.
 
         Args:
             distance: the distance (m); the depths of the result are relative to it.
+            links: those of `link_pairs` that are measured; `near_links` finds which can be so close.
             touching: the arms whose touch links may touch the object.
         """
         touch = _touch_links(touching)
-        found, done = [], set[int]()
-        for name, body in self.bodies.robots.items():
-            arm = next(arm for arm in self.scene.arms.values() if arm.robot.name == name)
-            alone = (Reason.SELF_COLLISION, Reason.SCENE_COLLISION)
-            queries = [q for q in self._queries[arm.name] if q.reason in alone]
-            queries += [q for q in self._parked_queries[name] if q.b not in done]
-            found += [c for q in queries for c in self._collisions(q, distance) if not _touches(c, touch)]
-            done.add(body)
-        return found
+        queries = [*self._outer_queries, *(self._link_query(a, b) for a, b in links)]
+        return [c for q in queries for c in self._collisions(q, distance) if not _touches(c, touch)]
+
+    def _link_query(self, a: BodyName, b: BodyName) -> Query:
+        own, other = (self.bodies.link_indices(name.body)[name.link] for name in (a, b))
+        reason = Reason.SELF_COLLISION if a.body == b.body else Reason.ROBOT_COLLISION
+        return Query(reason, b.body, self.bodies.robots[a.body], self.bodies.robots[b.body], own, other)
 
     def _collisions(self, query: Query, margin: float | None = None) -> list[Collision]:
         """Return the pairs of a query that are closer than a margin (m), by default that of its reason."""

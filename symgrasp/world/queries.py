@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from symgrasp.reason import Reason
-from symgrasp.robot.robot import Arm
+from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.scene import Scene
 from symgrasp.world.bodies import SceneBodies
 from symgrasp.world.hand_pairs import own_pairs
 
-__all__ = ["Query", "arm_queries", "body_query", "parked_queries"]
+__all__ = ["Query", "arm_queries", "body_query", "outer_queries", "parked_queries"]
 
 
 class Query(NamedTuple):
@@ -51,7 +51,6 @@ def arm_queries(bodies: SceneBodies, scene: Scene, arm: Arm) -> list[Query]:
     robot = arm.robot
     body = bodies.robots[robot.name]
     index = bodies.link_indices(robot.name)
-    mount = frozenset(index[link] for link in robot.model.mount_links() if link in index)
     touch = frozenset(index[link] for link in arm.hand.touch_links if link in index)
     queries = [
         Query(Reason.SELF_COLLISION, frozenset((a, b)), body, body, index[a], index[b])
@@ -60,11 +59,17 @@ def arm_queries(bodies: SceneBodies, scene: Scene, arm: Arm) -> list[Query]:
     queries += [
         body_query(bodies, Reason.OBJECT_COLLISION, body, piece, skip_a=touch) for piece in bodies.object
     ]
-    queries += [
-        body_query(bodies, Reason.SCENE_COLLISION, body, obstacle, skip_a=mount)
-        for obstacle in bodies.obstacles
+    return queries + _with_obstacles(bodies, robot) + _other_robots(bodies, body)
+
+
+def outer_queries(bodies: SceneBodies, scene: Scene) -> list[Query]:
+    """Return what is checked between robots and all else but robots: the object, and the obstacles."""
+    queries = [
+        body_query(bodies, Reason.OBJECT_COLLISION, body, piece)
+        for body in bodies.robots.values()
+        for piece in bodies.object
     ]
-    return queries + _other_robots(bodies, body)
+    return queries + [q for robot in scene.robots.values() for q in _with_obstacles(bodies, robot)]
 
 
 def parked_queries(bodies: SceneBodies, robot: str) -> list[Query]:
@@ -72,6 +77,15 @@ def parked_queries(bodies: SceneBodies, robot: str) -> list[Query]:
     body = bodies.robots[robot]
     queries = [body_query(bodies, Reason.OBJECT_COLLISION, body, piece) for piece in bodies.object]
     return queries + _other_robots(bodies, body)
+
+
+def _with_obstacles(bodies: SceneBodies, robot: Robot) -> list[Query]:
+    body, index = bodies.robots[robot.name], bodies.link_indices(robot.name)
+    mount = frozenset(index[link] for link in robot.model.mount_links() if link in index)
+    return [
+        body_query(bodies, Reason.SCENE_COLLISION, body, obstacle, skip_a=mount)
+        for obstacle in bodies.obstacles
+    ]
 
 
 def _other_robots(bodies: SceneBodies, body: int) -> list[Query]:

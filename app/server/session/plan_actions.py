@@ -68,17 +68,22 @@ class PlanActions:
         )
 
     def find_motion(self) -> None:
-        """Find the motion of the plan that is shown, or of the first one after it that has one."""
+        """Find the motion of the plan that is shown, or of the first one after it that has one.
+
+        Where none of the list has one, further plans are tried, and listed up to that with a motion.
+        """
         state = self._session.state
         if state is None or state.plan is None:
             return
         first = state.plan_results.index
         plans = tuple(result.plan for result in state.plan_results.plans[first:])
-        request = MotionRequest(state.scene, state.poses, plans)
+        request = MotionRequest(state.scene, state.poses, plans, state.plan_results.more)
         self._session.submit(
             "Planning the motion",
             lambda progress: self._process.motion(request, progress),
-            lambda state, found: motion_found(state, first + found.index, found.plan, found.failures),
+            lambda state, found: motion_found(
+                state, first + found.index, found.plan, found.failures, found.listed
+            ),
         )
 
     def open_file(self, name: str, content: bytes, expected: FileKind = "plan") -> None:

@@ -138,8 +138,25 @@ def as_planned(state: State) -> State:
     return show_step(after, after.plan_results.nearest)
 
 
-def motion_found(state: State, index: int, plan: Plan, motionless: tuple[str, ...] = ()) -> State:
-    """Show a plan of the list with the motion that was found for it; see `PlanResults.with_motion`."""
+def motion_found(
+    state: State,
+    index: int,
+    plan: Plan,
+    motionless: tuple[str, ...] = (),
+    listed: tuple[PlanResult, ...] = (),
+) -> State:
+    """Show a plan of the list with the motion that was found for it; see `PlanResults.with_motion`.
+
+    Args:
+        state: the state.
+        index: of the plan in the list, with further plans at its end.
+        plan: the plan with its motion.
+        motionless: why plans that were tried before have none.
+        listed: the further plans.
+    """
+    if listed:
+        results = state.plan_results
+        state = replace(state, plan_results=results.extended(listed, more=results.more))
     if index >= len(state.plan_results.plans):
         return state
     old = state.plan_results.plans[index]

@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import math
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from hypothesis import strategies as st
 from app.compute import plan_service
 from app.compute.cache import SharedCache
 from app.compute.map_service import MapService
-from app.compute.plan_service import SEARCH, PlanRequest, PlanService
+from app.compute.plan_service import PLANS_PER_BATCH, SEARCH, MotionRequest, PlanRequest, PlanService
 from app.files.plan_formats import PLAN_LIMIT
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
 from app.render.playback import plan_joint_values
@@ -26,13 +28,17 @@ from app.state.plans import plan_changes
 from app.state.plans.plan_results import PlanResults
 from app.state.state import State
 from app.state.task_list import TaskList
-from symgrasp.errors import InputError, PlanError, SceneError, SymgraspError
+from symgrasp.errors import Cancelled, InputError, NoPlanError, PlanError, SceneError, SymgraspError
 from symgrasp.files import SCENES_DIR
+from symgrasp.motion.choosing import Failure
 from symgrasp.planners.gaps import PrintGaps
+from symgrasp.planners.planning import sequential_plans
 from symgrasp.poses import pose_error
 from symgrasp.scene.scene import Scene
 from tests.app.state.states import opened, planned, results_of, small_map, with_plan
 from tests.conftest import load_small
+
+DATA = Path(__file__).parents[2] / "data"
 
 
 def quiet(share: float) -> None:
@@ -358,3 +364,64 @@ def test_the_progress_of_a_planner_is_at_its_end_when_all_is_listed(plans, name,
     if method != "hill_climb":
         listed = [share for share in shares if parts * (share - 1) + 1 > SEARCH + 1e-9]
         assert len(listed) == len(outcome.plans)
+
+
+# -- motions --------------------------------------------------------------------------------
+
+
+def test_plans_are_tried_beyond_the_list_until_one_has_a_motion(plans, monkeypatch):
+    """They are listed up to that one, and the rest when more are asked for."""
+    scene = load_small("bottle_on_table")
+    every = list(islice(sequential_plans(scene, "panda"), 3 * PLANS_PER_BATCH))
+    assert len(every) == 3 * PLANS_PER_BATCH
+
+    def moving(last: int) -> None:
+        def moving_plans(scene, plans, failures, progress):
+            for number, plan in enumerate(plans, start=1):
+                if number > last:
+                    yield plan, None
+                    return
+                failures.append(Failure(number, f"no way for {number}"))
+                if number == PLANS_PER_BATCH + 5:
+                    raise Cancelled
+
+        monkeypatch.setattr(plan_service, "moving_plans", moving_plans)
+
+    monkeypatch.setattr(plan_service, "with_motion", lambda plan, motion: plan)
+    outcome = plans.plan(PlanRequest(scene, "sequential", "", "panda"), {}, quiet)
+    shown = tuple(result.plan for result in outcome.plans)
+    assert list(shown) == every[:PLANS_PER_BATCH]
+    moving(1000)
+    with pytest.raises(Cancelled):
+        plans.motion(MotionRequest(scene, {}, shown, more=True), quiet)
+    moving(PLANS_PER_BATCH + 2)
+    found = plans.motion(MotionRequest(scene, {}, shown, more=True), quiet)
+    assert (found.index, found.plan) == (PLANS_PER_BATCH + 2, every[PLANS_PER_BATCH + 2])
+    assert found.failures[-1] == f"no way for {found.index}"
+    assert [result.plan for result in found.listed] == every[PLANS_PER_BATCH : found.index + 1]
+    later, more = plans.more(quiet)
+    assert more
+    assert [result.plan for result in later] == every[found.index + 1 :][:PLANS_PER_BATCH]
+    moving(1)
+    alone = plans.motion(MotionRequest(scene, {}, shown[4:], more=True), quiet)
+    assert (alone.index, alone.plan, alone.listed) == (1, shown[5], ())
+    moving(PLANS_PER_BATCH)
+    with pytest.raises(NoPlanError, match="no way for 10"):
+        plans.motion(MotionRequest(scene, {}, shown, more=False), quiet)
+
+
+def test_further_plans_are_listed_with_the_one_that_has_a_motion():
+    state = with_plan("bottle_on_table", "sequential")
+    results = state.plan_results
+    count = len(results.plans)
+    found = plan_changes.motion_found(state, count + 1, results.plans[1].plan, ("a", "b"), results.plans[:2])
+    assert found.plan_results.plans[:count] == results.plans
+    assert (len(found.plan_results.plans), found.plan_results.index) == (count + 2, count + 1)
+    assert found.plan_results.more == results.more
+
+
+def test_all_plans_with_the_fewest_regrasps_are_listed(plans):
+    scene = Scene.load(str(DATA / "crate_and_hood.yaml"))
+    outcome = plans.plan(PlanRequest(scene, "sequential", "regrasp", "panda"), {}, quiet)
+    assert len(outcome.plans) == PLANS_PER_BATCH
+    assert all(len(result.plan.tasks) == 4 for result in outcome.plans)
