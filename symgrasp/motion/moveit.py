@@ -70,6 +70,8 @@ def _numbers(values: Sequence[float] | Array) -> str:
 def to_srdf(plan: Plan) -> str:
     """Return an SRDF of the robot: its arms and hands as groups, home, and the links that may touch.
 
+    A fixed virtual joint has its root in the frame ``world``; MoveIt's planning frame stays the root.
+
     Raises:
         PlanError: the scene has several robots, of which each would need a file of its own.
     """
@@ -84,6 +86,9 @@ def srdf_of(scene: Scene) -> str:
     (robot,) = scene.robots.values()
     model = robot.model
     root = ET.Element("robot", name=model.name)
+    ET.SubElement(
+        root, "virtual_joint", name="world_joint", type="fixed", parent_frame="world", child_link=model.root
+    )
     for arm in scene.arms.values():
         ET.SubElement(
             ET.SubElement(root, "group", name=arm.name), "chain", base_link=model.root, tip_link=arm.tool

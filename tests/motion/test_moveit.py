@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 
 import numpy as np
@@ -106,6 +107,17 @@ def test_pinocchio_reads_the_srdf(tmp_path):
     kept = {frozenset((names[p.first], names[p.second])) for p in geometry.collisionPairs}
     expected = {frozenset(pair) for pair in own_pairs(scene, robot.name)}
     assert {pair for pair in kept if len(pair) == 2} == expected
+
+
+def test_the_root_of_the_robot_is_fixed_in_the_world():
+    """As Pinocchio has it: the parent of all its joints and of no link's own."""
+    model = pinocchio.buildModelFromXML(recorded_motion().scene.arm().robot.model.urdf.decode())
+    (joint,) = ET.fromstring(to_srdf(recorded_plan())).iter("virtual_joint")
+    assert (joint.get("type"), joint.get("parent_frame")) == ("fixed", "world")
+    child = model.frames[model.getFrameId(joint.get("child_link"))]
+    bodies = [frame for frame in model.frames if frame.type == pinocchio.FrameType.BODY]
+    assert child.name == bodies[0].name
+    assert child.parentJoint == 0
 
 
 def test_several_robots_have_no_srdf_together():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -99,18 +100,13 @@ def test_version_1_has_no_motion():
         Plan.parse(json.dumps({**content, "motion": motion}), "plan")
 
 
-def numbers(node: Any, path: tuple = ()) -> Iterator[tuple]:
-    """Yield the path of every number, of times and rows every fortieth and those at both ends."""
-    items = list(
-        node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-    )
-    for k, (key, value) in enumerate(items):
-        if len(items) > 20 and k % 40 and k not in (1, len(items) - 2, len(items) - 1):
-            continue
-        if isinstance(value, (int, float)):
-            yield (*path, key)
-        else:
-            yield from numbers(value, (*path, key))
+def numbers(node: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield every number of a document, as what it is in and its key there."""
+    for key, value in node.items() if isinstance(node, dict) else enumerate(node):
+        if isinstance(value, int | float):
+            yield node, key
+        elif isinstance(value, dict | list):
+            yield from numbers(value)
 
 
 @pytest.fixture
@@ -125,21 +121,24 @@ def only_changed_states(content, monkeypatch):
 
 
 @pytest.mark.usefixtures("only_changed_states")
-def test_every_changed_number_is_caught(content, world):
+@pytest.mark.parametrize("step", [1e-3, -1e-3])
+def test_every_changed_number_is_caught(step, content, world):
     """Clearances are what was proven, and may be larger in truth: they are changed by more."""
-    paths = list(numbers(content))
-    assert len(paths) > 300
-    assert failures(content, world) == []
+    changed = copy.deepcopy(content)
+    every = list(numbers(changed))
+    assert len(every) == len(re.findall(r"\d(?=[,\]}])", json.dumps(content)))
+    assert failures(changed, world) == []
     missed = []
-    for path in paths:
-        changed = copy.deepcopy(content)
-        node = changed
-        for key in path[:-1]:
-            node = node[key]
-        node[path[-1]] += 0.1 if path[-1] == "clearance" else 1e-3
+    for k, (node, key) in enumerate(every):
+        if k % 2 == (step > 0) and key != "clearance":  # every other number is made larger, the rest smaller
+            continue
+        was = node[key]
+        node[key] += 100 * abs(step) if key == "clearance" else step
         if not failures(changed, world):
-            missed.append(path)
+            missed.append((k, key, was))
+        node[key] = was
     assert missed == []
+    assert changed == content
 
 
 def reversed_segment(segment: dict[str, Any]) -> None:

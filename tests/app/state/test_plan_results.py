@@ -372,8 +372,10 @@ def test_the_progress_of_a_planner_is_at_its_end_when_all_is_listed(plans, name,
 def test_plans_are_tried_beyond_the_list_until_one_has_a_motion(plans, monkeypatch):
     """They are listed up to that one, and the rest when more are asked for."""
     scene = load_small("bottle_on_table")
-    every = list(islice(sequential_plans(scene, "panda"), 3 * PLANS_PER_BATCH))
-    assert len(every) == 3 * PLANS_PER_BATCH
+    batch = 3
+    monkeypatch.setattr(plan_service, "PLANS_PER_BATCH", batch)
+    every = list(islice(sequential_plans(scene, "panda"), 4 * batch))
+    assert len(every) == 4 * batch
 
     def moving(last: int) -> None:
         def moving_plans(scene, plans, failures, progress):
@@ -382,7 +384,7 @@ def test_plans_are_tried_beyond_the_list_until_one_has_a_motion(plans, monkeypat
                     yield plan, None
                     return
                 failures.append(Failure(number, f"no way for {number}"))
-                if number == PLANS_PER_BATCH + 5:
+                if number == batch + 5:
                     raise Cancelled
 
         monkeypatch.setattr(plan_service, "moving_plans", moving_plans)
@@ -390,23 +392,23 @@ def test_plans_are_tried_beyond_the_list_until_one_has_a_motion(plans, monkeypat
     monkeypatch.setattr(plan_service, "with_motion", lambda plan, motion: plan)
     outcome = plans.plan(PlanRequest(scene, "sequential", "", "panda"), {}, quiet)
     shown = tuple(result.plan for result in outcome.plans)
-    assert list(shown) == every[:PLANS_PER_BATCH]
+    assert list(shown) == every[:batch]
     moving(1000)
     with pytest.raises(Cancelled):
         plans.motion(MotionRequest(scene, {}, shown, more=True), quiet)
-    moving(PLANS_PER_BATCH + 2)
+    moving(batch + 2)
     found = plans.motion(MotionRequest(scene, {}, shown, more=True), quiet)
-    assert (found.index, found.plan) == (PLANS_PER_BATCH + 2, every[PLANS_PER_BATCH + 2])
+    assert (found.index, found.plan) == (batch + 2, every[batch + 2])
     assert found.failures[-1] == f"no way for {found.index}"
-    assert [result.plan for result in found.listed] == every[PLANS_PER_BATCH : found.index + 1]
+    assert [result.plan for result in found.listed] == every[batch : found.index + 1]
     later, more = plans.more(quiet)
     assert more
-    assert [result.plan for result in later] == every[found.index + 1 :][:PLANS_PER_BATCH]
+    assert [result.plan for result in later] == every[found.index + 1 :][:batch]
     moving(1)
-    alone = plans.motion(MotionRequest(scene, {}, shown[4:], more=True), quiet)
-    assert (alone.index, alone.plan, alone.listed) == (1, shown[5], ())
-    moving(PLANS_PER_BATCH)
-    with pytest.raises(NoPlanError, match="no way for 10"):
+    alone = plans.motion(MotionRequest(scene, {}, shown[1:], more=True), quiet)
+    assert (alone.index, alone.plan, alone.listed) == (1, shown[2], ())
+    moving(batch)
+    with pytest.raises(NoPlanError, match="no way for 3"):
         plans.motion(MotionRequest(scene, {}, shown, more=False), quiet)
 
 
