@@ -25,6 +25,7 @@ from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult, Node
 from symgrasp.engine.exclusion import (
     EXCLUDED,
     FALLS,
+    FIRM,
     GONE,
     HITS,
     OUTSIDE,
@@ -60,9 +61,11 @@ __all__ = ["COARSE", "FINEST", "cover"]
 FINEST = 1e-4
 """Width (rad) of a part of the range of φ that is not halved any more."""
 
+MEDIUM = 1e-3
+"""The same where the robot falls or the retreat is blocked at both ends, of which no measure is known."""
+
 COARSE = 3e-3
-"""The same where both ends fail in a way of which no measure is known: balance, the retreat, pieces that
-all but touch."""
+"""The same where pieces all but touch at both ends, so that PyBullet decides there."""
 
 CERTAIN = 1e-6
 """By how much (m) a pose is certain to be out of reach: more than numbers are rounded by."""
@@ -173,7 +176,7 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
             width = nodes.phi[right] - nodes.phi[left]
             known = what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, width)
             if known != EXCLUDED:
-                ends = width <= FINEST or (known == SOFT and width <= COARSE)
+                ends = width <= (COARSE if known == SOFT else MEDIUM if known == FIRM else FINEST)
                 if not ends and result.visited[i] < MOST_VISITED:
                     middle = _slot(nodes)
                     nodes.stack[count] = middle
@@ -249,10 +252,13 @@ def _visit(
     for b in range(len(exists)):
         nodes.missing[at, b] = branches.memory.missing[b]
     for b in range(len(exists)):
-        nodes.state[at, b] = SKIPPED if nodes.excluded[at, b] else GONE
-        if nodes.excluded[at, b] or not exists[b]:
+        nodes.state[at, b] = GONE
+        if not exists[b]:
             continue
-        copy_row(q[b], nodes.q[at, b])
+        copy_row(q[b], nodes.q[at, b])  # of excluded ones, too: they may be where another's curve ends
+        if nodes.excluded[at, b]:
+            nodes.state[at, b] = SKIPPED
+            continue
         nodes.state[at, b] = OUTSIDE
         if not inside[b]:
             continue

@@ -10,7 +10,10 @@ A branch is excluded on a part by what is the matter with it at both ends:
   other end;
 * the same root of the closed form has a negative radicand, by more than it bends in between.
 
-Where two branches end in a root, they are one curve: it is excluded from one branch to the other.
+Where two branches end in a root, they are one curve: it is excluded from one branch to the other. It leads
+away from both by as far as joints change with φ up to the root, which is anywhere in the part (`DRIFT`).
+
+By how much joints and links bend is not proven, but measured on the curves of arms.
 """
 
 from __future__ import annotations
@@ -20,13 +23,14 @@ import math
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.compiling import njit
 from symgrasp.engine.checks import HIT_BAND
-from symgrasp.engine.kinematics import place_arm
+from symgrasp.engine.kinematics import compose, place_arm, place_frames
 from symgrasp.ik.vectors import STRICT
 from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = [
     "EXCLUDED",
     "FALLS",
+    "FIRM",
     "GONE",
     "HARD",
     "HITS",
@@ -50,20 +54,34 @@ the retreat is blocked, only PyBullet can decide, or it is excluded all around t
 SAME_CURVE = 0.7
 """Largest difference (rad) of joints of two configurations that are taken for ends of one smooth curve."""
 
-BEND = 1.5
-"""By how much (1/rad) joint values leave the range of their values at both ends of a curve, for the square
-of the largest difference of any joint."""
+BEND, LEAST_BEND = 0.5, 0.08
+"""By how much joint values leave the range of their values at both ends of a curve: for the square of the
+largest difference of any joint (1/rad), and for that difference."""
 
 SAGITTA = 0.25
 """By how much (m/rad²) points of the arm leave a straight line between their places at both ends of a
 curve, for the square of the sum of the differences of the joints that move them."""
 
+LEAST_SAGITTA = 0.04
+"""The same, at least, where a trial shows that they leave it by less."""
+
+TRIED = 3.0
+"""By how much more they may leave it than half way between the joint values at both ends: the curve itself is
+not straight either."""
+
+DRIFT = 8.0
+"""By how much (rad/rad) joints change with φ at most, apart from what two branches are apart that end in the
+same root: the curve from one to the other leads away from both, for at most the width of the part."""
+
+ARM = 0.5
+"""By how much (m/rad) points of the arm move with a joint, there."""
+
 RADICAND_BEND = 1.0
 """The same (1/rad²) for radicands, for the square of the width of a part."""
 
-HARD, SOFT, EXCLUDED = 0, 1, 2
-"""What is known of a part of the range: nothing, nothing that a measure is known of, or that nothing is
-free."""
+HARD, FIRM, SOFT, EXCLUDED = 0, 1, 2, 3
+"""What is known of a part of the range: nothing, that both ends fail in a way of which no measure is known
+(balance, the retreat), that pieces all but touch at both, or that nothing is free."""
 
 
 @njit(**STRICT)
@@ -76,11 +94,12 @@ def what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, 
         here, there = nodes.state[left, b] != GONE, nodes.state[right, b] != GONE
         known = EXCLUDED
         if here:
-            known = _curve(nodes, scratch, moving, pieces, inputs, covered, left, right, b)
+            known = _curve(nodes, scratch, moving, pieces, inputs, covered, left, right, b, width)
         elif not there:
             known = _none(nodes.missing[left, b], nodes.missing[right, b], width)
         if known != HARD and there and not (here and _apart(nodes, left, b, right, b) <= SAME_CURVE):
-            known = min(known, _curve(nodes, scratch, moving, pieces, inputs, covered, right, left, b))
+            back = _curve(nodes, scratch, moving, pieces, inputs, covered, right, left, b, width)
+            known = min(known, back)
         least = min(least, known)
         if not covered.locked.spherical:  # whose branches may change places
             if least == HARD:
@@ -127,17 +146,15 @@ def _turn(angle):
 
 
 @njit(**STRICT)
-def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a):
+def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a, width):
     """Return what is known of the curve that starts with a branch at one end of a part.
 
     It leads to the nearest configuration: at the other end, or at this one where both end in between.
     """
     if nodes.state[other, a] != GONE and _apart(nodes, one, a, other, a) <= SAME_CURVE:
-        return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, a)
+        return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, a, width)
     nearest, at, least = -1, other, math.inf
     for b in range(nodes.state.shape[1]):
-        if nodes.excluded[one, b] or nodes.excluded[other, b]:
-            continue
         if nodes.state[other, b] != GONE:
             apart = _apart(nodes, one, a, other, b)
             if apart < least:
@@ -148,26 +165,34 @@ def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a):
                 nearest, at, least = b, one, apart
     if nearest < 0 or least > SAME_CURVE:
         return HARD
-    return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, at, nearest)
+    return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, at, nearest, width)
 
 
 @njit(**STRICT)
-def _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b):
+def _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b, width):
     """Return what is known of a curve between two configurations: slots and branches."""
     apart = _apart(nodes, one, a, other, b)
-    if _limits_exclude(nodes, one, a, other, b, apart):
+    ahead = DRIFT * width if other == one else 0.0  # both ends are at one side, the root is anywhere
+    if _limits_exclude(nodes, one, a, other, b, (BEND * apart + LEAST_BEND) * apart + ahead):
         return EXCLUDED
+    ahead *= ARM
     first, second = nodes.state[one, a], nodes.state[other, b]
-    if first == HITS and _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b):
+    if first == HITS and _pair_excludes(
+        nodes, scratch, moving, pieces, inputs, covered, one, a, other, b, ahead
+    ):
         return EXCLUDED
-    if second == HITS and _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, other, b, one, a):
+    if second == HITS and _pair_excludes(
+        nodes, scratch, moving, pieces, inputs, covered, other, b, one, a, ahead
+    ):
         return EXCLUDED
-    return SOFT if first >= FALLS and second >= FALLS else HARD
+    if first < FALLS or second < FALLS:
+        return HARD
+    return SOFT if first == UNSURE and second == UNSURE else FIRM
 
 
 @njit(**STRICT)
-def _limits_exclude(nodes, one, a, other, b, apart):
-    """Whether one joint is outside of its limits all along a curve."""
+def _limits_exclude(nodes, one, a, other, b, bend):
+    """Whether one joint is outside of its limits all along a curve, which may bend by an angle (rad)."""
     limits = nodes.chain.limits
     for j in range(nodes.q.shape[2]):
         half = 0.5 * (limits[1, j] - limits[0, j])
@@ -177,14 +202,18 @@ def _limits_exclude(nodes, one, a, other, b, apart):
         there = _turn(nodes.q[other, b, j] - limits[2, j])
         outside = min(abs(here), abs(there)) - half - LIMIT_TOLERANCE
         aside = here * there > 0.0 or abs(here) + abs(there) >= math.pi  # not through the range
-        if outside > BEND * apart * apart and aside:
+        if outside > bend and aside:
             return True
     return False
 
 
 @njit(**STRICT)
-def _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b):
-    """Whether the pair that collides at one end of a curve does so all along it."""
+def _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b, ahead):
+    """Whether the pair that collides at one end of a curve does so all along it.
+
+    Args:
+        ahead: how far (m) the curve may lead away from both of its ends.
+    """
     first, second = nodes.pair[one, a, 0], nodes.pair[one, a, 1]
     last = -1
     for side in range(2):
@@ -194,29 +223,71 @@ def _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, othe
     way = 0.0
     for j in range(last + 1):
         way += abs(_turn(nodes.q[other, b, j] - nodes.q[one, a, j]))
-    bend = SAGITTA * way * way
-    if not _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend):
+    least = LEAST_SAGITTA * way * way + ahead
+    if not _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, least):
         return False
-    if (
+    alike = (
         nodes.state[other, b] == HITS
         and nodes.pair[other, b, 0] == first
         and nodes.pair[other, b, 1] == second
-    ):
+    )
+    if alike and not _deeper(nodes, scratch, moving, pieces, inputs, covered, other, b, least):
+        return False
+    if alike:
         for side in range(2):
-            angle = _turned(nodes.pose[one, a, side], nodes.pose[other, b, side])
-            bend += 0.25 * angle * _length(pieces.size, nodes.pair[one, a, side])
-        return _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend) and _deeper(
-            nodes, scratch, moving, pieces, inputs, covered, other, b, bend
-        )
-    place_arm(moving, pieces, scratch, nodes.q[other, b])
+            copy_pose(nodes.pose[other, b, side], nodes.end[side])
+    else:
+        place_arm(moving, pieces, scratch, nodes.q[other, b])
+        for side in range(2):
+            copy_pose(scratch.pose[nodes.pair[one, a, side]], nodes.end[side])
+    turned = 0.0
     for side in range(2):
-        piece = nodes.pair[one, a, side]
-        angle = _turned(nodes.pose[one, a, side], scratch.pose[piece])
-        bend += 0.25 * angle * _length(pieces.size, piece)
+        angle = _turned(nodes.pose[one, a, side], nodes.end[side])
+        turned += 0.25 * angle * _length(pieces.size, nodes.pair[one, a, side])
+    bend = SAGITTA * way * way + ahead
+    if nodes.depth[one, a] <= bend + turned or alike:
+        bend = min(bend, least + _bent(nodes, scratch, moving, pieces, one, a, other, b))
+    bend += turned
+    if not _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend):
+        return False
+    if alike:
+        return _deeper(nodes, scratch, moving, pieces, inputs, covered, other, b, bend)
+    for side in range(2):
+        copy_pose(nodes.end[side], scratch.pose[nodes.pair[one, a, side]])
     for level in range(len(covered.inner)):
         if _depth(scratch, moving, pieces, inputs, covered, first, second, level) > bend:
-            return _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend)
+            return True
     return False
+
+
+@njit(**STRICT)
+def _bent(nodes, scratch, moving, pieces, one, a, other, b):
+    """Return by how much (m) the pieces of a pair leave straight lines, as far as a trial shows.
+
+    The poses of the pieces half way between the joint values at both ends are compared with the mean of those
+    at both ends, ``nodes.end`` at the other one.
+    """
+    for j in range(nodes.q.shape[2]):
+        nodes.half[j] = nodes.q[one, a, j] + 0.5 * _turn(nodes.q[other, b, j] - nodes.q[one, a, j])
+    place_frames(moving, nodes.half, scratch.frames)
+    total = 0.0
+    for side in range(2):
+        piece = nodes.pair[one, a, side]
+        if not moving.hand.shape[1] <= piece < len(moving.frame):
+            continue
+        pose, here, there = nodes.middle, nodes.pose[one, a, side], nodes.end[side]
+        compose(scratch.frames[moving.frame[piece]], moving.local[piece], pose)
+        for i in range(12):
+            pose[i] -= 0.5 * (here[i] + there[i])
+        turn = shift = 0.0
+        for i in range(3):
+            along = pose[9 + i]
+            for j in range(3):
+                turn += pose[3 * i + j] ** 2
+                along += pose[3 * i + j] * pieces.size[piece, 3 + j]
+            shift += along * along
+        total += math.sqrt(shift) + 0.5 * math.sqrt(turn) * _length(pieces.size, piece)
+    return TRIED * total
 
 
 @njit(**STRICT)

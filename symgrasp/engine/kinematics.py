@@ -16,6 +16,7 @@ from symgrasp.poses import Array
 __all__ = [
     "MovingPieces",
     "Scratch",
+    "compose",
     "copied",
     "new_scratch",
     "place_arm",

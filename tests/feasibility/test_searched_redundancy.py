@@ -15,6 +15,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
+from symgrasp.scene.format import MOST_SAMPLES
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 from tests.conftest import load_small
@@ -23,11 +24,11 @@ from tests.engine.random_scenes import random_scene, random_torso_scene
 DENSE = 256
 
 
-def covered(scene: Scene) -> tuple[FeasibilityMap, FeasibilityMap]:
+def covered(scene: Scene, samples: int = DENSE) -> tuple[FeasibilityMap, FeasibilityMap]:
     """The map of the first task for which all of the redundancy is searched, and that at many samples."""
     with open_world(scene.with_settings(redundancy="auto")) as world:
         auto = MapMaker(world).map()
-    with open_world(scene.with_settings(redundancy=DENSE)) as world:
+    with open_world(scene.with_settings(redundancy=samples)) as world:
         return auto, MapMaker(world).map()
 
 
@@ -58,6 +59,16 @@ def test_no_cell_is_missed_that_a_sample_shows_feasible(seed):
     assert not (dense.feasible & ~auto.feasible).any()
     assert not (auto.proven & dense.feasible).any()
     assert_witnesses(scene.with_settings(redundancy="auto"), auto)
+
+
+@pytest.mark.parametrize("seed", [511, 516, 524])
+def test_narrow_windows_are_found(seed):
+    # Free between two branches that end in the same root, far from both (516), and between two values at
+    # which the retreat is blocked (524).
+    auto, dense = covered(Scene.from_content(random_scene(seed)), MOST_SAMPLES)
+    assert dense.feasible.any()
+    assert not (dense.feasible & ~auto.feasible).any()
+    assert not (auto.proven & dense.feasible).any()
 
 
 @pytest.mark.parametrize("seed", range(2))

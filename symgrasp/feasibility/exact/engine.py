@@ -316,12 +316,15 @@ class ExactEngine:
         )
         found.solution[:, 0] = batch.samples[found.solution[:, 0]]  # of cells without one it is not used
         record_search(draft, bodies, found, cells, fixed)
-        covered = self._cover(draft, found, inputs, batch, cells)
-        for i in np.flatnonzero((found.status != search.FEASIBLE) & (found.undecided_count > 0)):
+        left = found.status != search.FEASIBLE
+        for i in np.flatnonzero(left & (found.undecided_count > 0)):
             cell = tuple(int(part[i]) for part in cells)
             T = inputs.T_base_tool[i]
-            self._open.decide(draft, cell, T, batch.ik, self._undecided(found, int(i), T, batch))
+            listed = self._undecided(found, int(i), T, batch)
+            by_tool = self._open.decide(draft, cell, T, batch.ik, listed)
+            left[i] = not by_tool and draft.reason[cell] != Reason.FEASIBLE
             yield
+        covered = self._cover(draft, found, np.flatnonzero(left), inputs, batch, cells)
         if covered:
             yield from self._decide_covered(draft, *covered, inputs, batch, cells)
 
@@ -329,6 +332,7 @@ class ExactEngine:
         self,
         draft: MapDraft,
         found: search.SearchResult,
+        which: np.ndarray,
         inputs: search.SearchInput,
         batch: Batch,
         cells: tuple[np.ndarray, ...],
@@ -336,13 +340,15 @@ class ExactEngine:
         """Search all of the redundancy for the cells at whose samples nothing is free, where that is asked
         for.
 
+        Args:
+            which: the cells.
+
         Returns:
             What was found for which of the cells, or None where samples are all there is.
         """
         locked = locked_joint(batch.compiled) if self._settings.redundancy == "auto" else None
         if locked is None or inputs.always_collides:
             return None
-        which = np.flatnonzero(found.status != search.FEASIBLE)
         tools = pose_rows(inputs.T_base_tool[which])
         covered = cover(
             batch.compiled.chain,

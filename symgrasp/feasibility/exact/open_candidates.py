@@ -49,7 +49,7 @@ class OpenCandidates:
         ik: Solver,
         listed: list[tuple[Array, int, int]],
         phi: Array | None = None,
-    ) -> None:
+    ) -> bool:
         """Check the candidates of a cell until one is free, and record what becomes of the cell.
 
         Args:
@@ -59,6 +59,9 @@ class OpenCandidates:
             ik: the solver of the candidates.
             listed: joint values, sample of that solver, and branch of each.
             phi: the samples of that solver (rad), where it is not the map's.
+
+        Returns:
+            Whether all candidates of the cell collide, listed or not.
         """
         near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
         approach = self._world.scene.settings.approach
@@ -70,13 +73,14 @@ class OpenCandidates:
                 if phi is not None:
                     sample = int(draft.add_phi(phi[sample : sample + 1])[0])
                 draft.record_feasible(cell, q, sample, branch)
-                return
+                return False
             if reason > draft.reason[cell]:
                 draft.record_failure(cell, reason, collision)
             if collision and self._with_tool(collision):
                 if before and _same(before, collision):
-                    return  # all others collide like that too, because the tool pose alone decides it
+                    return True  # like that, because the tool pose alone decides it
                 before = collision
+        return False
 
     def _near(self, q: Array, T_base_tool: Array, row: int) -> NearBodies:
         """Return the bodies near the arm at joint values (n,); all others are certified free."""
