@@ -24,7 +24,7 @@ def plan_for(scene: Scene) -> Plan:
 def test_the_scene_s_planner_finds_a_plan_that_holds(name):
     scene = Scene.load(name)
     plan = plan_for(scene)
-    assert verify(plan).failures == []
+    assert verify(plan, scene=scene, strict=True).failures == []
     grid = scene.manifold
     cells = {grid.cell(h.grasp.h, h.grasp.theta) for task in plan.tasks for h in task.holds}
     assert cells != {(0, 0)}
