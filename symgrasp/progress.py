@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from time import perf_counter
 
-__all__ = ["Progress", "part_of", "rising"]
+__all__ = ["TELL", "Progress", "part_of", "portions", "rising"]
+
+TELL = 0.05
+"""Time (s) after which progress is told, and may cancel: long computations are done in portions of about
+that long."""
 
 Progress = Callable[[float], None]
 """Called with the finished share (0 to 1) of a computation; may raise `Cancelled` to stop it."""
@@ -27,3 +32,24 @@ def rising(progress: Progress) -> Progress:
         progress(most)
 
     return report
+
+
+def portions(count: int, progress: Progress | None, first: int = 1) -> Iterator[slice]:
+    """Yield slices of so many things to do, each of about `TELL` seconds; all at once without a progress.
+
+    Args:
+        count: number of things.
+        progress: called with the finished share after every slice; may raise `Cancelled`.
+        first: length of the first slice.
+    """
+    done, some = 0, first if progress else count
+    while done < count:
+        start, end = perf_counter(), min(done + some, count)
+        yield slice(done, end)
+        # Things differ in cost, so slices at most double; what is found does not depend on their size.
+        some = max(1, min(2 * some, int((end - done) * TELL / max(perf_counter() - start, 1e-9))))
+        done = end
+        if progress:
+            progress(done / count)
+    if progress and not count:
+        progress(1.0)

@@ -20,12 +20,16 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import Solver
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse, spin
+from symgrasp.progress import Progress, portions
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import load_of_hand
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
 __all__ = ["LEVELS", "CellProver"]
+
+FIRST_CELLS = 64
+"""Cells that are proven before progress is told for the first time."""
 
 LEVELS = 3
 """How often the cells of a map may be cut in two, along and around, to be proven."""
@@ -73,7 +77,12 @@ class CellProver:
         self._inner = inner_pieces(geometry.pieces)
 
     def certified(
-        self, m: FeasibilityMap, task: Task, scratches: Sequence[Scratch], only: np.ndarray | None = None
+        self,
+        m: FeasibilityMap,
+        task: Task,
+        scratches: Sequence[Scratch],
+        only: np.ndarray | None = None,
+        progress: Progress | None = None,
     ) -> np.ndarray:
         """Return which cells (R, H, A) of a map hold as a whole.
 
@@ -82,6 +91,7 @@ class CellProver:
             task: its task.
             scratches: the poses of all pieces, for each thread, with the object where the task has it.
             only: (R, H, A) of which cells that is asked; of all if None.
+            progress: called with the finished share; may raise `Cancelled`.
         """
         found = np.zeros(m.reason.shape, dtype=bool)
         if self._arm.pitched:
@@ -106,12 +116,14 @@ class CellProver:
             wanted &= only
         # Of one layout, however many there are: for another one all would be compiled once more.
         cells = np.ascontiguousarray(np.argwhere(wanted))
-        if not len(cells):
-            return found
-        found[wanted] = prove_cells(
-            geometry.moving, geometry.pieces, geometry.tree, scratches, inputs, self._loaded(task), cells,
-            m.q[wanted],
-        )  # fmt: skip
+        balance, q = self._loaded(task), m.q[wanted]
+        whole = np.zeros(len(cells), dtype=bool)
+        for some in portions(len(cells), progress, FIRST_CELLS):
+            whole[some] = prove_cells(
+                geometry.moving, geometry.pieces, geometry.tree, scratches, inputs, balance, cells[some],
+                q[some],
+            )  # fmt: skip
+        found[wanted] = whole
         return found
 
     def _loaded(self, task: Task) -> Balance:

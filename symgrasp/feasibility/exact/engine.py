@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 
 import numpy as np
@@ -36,11 +36,11 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.torso_maps import merged
 from symgrasp.ik import GridSolvers, solver_for
-from symgrasp.ik.at_phi import locked_joint
+from symgrasp.ik.at_phi import Locked, locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
-from symgrasp.progress import Progress, part_of
+from symgrasp.progress import TELL, Progress, part_of, portions
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import load_of_hand
@@ -58,8 +58,8 @@ WORTH_A_PART = 256
 COVER_PARTS = 16
 """Equal parts of the range of the redundancy with which covering it begins."""
 
-TELL = 0.05
-"""Time (s) after which progress is told, and may cancel: rows are searched in parts of about that long."""
+FIRST_COVERED = 64
+"""Cells of which all of the redundancy is searched before progress is told for the first time."""
 
 
 class ExactEngine:
@@ -161,27 +161,31 @@ class ExactEngine:
         )
         drafts = []
         parts = 2 if self.arm.pitched else 1
+        steps = parts + int(certify)
         for part in range(parts):
             draft = MapDraft(self.arm, grid, self._opening, self._solvers.at(0, 0))
             for row, misfit in enumerate(self._misfit):
                 if misfit is not None:
                     draft.reason[:, row], draft.proven[:, row] = misfit, True
-            self._search_rows(draft, part, T_base_tool, part_of(progress, part, parts), only)
+            self._search_rows(draft, part, T_base_tool, part_of(progress, part, steps), only)
             drafts.append(draft.finish(self.world.scene.name, task))
         found = merged(drafts) if len(drafts) > 1 else drafts[0]
         if certify:
-            found = replace(found, certified=self._certified(found, task, only))
+            proven = self._certified(found, task, only, part_of(progress, parts, steps))
+            found = replace(found, certified=proven)
         self.world.set_arms(())
         return found
 
-    def _certified(self, found: FeasibilityMap, task: Task, only: np.ndarray | None) -> np.ndarray:
+    def _certified(
+        self, found: FeasibilityMap, task: Task, only: np.ndarray | None, progress: Progress | None
+    ) -> np.ndarray:
         """Return which cells (R, H, A) of a map that was just computed hold as a whole, of some or all."""
         if self._fixed_bodies().collision is not None:
             return np.ones(found.reason.shape, dtype=bool)  # bodies collide whatever the arm does
         if self._prover is None:
             scene, ik = self.world.scene, self._solvers.at(0, 0)
             self._prover = CellProver(scene, self.arm, ik, self._geometry, self.manifold, self._levels)
-        return self._prover.certified(found, task, self._scratches(), only)
+        return self._prover.certified(found, task, self._scratches(), only, progress)
 
     def _place_object(self, T_world_object: Array) -> None:
         """Put the object at a pose (4, 4) in both worlds, PyBullet's and the engine's; the arm at home."""
@@ -222,21 +226,13 @@ class ExactEngine:
         fixed, bodies = self._fixed_bodies(), self._bodies(draft)
         wanted = np.array([misfit is None for misfit in self._misfit])
         rows = np.flatnonzero(wanted if only is None else wanted & only.any(axis=(0, 2)))
-        first, count = 0, 1 if progress else len(rows)
-        while first < len(rows):
-            start = perf_counter()
-            some = rows[first : first + count]
+        for these in portions(len(rows), progress):
+            start, done, some = perf_counter(), these.start / len(rows), rows[these]
             for batch in batches(self._solvers, self._geometry, some, part):
-                for _ in self._search(draft, bodies, batch, T_base_tool, fixed, only):
+                tell = None if progress is None else partial(_tell_again, progress, done)
+                for _ in self._search(draft, bodies, batch, T_base_tool, fixed, only, tell):
                     if progress and perf_counter() - start > TELL:
-                        progress(first / len(rows))  # PyBullet takes its time: here one may cancel, too
-            first += len(some)
-            if progress:
-                progress(first / len(rows))
-            # Rows differ in cost, so parts at most double; what is found does not depend on their size.
-            count = max(1, min(2 * count, int(len(some) * TELL / (perf_counter() - start))))
-        if progress and not len(rows):
-            progress(1.0)
+                        progress(done)  # PyBullet takes its time: here one may cancel, too
 
     def _fixed_bodies(self) -> FixedBodies:
         """Measure the bodies that the arm does not move, with the object where it is now."""
@@ -281,8 +277,12 @@ class ExactEngine:
         T_base_tool: Array,
         fixed: FixedBodies,
         only: np.ndarray | None,
+        progress: Progress | None,
     ) -> Iterator[None]:
-        """Search some cells of the map; pause after every one that PyBullet decided."""
+        """Search some cells of the map; pause after every one that PyBullet decided.
+
+        Progress is called in between, where all of the redundancy is searched.
+        """
         rows, rolls = batch.rows, batch.rolls
         roll, row, column = np.indices((len(rolls), len(rows), draft.manifold.angles)).reshape(3, -1)
         cells, runs = (rolls[roll], rows[row], column), np.tile(rows, len(rolls))
@@ -324,31 +324,29 @@ class ExactEngine:
             by_tool = self._open.decide(draft, cell, T, batch.ik, listed)
             left[i] = not by_tool and draft.reason[cell] != Reason.FEASIBLE
             yield
-        covered = self._cover(draft, found, np.flatnonzero(left), inputs, batch, cells)
-        if covered:
-            yield from self._decide_covered(draft, *covered, inputs, batch, cells)
+        locked = locked_joint(batch.compiled) if self._settings.redundancy == "auto" else None
+        if locked is None or inputs.always_collides:
+            return
+        which = np.flatnonzero(left)
+        for these in portions(len(which), progress, FIRST_COVERED):
+            covered = self._cover(draft, found, which[these], locked, inputs, batch, cells)
+            yield from self._decide_covered(draft, which[these], covered, inputs, batch, cells)
 
     def _cover(
         self,
         draft: MapDraft,
         found: search.SearchResult,
         which: np.ndarray,
+        locked: Locked,
         inputs: search.SearchInput,
         batch: Batch,
         cells: tuple[np.ndarray, ...],
-    ) -> tuple[np.ndarray, CoverResult] | None:
-        """Search all of the redundancy for the cells at whose samples nothing is free, where that is asked
-        for.
+    ) -> CoverResult:
+        """Search all of the redundancy for cells at whose samples nothing is free, and record what is found.
 
         Args:
             which: the cells.
-
-        Returns:
-            What was found for which of the cells, or None where samples are all there is.
         """
-        locked = locked_joint(batch.compiled) if self._settings.redundancy == "auto" else None
-        if locked is None or inputs.always_collides:
-            return None
         tools = pose_rows(inputs.T_base_tool[which])
         covered = cover(
             batch.compiled.chain,
@@ -374,7 +372,7 @@ class ExactEngine:
         proven = which[covered.proven]
         draft.proven[tuple(part[proven] for part in cells)] = True
         draft.resolution = max(draft.resolution, FINEST, float(covered.left.max(initial=0.0)))
-        return which, covered
+        return covered
 
     def _decide_covered(
         self,
@@ -410,3 +408,8 @@ class ExactEngine:
             return [(found.undecided_q[i, j], int(sample[j]), int(branch[j])) for j in range(count)]
         s = batch.ik.solve(T_base_tool)
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
+
+
+def _tell_again(progress: Progress, share: float, _: float) -> None:
+    """Tell a share that is finished once more: for a part of which no share is known; it may be cancelled."""
+    progress(share)

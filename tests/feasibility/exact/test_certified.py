@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symgrasp.engine.reach import arm_reach
-from symgrasp.errors import MapError, SceneError
+from symgrasp.errors import Cancelled, MapError, SceneError
 from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.exact.cell_rows import new_rows
 from symgrasp.feasibility.fit import fit, fits_all, fits_none
@@ -262,3 +262,22 @@ def test_hands_move_no_further_than_their_play(name):
                     ]
                     moved = np.linalg.norm(placed[0] - placed[1], axis=-1).max(axis=1)
                     assert (moved <= rows.play[parent, k] + 1e-12).all()
+
+
+def test_proofs_tell_progress_and_can_be_cancelled():
+    scene = Scene.load("pick_pour_place").with_settings(heights=6, angles=24)
+    shares: list[float] = []
+
+    def cancel(share: float) -> None:
+        if share > 0.5:  # searched, and the first cells are proven
+            raise Cancelled
+
+    with open_world(scene) as world:
+        maker = MapMaker(world)
+        told = maker.map(progress=shares.append, certify=True)
+        assert shares == sorted(shares)
+        assert sum(0.5 < share < 1.0 for share in shares) >= 2
+        assert shares[-1] == 1.0
+        with pytest.raises(Cancelled):
+            maker.map(progress=cancel, certify=True)
+        assert np.array_equal(maker.map(certify=True).certified, told.certified)
