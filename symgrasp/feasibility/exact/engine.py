@@ -58,7 +58,7 @@ WORTH_A_PART = 256
 COVER_PARTS = 16
 """Equal parts of the range of the redundancy with which covering it begins."""
 
-FIRST_COVERED = 64
+FIRST_COVERED = 16
 """Cells of which all of the redundancy is searched before progress is told for the first time."""
 
 
