@@ -55,6 +55,7 @@ def fits_all(hand: Hand, profile: Profile, low: float, high: float, halvings: in
         and bottom >= profile.h_min - 1e-9 + ROUNDING
         and top <= profile.h_max + 1e-9 - ROUNDING
         and largest - smallest + ROUNDING <= hand.radius_tolerance
+        and hand.fingers_have_room(profile, low - ROUNDING, high + ROUNDING)
     ):
         return True
     middle = 0.5 * (low + high)

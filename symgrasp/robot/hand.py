@@ -50,6 +50,8 @@ class Hand:
         palm_width: extent of the palm along the object's axis; 0 leaves contact of the palm to the
             collision check.
         palm_depth: distance from the tool frame back to the face of the palm that has this width.
+        finger_width: extent along the object's axis of what of the fingers lies beside the object; 0 if
+            that is no more than the pads.
         shift: y of the tool frame where the axis of the object lies, over the opening: 0 for fingers that
             close from two sides; with a jaw that is fixed it moves with the opening.
         tool: the tool frame, for arms that do not name a link of their own.
@@ -71,6 +73,7 @@ class Hand:
     radius_tolerance: float = 0.003
     palm_width: float = 0.0
     palm_depth: float = 0.0
+    finger_width: float = 0.0
     shift: JointTable = field(default=0.0, hash=False)
     tool: Frame | None = None
     urdf: str | None = None
@@ -158,12 +161,34 @@ class Hand:
         return largest <= self.standoff(float(profile.radius(h))) + self.palm_depth
 
     def pads_rest(self, profile: Profile, h: float) -> bool:
-        """Whether the pads lie on the surface around height h (m): not past an end, not across a step."""
+        """Whether the pads lie on the surface around height h (m): not past an end, not across a step.
+
+        Nor may the object be thicker beside them where the fingers are wider than their pads.
+        """
         low, high = h - self.pad_width / 2, h + self.pad_width / 2
         if low < profile.h_min - 1e-9 or high > profile.h_max + 1e-9:
             return False
         smallest, largest = profile.radius_span(low, high)
-        return largest - smallest <= self.radius_tolerance
+        return largest - smallest <= self.radius_tolerance and self.fingers_have_room(profile, h, h)
+
+    def fingers_have_room(self, profile: Profile, low: float, high: float) -> bool:
+        """Whether open fingers are clear of the object beside their pads, at all heights of a range.
+
+        The object may there be thicker than where it is held by what it may be under the pads; at the largest
+        opening, where less than the clearance is left on either side, by that much less.
+
+        Args:
+            profile: the object.
+            low: lower end (m) of the range of heights at which the hand may hold it.
+            high: its upper end (m).
+        """
+        if self.finger_width <= self.pad_width:
+            return True
+        least, most = profile.radius_span(low, high)
+        left = min(self.clearance, max(0.0, 0.5 * self.max_opening - most))
+        rise = max(0.0, self.radius_tolerance - (self.clearance - left))
+        _, largest = profile.radius_span(low - self.finger_width / 2, high + self.finger_width / 2)
+        return largest <= least + rise
 
     def prefixed(self, prefix: str) -> Hand:
         """Return the hand with a prefix before the names of all its links and joints."""
@@ -197,6 +222,7 @@ def _pr2(side: str) -> Hand:
         max_opening=0.092,
         finger_depth=0.0507,
         pad_width=0.0207,
+        finger_width=0.0305,
         palm_width=0.0452,
         palm_depth=0.0597,
         tool=Frame("tool_frame", quat_wxyz=(np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)),
@@ -220,6 +246,7 @@ def _talos(side: str) -> Hand:
         max_opening=0.0926,
         finger_depth=0.0826,
         pad_width=0.0854,
+        finger_width=0.1113,
         palm_width=0.1,
         palm_depth=0.0916,
         tool=Frame("base_link", (0.0, 0.0, -0.1416), (0.0, 0.0, 1.0, 0.0)),
@@ -270,6 +297,7 @@ def _dex3(side: str) -> Hand:
         max_opening=0.1101,
         finger_depth=0.0347,
         pad_width=0.0738,
+        finger_width=0.0852,
         palm_width=0.0815,
         palm_depth=0.0458,
         tool=Frame(
@@ -291,6 +319,7 @@ HANDS: Mapping[str, Hand] = {
         max_opening=0.08,
         finger_depth=0.035,
         pad_width=0.0175,
+        finger_width=0.023,
         palm_width=0.0354,
         palm_depth=0.044,
         tool=Frame("panda_grasptarget"),
@@ -305,6 +334,7 @@ HANDS: Mapping[str, Hand] = {
         max_opening=0.11,
         finger_depth=0.067,
         pad_width=0.0203,
+        finger_width=0.032,
         palm_width=0.05,
         palm_depth=0.076,
         tool=Frame("wsg50_tool"),

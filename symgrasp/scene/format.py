@@ -136,6 +136,7 @@ class HandFile(_Strict):
     radius_tolerance: NotNegative = 0.003
     palm_width: NotNegative = 0.0
     palm_depth: NotNegative = 0.0
+    finger_width: NotNegative = 0.0
     shift: Number | list[tuple[NotNegative, Number]] = 0.0
     tool: FrameFile | None = None
     urdf: str | None = None
