@@ -116,7 +116,7 @@ def test_among_meshes_the_maps_are_the_same(tmp_path):
     for name, mesh in meshes.items():
         mesh.export(tmp_path / f"{name}.stl")
     blocked = feasible = 0
-    for seed in range(8):
+    for seed in range(12):
         content = random_scene(seed)
         for obstacle, name in zip(content["obstacles"], itertools.cycle(meshes), strict=False):
             for shape in ("box", "cylinder", "sphere"):
