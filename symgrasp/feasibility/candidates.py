@@ -154,7 +154,7 @@ class CandidateChecker:
         if robot.support is None:
             return 0.0
         loads = [] if T_base_tool is None else [self._load(T_base_tool)]
-        return max(0.0, -support_margin(robot, self.arm.robot_values(q, opening), loads))
+        return max(0.0, -float(support_margin(robot, self.arm.robot_values(q, opening), loads)))
 
     def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
         near = self._near(q, T_base_tool) if self._near else None

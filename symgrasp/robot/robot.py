@@ -321,8 +321,8 @@ class Arm:
             bounded, 0.5 * (np.where(bounded, self.lower, 0) + np.where(bounded, self.upper, 0)), 0
         )
         q = q + 2 * np.pi * np.round((middle - q) / (2 * np.pi))
-        inside = self.value_inside(q).all(axis=-1)
-        return np.where(inside[..., None], np.clip(q, self.lower, self.upper), q), inside
+        inside = np.all(self.value_inside(q), axis=-1, keepdims=True)
+        return np.where(inside, np.clip(q, self.lower, self.upper), q), inside[..., 0]
 
     def value_inside(self, q: Array) -> np.ndarray:
         """Whether values (..., n) are inside their limits, or beyond by at most `LIMIT_TOLERANCE`."""

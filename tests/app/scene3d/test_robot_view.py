@@ -1,5 +1,8 @@
 """Robots in the 3D view: a browser draws a link as soon as it arrives, so it arrives where it belongs."""
 
+# A map may be None in general, but not where these tests look.
+# pyright: reportOptionalMemberAccess=false
+
 from __future__ import annotations
 
 from dataclasses import replace
