@@ -324,7 +324,7 @@ def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
 
 def test_the_symmetry_error_is_told_and_painted(open_page, tmp_path):
     page = open_page()
-    expect(page.text("The hand franka fits from 0.9 to 19.1 and 24.0 to 29.1 cm.")).to_be_visible()
+    expect(page.text("The hand franka fits from 0.9 to 19.1 and 24.2 to 29.1 cm.")).to_be_visible()
     expect(page.frame.get_by_label("Colours", exact=True)).to_have_count(0)
     path = tmp_path / "oval.stl"
     path.write_bytes(oval_stl())

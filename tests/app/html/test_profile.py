@@ -53,7 +53,7 @@ def test_what_a_hand_is_called_is_escaped(tmp_path, content):
     content["robots"][0]["tool"] = "panda_grasptarget"
     html = holds_html(State.of(Scene.load(write_scene(tmp_path, content)), ""))
     assert "<script" not in html
-    assert "The hand &lt;script&gt; fits from 0.9 to 19.1 and 24.0 to 29.1 cm." in html
+    assert "The hand &lt;script&gt; fits from 0.9 to 19.1 and 24.2 to 29.1 cm." in html
 
 
 def test_the_deviation_is_where_the_mesh_has_it(oval):
