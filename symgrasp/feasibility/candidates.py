@@ -15,6 +15,7 @@ from symgrasp.ik import Solver
 from symgrasp.ik.retreat import retreat_distances, retreat_turns, retreated
 from symgrasp.poses import Array, inverse
 from symgrasp.reason import Reason
+from symgrasp.robot.limits import moved_onto_limits
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import Load, load_of_hand, support_margin
 from symgrasp.world import BulletWorld, Collision, NearBodies
@@ -171,8 +172,7 @@ class CandidateChecker:
             return None
         # A joint that turns further than once around goes on from where it is, where its limits allow.
         near = choices + 2 * np.pi * np.round((q - choices) / (2 * np.pi))
-        inside = self.arm.value_inside(near)
-        choices = np.where(inside, np.clip(near, self.arm.lower, self.arm.upper), choices)
+        choices = moved_onto_limits(near, self.arm.lower, self.arm.upper, choices)
         turns = np.abs(choices - q)
         nearest = int(turns.max(axis=1).argmin())
         return choices[nearest] if np.all(turns[nearest] <= self._turns) else None

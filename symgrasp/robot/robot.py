@@ -18,7 +18,7 @@ from symgrasp.poses import Array, from_rotation, inverse, rotation_about
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.handprint import Handprint, handprint
 from symgrasp.robot.joint import Joint
-from symgrasp.robot.limits import LIMIT_TOLERANCE
+from symgrasp.robot.limits import values_inside
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.pitch import SAME_PITCH, STEEPEST, pitch_range
 from symgrasp.robot.torso import Torso
@@ -326,7 +326,7 @@ class Arm:
 
     def value_inside(self, q: Array) -> np.ndarray:
         """Whether values (..., n) are inside their limits, or beyond by at most `LIMIT_TOLERANCE`."""
-        return (q >= self.lower - LIMIT_TOLERANCE) & (q <= self.upper + LIMIT_TOLERANCE)
+        return values_inside(q, self.lower, self.upper)
 
     def in_cell(self, q: Array) -> np.ndarray:
         """Whether values (..., n) grasp in the cell that is meant: not with an azimuth beyond its edge."""

@@ -18,7 +18,7 @@ from symgrasp.ik import Solver
 from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.search import NoMotionError, blockers, prove
 from symgrasp.poses import Array, inverse, pose_error
-from symgrasp.robot.limits import LIMIT_TOLERANCE
+from symgrasp.robot.limits import moved_onto_limits
 
 __all__ = ["CLEAR", "Leg", "LineTree", "configurations", "follow"]
 
@@ -140,8 +140,7 @@ def _following_turns(layer: Array, following: Array, limits: Array) -> Array:
     """Return what follows (m, k, n) each configuration: with full turns added towards it, within limits."""
     turns = 2 * np.pi * np.round((layer[:, None] - following[None]) / (2 * np.pi))
     near = following[None] + turns
-    inside = (near >= limits[0] - LIMIT_TOLERANCE) & (near <= limits[1] + LIMIT_TOLERANCE)
-    return np.where(inside, np.clip(near, *limits), following[None])
+    return moved_onto_limits(near, limits[0], limits[1], following[None])
 
 
 def _edges(layer: Array, new: Array) -> tuple[np.ndarray, np.ndarray]:

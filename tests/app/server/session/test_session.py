@@ -7,7 +7,6 @@ import gc
 import multiprocessing
 import sys
 import threading
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +23,6 @@ from app.server.session.session import Session
 from symgrasp.world import BulletWorld
 from tests.app import failures
 from tests.app.server.session.served import (
-    Server,
     picture,
     processes,
     ready,
@@ -33,12 +31,6 @@ from tests.app.server.session.served import (
 from tests.app.wire import Wire
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with start_server() as server:
-        yield server
 
 
 def alive(*kinds: type) -> list[int]:

@@ -6,7 +6,6 @@ import asyncio
 import logging
 import random
 import threading
-from collections.abc import Iterator
 from html import escape
 
 import pytest
@@ -16,25 +15,17 @@ from app.panels.pose_panel import PosePanel
 from app.panels.status_panel import StatusPanel
 from app.server.session.session import Session
 from tests.app.server.session.served import (
-    Server,
     entered,
     legend,
     link_in,
     picture,
     ready,
-    start_server,
     tasks,
     title,
     wait_until_alike,
 )
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with start_server() as server:
-        yield server
 
 
 def test_what_is_entered_while_the_page_writes_its_inputs_stays_entered(server, monkeypatch):

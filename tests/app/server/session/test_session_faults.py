@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterator
 
 import pytest
 
@@ -17,26 +16,18 @@ from app.server.door.lobby import open_lobby
 from app.server.door.viser_server import any_port
 from app.server.session.actions import Actions
 from tests.app.server.session.served import (
-    Server,
     entered,
     kill_processes,
     picture,
     processes,
     ready,
     signal_processes,
-    start_server,
     title,
 )
 from tests.app.wire import Wire
 from tests.conftest import write_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with start_server() as server:
-        yield server
 
 
 @pytest.mark.parametrize("restart", ["Restart", "the next change"])
