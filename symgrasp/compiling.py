@@ -167,13 +167,16 @@ class _EntryLibrary(JITCodeLibrary):
     def _optimize_final_module(self) -> None:
         """Optimise all together; nobody else calls these copies, so LLVM may change how they are called.
 
+        Private, not internal: LLVM's linker would still find these by name, for functions that numba compiles
+        in its own way with the same inner ones, which would then call them with arguments they do not take.
+
         Nor does anybody fill in their environments, which only functions called from Python have a use for.
         numba keeps those that it finds, and imports the module of each when it loads the code again.
         """
         inner = [f for f in self._final_module.functions if f.linkage == Linkage.linkonce_odr]
         unused = {ENVIRONMENT + function.name.removeprefix(MANGLED) for function in inner}
         for value in [*inner, *(v for v in self._final_module.global_variables if v.name in unused)]:
-            value.linkage = Linkage.internal
+            value.linkage = Linkage.private
         super()._optimize_final_module()
 
 

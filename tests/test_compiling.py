@@ -197,3 +197,37 @@ def test_python_calls_no_inner_function():
                 called = {ast.unparse(call.func) for call in ast.walk(node) if isinstance(call, ast.Call)}
                 bad = {name for name in called if known.get(name) in inner} - {"branch_count"}
                 assert not bad, f"{path}: {bad}"
+
+
+SHARED_INNER_FUNCTION = """
+import math
+
+import numba
+import numpy as np
+
+from symgrasp.collision.distance import distance_bounds
+from symgrasp.collision.pieces import Piece, pack, pose_rows
+from symgrasp.compiling import ENTRY, njit
+
+@njit(**{**ENTRY, "cache": False})
+def of_first(pieces, pose, work):
+    lower, upper = distance_bounds(pieces, pose, 0, 1, math.inf, math.inf, -math.inf, work)
+    return lower
+
+@numba.njit
+def of_any(pieces, pose, a, b, work):
+    lower, upper = distance_bounds(pieces, pose, a, b, math.inf, math.inf, -math.inf, work)
+    return lower
+
+pieces = pack([Piece(np.random.default_rng(0).normal(size=(50, 3)))] * 2)
+pose = pose_rows(np.tile(np.eye(4), (2, 1, 1)))
+pose[1, 9] = 9.0
+work = np.empty((4, 3))
+print(of_first(pieces, pose, work) == of_any(pieces, pose, 0, 1, work) > 0.0)
+"""
+
+
+def test_functions_that_numba_compiles_in_its_own_way_have_their_own_copy_of_inner_ones():
+    """As those of a program that uses the package may be; in its own process, as a wrong call ends it."""
+    program = [sys.executable, "-c", SHARED_INNER_FUNCTION]
+    assert subprocess.run(program, capture_output=True, text=True, check=True).stdout == "True\n"
