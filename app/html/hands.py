@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symgrasp.object.manifold import turn_text
 from symgrasp.plan.plan import PlanTask
 from symgrasp.planners.bimanual import ClimbStep
 
@@ -32,7 +33,7 @@ def hands_html(state: State) -> str:
     for k, task in enumerate(plan.plan.tasks):
         now = " sg-now" if k == state.step else ""
         apart = f"<span>{apart_text(state, k)}</span>"
-        turned = f"turned by {np.rad2deg(task.delta) + 0.0:.1f}°"
+        turned = f"turned by {turn_text(task.delta)}"
         name = f"{k + 1} · {escape(task.name)}" if len(plan.plan.tasks) > 1 else escape(task.name)
         blocks.append(f'<div class="sg-task{now}"><b>{name}</b><span>{turned}</span>{apart}</div>')
         blocks.extend(_hands(task))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from symgrasp.object.manifold import ROLLS
+from symgrasp.object.manifold import ROLLS, turn_text
 from symgrasp.plan.plan import Grasp
 from symgrasp.survey.success import CONFIDENCE, interval
 
@@ -31,10 +31,10 @@ def comparison_html(state: State) -> str:
     comparison = state.map_view.comparison
     if comparison is None:
         return '<div class="sg sg-faint">The map is being computed from scratch …</div>'
-    turn, cells = np.rad2deg(comparison.request.delta), comparison.map.reason.size
+    turn, cells = turn_text(comparison.request.delta), comparison.map.reason.size
     rolls, heights, angles = comparison.map.reason.shape
     return (
-        f'<div class="sg sg-check" role="status">Below: from scratch for {turn:.2f}°: '
+        f'<div class="sg sg-check" role="status">Below: from scratch for {turn}: '
         f"<b>{comparison.differing} of {cells} cells differ</b>: {heights * angles} places "
         f"with {rolls} rolls each.</div>"
     )

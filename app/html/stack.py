@@ -7,6 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
+from symgrasp.object.manifold import turn_text
 from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold
 
 from ..state.state import State
@@ -29,9 +30,8 @@ def stack_html(state: State) -> str:
         if len(groups) > 1:
             rows.append(f'<div class="sg-part">grasp {number}: {_grasp_text(group[0][2].grasp)}</div>')
         for k, task, hold in group:
-            turn = f"{np.rad2deg(task.delta) + 0.0:.1f}°"
             now = "sg-now" if k == state.step else ""
-            rows.append(_row((f"{k + 1} · {task.name}", turn, *margin_texts(hold)), now))
+            rows.append(_row((f"{k + 1} · {task.name}", turn_text(task.delta), *margin_texts(hold)), now))
     return f'<div class="sg-stack">{"".join(rows)}</div>'
 
 

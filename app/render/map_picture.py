@@ -11,6 +11,7 @@ import numpy as np
 from symgrasp.errors import InputError
 from symgrasp.feasibility import pictures
 from symgrasp.feasibility.color_by import ColoredMap, Swatch
+from symgrasp.object.manifold import turn_text
 
 from ..state.map_view_state import RollChoice
 from ..state.state import State
@@ -51,7 +52,7 @@ def map_picture(state: State, kind: str) -> bytes:
     roll = "either roll" if state.map_view.roll is RollChoice.EITHER else f"roll {state.map_view.roll.value}"
     title = f"{state.scene.name} · {state.task} · {state.arm}"
     if state.delta:
-        title += f" · turned by {np.rad2deg(state.delta):.5g}°"
+        title += f" · turned by {turn_text(state.delta)}"
     profile = state.scene.profile
     marks = [(mark.h, mark.theta) for mark in marks_of(state)]
     panel = ColoredMap(colored.index[None], colored.colors, colored.swatches, colored.scale)

@@ -25,7 +25,7 @@ from docs.figures.style import IMAGES, board, label, legend, map_axes, mark, new
 from docs.pages import refresh
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import create_map
-from symgrasp.object.manifold import ROLLS, Manifold
+from symgrasp.object.manifold import ROLLS, Manifold, turn_text
 from symgrasp.plan.plan import Hold, Plan
 from symgrasp.planners.planning import plan_bimanual, plan_sequential
 from symgrasp.scene.scene import Scene
@@ -119,7 +119,7 @@ def pick_pour_place() -> None:
         bodies = [*robots(scene, task), *obstacles(scene), thing, floor(-0.04)]
         box = (3.35 * k, 0.5, 3.3, 3.7)
         photo(figure, box, bodies, Camera((0.36, 0.01, 0.33), -14, 20, 1.14))
-        turned = f", bottle turned by {np.rad2deg(task.delta):.1f}°" if k else ""
+        turned = f", bottle turned by {turn_text(task.delta)}" if k else ""
         figure.text(
             (3.35 * k + 1.65) / 10, 0.09, f"{task.name}{turned}", ha="center", va="center", fontsize=10
         )

@@ -105,7 +105,7 @@ def _shoot(it: GraspPage, name: str) -> None:
 
 @contextmanager
 def _open(scene: str) -> Iterator[GraspPage]:
-    """Open the page on a scene, without the browser's notice that it draws without a GPU."""
+    """Open the page on a scene, without the invitation and the notice of a browser without a GPU."""
     chromium = shutil.which("chromium")
     if chromium is None:
         raise RuntimeError(HOW_TO_GET_IT)
@@ -115,6 +115,7 @@ def _open(scene: str) -> Iterator[GraspPage]:
         notice = it.frame.locator(".mantine-Notification-closeButton")
         if notice.count():
             notice.first.click()
+        it.page.get_by_role("button", name="No, thanks").click()
         yield it
         browser.close()
 

@@ -16,7 +16,7 @@ from docs.figures.render import Camera
 from docs.figures.style import board, label, legend, map_axes, mark, new, photo, save
 from symgrasp.feasibility.create import create_map
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.object.manifold import ROLLS, wrap
+from symgrasp.object.manifold import ROLLS, turn_text, wrap
 from symgrasp.object.profile import Profile
 from symgrasp.planners.planning import plan_sequential
 from symgrasp.poses import Array
@@ -95,7 +95,7 @@ def turn_shifts() -> None:
         flat.axvline(seam, color=INK, linewidth=1.2, linestyle=(0, (4, 2)))
         anew = create_map(scene.with_task(replace(scene.task(), T_world_object=pose)), manifold=grid)
         differing = np.count_nonzero(anew.reason != shifted.reason)
-        turned = f"turned by δ = {np.rad2deg(delta):.1f}°" if k else "as it stands"
+        turned = f"turned by δ = {turn_text(delta)}" if k else "as it stands"
         note = f"computed anew: {differing} of {anew.reason.size} cells differ" if k else ""
         figure.text((left + 1.375) / 10, 6.0 / 6.2, turned, ha="center", fontsize=10)
         flat.set_title(note, fontsize=8)
@@ -123,7 +123,7 @@ def maps_slide() -> None:
             if k < 2 or axes is after:
                 axes.set(xlabel="", xticklabels=[])
         before.set_title(task.name, loc="left", pad=3)
-        after.set_title(f"turned by δ = {np.rad2deg(task.delta):.1f}°", loc="left", pad=3)
+        after.set_title(f"turned by δ = {turn_text(task.delta)}", loc="left", pad=3)
     seen = np.concatenate([m.reason[roll] for m in maps])
     legend(figure, seen, (0.75, 1.7), columns=2)
     common = board(figure, (5.3, 0.55, 3.9, 1.25))

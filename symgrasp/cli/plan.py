@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Iterator
 from contextlib import closing
 from itertools import chain, islice, repeat
@@ -159,11 +158,12 @@ def _listed(args: argparse.Namespace, scene: Scene, progress: Progress | None) -
 
 def _print_holds(plan: Plan) -> None:
     """Print how the object is turned and held in every task."""
+    from symgrasp.object.manifold import turn_text
     from symgrasp.plan.listing import place_in_words
 
     unsupported = {task["name"] for task in plan.scene.content["tasks"] if task.get("supported") is False}
     for task in plan.tasks:
-        say(f"{task.name}: turn the object by {math.degrees(task.delta):.1f}°")
+        say(f"{task.name}: turn the object by {turn_text(task.delta)}")
         if task.name in unsupported:
             say("  nothing holds the object up but the hands (supported: false)")
         for hold in task.holds:

@@ -22,7 +22,7 @@ from symgrasp.errors import InputError
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array, axis_frame, from_rotation, rotation_z, spin
 
-__all__ = ["ROLLS", "Manifold", "grasp_to_tool", "wrap"]
+__all__ = ["ROLLS", "Manifold", "grasp_to_tool", "turn_text", "wrap"]
 
 ROLLS = (0.0, np.pi)
 """The two ways to hold with the fingers' plane perpendicular to the axis."""
@@ -35,6 +35,15 @@ turning the object by whole cells gives bit for bit the same tool poses in the w
 def wrap(angle: ArrayLike) -> Array:
     """Wrap angles (...) (rad) into [-π, π)."""
     return np.mod(np.asarray(angle, dtype=float) + np.pi, 2 * np.pi) - np.pi
+
+
+def turn_text(delta: float) -> str:
+    """Return a turn δ (rad) of the object about its axis as it is written everywhere, such as ``37.50°``.
+
+    The page writes it likewise while it is being dragged: `turnText` in ``app/shell/static/frame.js``.
+    """
+    text = f"{np.rad2deg(delta):.2f}°"
+    return "0.00°" if text == "-0.00°" else text
 
 
 def grasp_to_tool(

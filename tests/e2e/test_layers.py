@@ -11,7 +11,7 @@ import numpy as np
 from playwright.sync_api import Browser, Locator, expect
 
 from symgrasp.feasibility.create import create_map
-from symgrasp.object.manifold import ROLLS
+from symgrasp.object.manifold import ROLLS, turn_text
 from symgrasp.plan.plan import Plan
 from symgrasp.planners.gaps import print_gap
 from symgrasp.scene.scene import Scene
@@ -67,6 +67,9 @@ def test_a_map_of_a_sequence_is_slid_by_hand_and_the_common_cells_count_live(ope
     expect(layers).to_have_count(3)
     deltas = [task.delta for task in plan.tasks]
     expect(together).to_have_text(f"all 3 over each other: {common(plan, deltas)} common cells")
+    for k, delta in enumerate(deltas):  # said alike above its map and in the table
+        expect(page.page.locator("#stack output").nth(k)).to_contain_text(f"turned by {turn_text(delta)}")
+        expect(page.frame.locator(".sg-stack .sg-head").nth(k + 1)).to_contain_text(turn_text(delta))
     x, y, width, height = cells_box(layers.nth(1))
     mouse = page.page.mouse
     mouse.move(x + width / 2, y + height / 2)

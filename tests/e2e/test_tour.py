@@ -19,6 +19,45 @@ def done(page: Page, step: int) -> str:
     return page.get_by_test_id("tour-said").inner_text()
 
 
+INVITED = re.compile("New here")
+
+
+def test_the_first_visit_is_invited_to_the_tour_and_later_ones_are_not(open_page):
+    it: GraspPage = open_page("")
+    page, invitation = it.page, it.page.locator("#invitation")
+    expect(invitation).to_contain_text("New here?")
+    it.expect_title(STORY)
+    expect(invitation).to_be_visible()
+    row, _ = it.shown_map.look["picked"]
+    it.map.press("ArrowUp")  # the page can be used beside it
+    it.wait_for_picture(lambda _: it.shown_map.look["picked"][0] == row + 1)
+    page.reload()  # not answered yet
+    it.expect_title(STORY)
+    expect(invitation).to_be_visible()
+    page.get_by_role("button", name="No, thanks").click()
+    expect(invitation).to_be_hidden()
+    expect(it.map).to_be_focused()
+    for again in (page, page.context.new_page()):
+        again.goto(page.url)
+        expect(again.locator("#nothing")).to_be_hidden()
+        expect(again.locator("#invitation")).to_be_hidden()
+    assert it.complaints == []
+
+
+def test_the_invitation_is_answered_by_any_way_into_the_tour(open_page):
+    for way in ("Take the tour", "Tour"):
+        it: GraspPage = open_page("")  # a browser of its own
+        page, invitation = it.page, it.page.locator("#invitation")
+        it.expect_title(STORY)
+        page.get_by_role("button", name=way, exact=True).click()
+        expect(page.locator("#tour-title")).to_contain_text("1 of 6")
+        expect(invitation).to_be_hidden()
+        page.get_by_role("button", name="Skip the tour").click()
+        page.reload()
+        expect(page.locator("#nothing")).to_be_hidden()
+        expect(invitation).to_be_hidden()
+
+
 @pytest.mark.parametrize("motion", ["reduce", "no-preference"])
 def test_the_tour_does_what_the_paper_says(open_page, motion):
     it: GraspPage = open_page("")

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symgrasp.errors import InputError, ProfileError
-from symgrasp.object.manifold import Manifold, grasp_to_tool, wrap
+from symgrasp.object.manifold import Manifold, grasp_to_tool, turn_text, wrap
 from symgrasp.object.profile import Profile
 from symgrasp.poses import rotation_z, translation
 from tests.strategies import angles, poses, profiles
@@ -98,3 +98,11 @@ def test_standoff_keeps_the_palm_outside():
 def test_a_grid_needs_cells(heights, columns):
     with pytest.raises(InputError, match="at least 1"):
         Manifold(BOTTLE, heights, columns)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "text"),
+    [(0.0, "0.00°"), (-0.004, "0.00°"), (37.5, "37.50°"), (-7.26, "-7.26°"), (-180.0, "-180.00°")],
+)
+def test_a_turn_is_written_with_two_decimals(degrees, text):
+    assert turn_text(np.deg2rad(degrees)) == text

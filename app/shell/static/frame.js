@@ -3,6 +3,13 @@ const NARROWEST = 1 / 40;
 
 export const TURN = 2 * Math.PI;
 export const mod = (a, n) => ((a % n) + n) % n;
+export const degrees = (angle) => (angle * 360) / TURN;
+
+/** A turn δ (rad) of the object as it is written everywhere: `turn_text` in `symgrasp.object.manifold`. */
+export function turnText(delta) {
+  const text = `${degrees(delta).toFixed(2)}°`;
+  return text === "-0.00°" ? "0.00°" : text;
+}
 
 export class Frame {
   constructor() {

@@ -1,6 +1,6 @@
 /* The stack of maps below the main one: of tasks, of hands, of rolls. Each is the same element as the main map. */
-import { TURN, mod } from "./frame.js";
-import { MapPane, degrees } from "./map_pane.js";
+import { TURN, mod, turnText } from "./frame.js";
+import { MapPane } from "./map_pane.js";
 
 const COLUMNS = 1440; // four a degree, as many as the angles that a drag stops at
 const SHARED = ["#eceef1", "#5fbf77"], WORDS = ["excluded by some task", "serves all of them"];
@@ -68,8 +68,8 @@ export class Layers {
       speak: () => {},
       turned: () => {
         const { planned, kind } = this.looks?.[k] ?? {};
-        const by = planned == null ? "" : ` (plan: ${degrees(planned).toFixed(2)}°)`;
-        turn.textContent = kind === "task" || kind === "roll" ? `turned by ${degrees(pane.delta).toFixed(2)}°${by}` : "";
+        const by = planned == null ? "" : ` (plan: ${turnText(planned)})`;
+        turn.textContent = kind === "task" || kind === "roll" ? `turned by ${turnText(pane.delta)}${by}` : "";
         this.count();
       },
       move: (hand, row, column) => this.on.send({ do: "move", step: this.looks[k].step, hand, row, column }),

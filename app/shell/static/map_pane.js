@@ -1,11 +1,10 @@
 /* The map: holds what the server says of it, and does what is done to it. */
-import { Frame, TURN, mod } from "./frame.js";
+import { Frame, TURN, degrees, mod, turnText } from "./frame.js";
 import { draw, layout, masks, texture } from "./drawing.js";
 
 const CLICK = 5; // how far (px) a pointer may move in a click
 const STEP = Math.PI / 720; // that of the slider (rad)
 const UNKNOWN = 0xffff;
-export const degrees = (angle) => (angle * 360) / TURN;
 export const wrap = (angle) => mod(angle + Math.PI, TURN) - Math.PI;
 
 export class MapPane {
@@ -220,7 +219,7 @@ export class MapPane {
   settle(anyway = false) {
     const answered = this.own !== null && Math.abs(wrap(this.look.delta - this.own)) < 1e-6;
     if (!this.drag && (anyway || answered)) this.own = null;
-    this.on.turned(`turned by ${degrees(this.delta).toFixed(2)}°`);
+    this.on.turned(`turned by ${turnText(this.delta)}`);
     this.redraw();
   }
 
@@ -266,7 +265,7 @@ export class MapPane {
     if (own === this.own) return;
     this.own = own;
     this.on.send({ do: "turn", delta: own });
-    this.on.turned(`turned by ${degrees(own).toFixed(2)}°`);
+    this.on.turned(`turned by ${turnText(own)}`);
     this.redraw();
   }
 

@@ -2,6 +2,7 @@
 import { Link } from "./link.js";
 import { Layers } from "./layers.js";
 import { MapPane } from "./map_pane.js";
+import { Invitation } from "./invitation.js";
 import { describe } from "./legend.js";
 import { watchPlaces } from "./places.js";
 import { Tour } from "./tour.js";
@@ -44,7 +45,11 @@ const layers = new Layers(element, {
   send: (command) => link.send(command),
   say,
 });
-const tour = new Tour(element, pane, (command) => link.send(command));
+const tour = new Tour(element, pane, {
+  send: (command) => link.send(command),
+  begun: () => invitation.answer(),
+});
+const invitation = new Invitation(element, () => tour.show(0));
 const arrived = [];
 const link = new Link(`/map/${visit.token}`, {
   message: (head, data) => {

@@ -102,10 +102,10 @@ export class Tour {
   /**
    * @param {(id: string) => HTMLElement} element
    * @param {import("./map_pane.js").MapPane} pane the main map
-   * @param {(command: object) => void} send to the server
+   * @param {{send: (command: object) => void, begun: () => void}} on send goes to the server
    */
-  constructor(element, pane, send) {
-    Object.assign(this, { element, pane, send });
+  constructor(element, pane, on) {
+    Object.assign(this, { element, pane, on, send: on.send });
     this.card = element("tour");
     this.sheet = element("unroll");
     this.run = 0; // its number: what waits in an earlier one is left
@@ -135,6 +135,7 @@ export class Tour {
       return;
     }
     this.leave();
+    this.on.begun();
     this.step = Math.max(0, step);
     const run = this.run, { title, words, run: act } = STEPS[this.step];
     this.card.hidden = false;
