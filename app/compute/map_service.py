@@ -47,6 +47,7 @@ class MapService:
     def __init__(self, on_map: Callable[[MapResult], None] = lambda _: None) -> None:
         self._on_map = on_map
         self._maker: MapMaker | None = None
+        self._draws: tuple[ProbabilityRequest, list[np.ndarray]] | None = None
 
     def close(self) -> None:
         """Free the physics world."""
@@ -117,9 +118,20 @@ class MapService:
         return ExplainResult(request, explanation)
 
     def probability(self, request: ProbabilityRequest, progress: Progress) -> Probability:
-        """Compute how probable the grasps of a map are."""
+        """Compute how probable the grasps of a map are; goes on where an equal request was cancelled."""
         maker, the_map = self._maker_for(request.map.scene), request.map
-        found = success_map(maker, the_map.arm, the_map.moved_task(), request.noise, DRAWS, progress=progress)
+        if self._draws is None or self._draws[0] != request:
+            self._draws = request, []
+        found = success_map(
+            maker,
+            the_map.arm,
+            the_map.moved_task(),
+            request.noise,
+            DRAWS,
+            progress=progress,
+            known=self._draws[1],
+        )
+        self._draws = None
         return Probability(request, found.feasible.sum(axis=0), len(found.feasible))
 
     def _maker_for(self, scene: Scene) -> MapMaker:

@@ -18,6 +18,7 @@ from symgrasp.cli.shared import (
     add_packages,
     check_out,
     say,
+    warn,
     whole,
     write_picture,
 )
@@ -97,6 +98,8 @@ def _run(args: argparse.Namespace) -> int:
     from symgrasp.survey.survey import Survey
 
     survey = Survey.load(args.survey)
+    for note in (*survey.scene.notes, *survey.notes):
+        warn(f"{survey.file.name}: {note}")
     try:
         with progress_of_points(survey.file.name) as progress:
             run_survey(survey, args.out, workers=args.workers, scheduler=args.scheduler, progress=progress)

@@ -437,7 +437,9 @@ def describe_error(error: ValidationError, content: Any) -> tuple[str, object, s
     Returns:
         The field, its value, and what was expected.
     """
-    first = error.errors(include_url=False)[0]
+    first, *others = error.errors(include_url=False)
+    if others and first["type"] == "string_type" and isinstance(first["input"], dict):
+        first = others[0]  # what may be a text or a mapping is a mapping, in which this is wrong
     # pydantic's location also names members of unions; steps that do not lead into the content are skipped.
     path: list[str | int] = []
     at = content

@@ -130,9 +130,9 @@ class Evaluator:
             return PointResult(State.ROBOT_BLOCKED)
         file, task = self.survey.file, self.task_at(point, stage.scene)
         arm = file.arm or task.arms[0]
-        scene = stage.scene.with_task(task)
-        tasks = [task]
+        scene, tasks = stage.scene, [task]
         if file.plan:
+            scene = scene.with_task(task)
             tasks += [t for t in tasks_of_plan(scene, file.plan, arm, task.name) if t.name != task.name]
         if any(object_contact(stage.world, own) for own in tasks):
             return PointResult(State.OBJECT_BLOCKED)

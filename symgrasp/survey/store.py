@@ -1,12 +1,14 @@
 """The store of a survey's results: a Zarr group whose dimensions are the axes, which xarray opens.
 
-A batch of points is a chunk of every variable. What a batch writes last is `STATE`, so a batch counts as
-computed when all its points have one and every chunk can be read; each carries a checksum.
+A batch of points is a chunk of every variable, but of `PROBLEM` only where there is one. What a batch writes
+last is `STATE`, so a batch counts as computed when all its points have one and every chunk can be read; each
+carries a checksum.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import warnings
 from collections.abc import Iterator, Mapping
@@ -36,6 +38,9 @@ FORMAT_VERSION = 2
 
 VERSIONS = (1, FORMAT_VERSION)
 
+SMALLEST_COMPRESSED = 4096
+"""Bytes of a chunk from which on it is compressed: a smaller one takes a block of the disk either way."""
+
 LONGEST_PROBLEM = 240
 """Bytes of a text that says why the values of a point do not go together, at most."""
 
@@ -63,7 +68,6 @@ class SurveyStore:
         every = {"write_empty_chunks": True}  # a chunk that is not there is missing
         self._kinds = {name: own for name, own in variables(survey).items() if name in group}
         self._arrays = {name: group[name].with_config(every) for name in self._kinds}
-        self._names = [name for name in self._arrays if name != STATE]
 
     def write(self, batch: int, results: Mapping[tuple[int, ...], PointResult]) -> None:
         """Write a batch.
@@ -97,9 +101,16 @@ class SurveyStore:
             }
             for name in values.keys() & blocks.keys():
                 blocks[name][where] = values[name]
-        for name in (*self._names, STATE):
+        for name in self._written(blocks[STATE]):
             array: Any = self._arrays[name]
             array[region] = blocks[name]
+
+    def _written(self, state: np.ndarray) -> list[str]:
+        """Return the variables of which a batch with these states has a chunk, `STATE` last."""
+        known = [name for name in self._kinds if name not in (STATE, PROBLEM)]
+        if PROBLEM in self._kinds and (state == State.UNUSABLE).any():
+            known.append(PROBLEM)
+        return [*known, STATE]
 
     def missing(self) -> list[int]:
         """Return the batches that are not computed, or cannot be read."""
@@ -114,12 +125,14 @@ class SurveyStore:
         """Whether every chunk of a batch is there, as it was written."""
         region, where = self.survey.region(batch), np.unravel_index(batch, self.survey.batch_grid)
         with suppress(Exception):  # zarr, its codecs and the disk each raise their own
-            for name, own in self._kinds.items():
-                chunk = [*(str(k) for k in where), *("0" for _ in own.sizes)]
-                self._path.joinpath(name, "c", *chunk).stat()
-                array: Any = self._arrays[name]
-                if name == STATE and (array[region] == State.MISSING).any():
-                    return False
+            array: Any = self._arrays[STATE]
+            state = array[region]
+            if (state == State.MISSING).any():
+                return False
+            for name in self._written(state):
+                chunk = [*(str(k) for k in where), *("0" for _ in self._kinds[name].sizes)]
+                self._path.joinpath(name, "c", *chunk).stat()  # one that is not there is read as blank
+                array = self._arrays[name]
                 array[region]
             return True
         return False
@@ -195,7 +208,8 @@ def _make(path: Path, survey: Survey) -> None:
         chunks = (*survey.batch_shape, *sizes)
         blank = da.full((*survey.shape, *sizes), fill, dtype=kind, chunks=chunks)
         data[name] = ((*names, *dims), blank, attributes)
-        codecs = (ZstdCodec(level=3), Crc32cCodec())
+        large = np.dtype(kind).itemsize * math.prod(chunks) >= SMALLEST_COMPRESSED
+        codecs = (*((ZstdCodec(level=3),) if large else ()), Crc32cCodec())
         encoding[name] = {"chunks": chunks, "compressors": codecs, "fill_value": fill, "_FillValue": None}
     coordinates: dict[str, Any] = {
         "reason": [reason.name for reason in Reason],

@@ -102,6 +102,7 @@ def success_map(
     count: int = 100,
     seed: int = 0,
     progress: Progress | None = None,
+    known: list[np.ndarray] | None = None,
 ) -> SuccessMap:
     """Compute how probable it is that the grasps of a task are feasible.
 
@@ -113,6 +114,8 @@ def success_map(
         count: number of draws.
         seed: of the draws; equal seeds give equal draws, whatever the task.
         progress: called with the finished share; may raise `Cancelled`.
+        known: (R, H, A) which cells are feasible at the first draws, from a call with the same arguments that
+            was cancelled; those that are computed are added.
 
     Raises:
         InputError: the maps of so many draws are too large.
@@ -123,8 +126,10 @@ def success_map(
         raise InputError(
             "success", "draws", count, f"at most {most:,} for maps of {nominal.feasible.size:,} cells"
         )
-    found = []
+    found = [] if known is None else known
     for k, draw in enumerate(noise.draws(count, seed)):
+        if k < len(found):
+            continue
         own = Task(task.name, task.arms, moved(task.T_world_object, draw), task.supported)
         found.append(maker.map(arm, own, progress=part_of(progress, k, count)).feasible)
     return SuccessMap(nominal, np.array(found))

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from itertools import combinations
@@ -56,12 +56,14 @@ class Axis:
         file: the axis as the survey file has it.
         values: n values: numbers, positions (m), names of tasks, or entries of scene files.
         labels: n coordinates of the store: the numbers, or texts.
+        notes: which objects or hands are the same under two names, as those of a catalogue may be, in words.
     """
 
     name: str
     file: AxisFile
     values: tuple[Any, ...]
     labels: tuple[float, ...] | tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def moves_object(self) -> bool:
@@ -193,6 +195,11 @@ class Survey:
         return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person may not have meant, in words; see `Axis`."""
+        return tuple(note for axis in self.axes for note in axis.notes)
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Number of values of each axis."""
         return lengths(self.file)
@@ -268,7 +275,7 @@ def _resolved(field: str, axis: AxisFile, file: SurveyFile, scene: Scene, source
     Raises:
         SurveyError: a value cannot be put into the scene.
     """
-    values = list(_values(axis))
+    values, first, notes = list(_values(axis)), dict[Any, str](), list[str]()
     labels = tuple(_label(axis, value) for value in values)
     if len(set(labels)) < len(labels):
         raise SurveyError(source, field, list(labels), "values that differ")
@@ -278,11 +285,19 @@ def _resolved(field: str, axis: AxisFile, file: SurveyFile, scene: Scene, source
             changed = _changed(scene.content, file, scene, axis, value)
             if isinstance(axis, NumberAxis) and changed is not None:
                 SceneFile.model_validate(changed)
-            elif isinstance(axis, ObjectAxis):
-                values[k] = Scene.from_content(changed or {}, source, folder).content["object"]
-            elif isinstance(axis, HandAxis):
+            elif isinstance(axis, ObjectAxis | HandAxis):
                 built = Scene.from_content(changed or {}, source, folder)
-                values[k] = _arm_entry(built.content, _arm_of(axis, file, scene))["hand"]
+                if isinstance(axis, ObjectAxis):
+                    values[k] = built.content["object"]
+                    what = built.profile.points.tobytes(), built.object_mass
+                else:
+                    arm = built.arm(_arm_of(axis, file, scene))
+                    values[k] = _arm_entry(built.content, arm.name)["hand"]
+                    own = replace(arm.hand, name="", tool=None)  # the arm and its robot say where that is
+                    what = repr(own), arm.tool, arm.robot.model.sha256
+                same = first.setdefault(what, labels[k])
+                if same != labels[k]:
+                    notes.append(f"{field} ({axis.name}): {labels[k]} is the same as {same}")
         except ValidationError as error:
             expected = describe_error(error, changed)[-1]
             raise SurveyError(source, f"{field} ({axis.name})", labels[k], expected) from None
@@ -290,7 +305,7 @@ def _resolved(field: str, axis: AxisFile, file: SurveyFile, scene: Scene, source
             raise SurveyError(source, f"{field}.of", axis.of, str(error)) from None
         except SymgraspError as error:
             raise SurveyError(source, f"{field} ({axis.name})", labels[k], str(error)) from None
-    return Axis(axis.name, axis, tuple(values), labels)
+    return Axis(axis.name, axis, tuple(values), labels, tuple(notes))
 
 
 def _arm_of(axis: HandAxis, file: SurveyFile, scene: Scene) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from hypothesis import strategies as st
 from symgrasp.cli.main import main
 from symgrasp.errors import InputError, SurveyError, SymgraspError
 from symgrasp.feasibility.create import MapMaker
+from symgrasp.object.library import load_object
 from symgrasp.poses import from_position_rpy
+from symgrasp.robot.hand import HANDS
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.evaluation import Evaluator, State
 from symgrasp.survey.format import NumberAxis, SurveyFile
@@ -31,6 +34,7 @@ from symgrasp.world import open_world
 from tests.conftest import load_small
 
 X = {"name": "x", "of": "position.x", "from": 0.4, "to": 0.6, "count": 3}
+TWO_FINGERS = {"name": "two", "links": ["a"], "touch_links": ["a"], "joints": {"a": 1}, "min_opening": 0}
 SMALL = {"schema_version": 1, "name": "small", "scene": "pick_pour_place"}
 
 
@@ -76,6 +80,15 @@ def test_every_shipped_survey_loads():
         ({**X, "robot": "panda"}, "a robot only with"),
         ({"name": "t", "of": "task", "values": ["pick", "por"]}, "did you mean 'pour'"),
         ({"name": "o", "of": "object", "values": ["wine_botle"]}, "did you mean 'wine_bottle'"),
+        (
+            {"name": "o", "of": "object", "values": ["tumbler", {"name": "a", "mash": "a.stl"}]},
+            "axes[0].values[1].mash: 'a.stl': expected a key of the file format",
+        ),
+        (
+            {"name": "h", "of": "hand", "values": [TWO_FINGERS]},
+            "axes[0].values[0].max_opening: nothing: expected a value; this key is required",
+        ),
+        ({"name": "o", "of": "object", "values": [3]}, "axes[0].values[0]: 3: expected a text"),
         ({"name": "o", "of": "object", "values": [{"name": "a", "mesh": "no.stl"}]}, "no.stl"),
         ({"name": "h", "of": "hand", "values": ["frank"]}, "did you mean 'franka'"),
         ({"name": "p", "of": "position", "values": [[0.1, 0.2]]}, "axes[0].values[0]"),
@@ -86,6 +99,23 @@ def test_a_wrong_axis_is_refused_in_one_line(axis, message, tmp_path):
         survey_of([{k: v for k, v in axis.items() if v is not None}], tmp_path)
     assert message in str(raised.value)
     assert "survey.yaml" in str(raised.value)
+
+
+def test_one_object_or_hand_under_two_names_is_told(tmp_path):
+    """Products of a catalogue may be alike; each has its row, and that the rows are the same is said."""
+    points = load_object("can_330ml")[1].points.tolist()
+    same = {"name": "cola", "profile": points}
+    heavy = {"name": "full", "profile": points, "mass": 0.35}
+    objects = {"name": "o", "of": "object", "values": ["can_330ml", "tumbler", same, heavy]}
+    franka = {k: v for k, v in asdict(HANDS["franka"]).items() if v and k != "tool"} | {"min_opening": 0}
+    near = {**franka, "name": "shy", "clearance": 0.006}
+    hands = {"name": "g", "of": "hand", "values": ["franka", {**franka, "name": "mine"}, near]}
+    survey = survey_of([objects, hands], tmp_path)
+    assert survey.notes == (
+        "axes[0] (o): cola is the same as can_330ml",
+        "axes[1] (g): mine is the same as franka",
+    )
+    assert survey.shape == (4, 3)
 
 
 def test_the_command_line_says_what_is_wrong(tmp_path, capsys):

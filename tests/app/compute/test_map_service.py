@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +13,15 @@ from app.compute import map_service
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest
 from app.state import changes
-from app.state.requests import MapRequest
+from app.state.requests import ExplainRequest, MapRequest, ProbabilityRequest
 from app.state.state import State
 from symgrasp.errors import Cancelled, SymgraspError
+from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+from symgrasp.survey.success import PoseNoise
 from symgrasp.world import BulletWorld, open_world
 from tests.app.state.states import results_of, small_map
 from tests.conftest import load_small
@@ -59,6 +64,49 @@ def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(maps, mo
     for scene in others:
         maps.map(State.of(scene, "").request, quiet)
     assert worlds == [bottle, *others]
+
+
+def test_probabilities_go_on_after_a_cell_was_explained(maps, monkeypatch):
+    """What interrupts them does not restart them; with another noise they begin anew."""
+    monkeypatch.setattr(map_service, "DRAWS", 6)
+    request = State.of(load_small("bottle_on_table"), "").request
+    noise = PoseNoise(0.02, 0.05)
+    asked = ProbabilityRequest(request, noise)
+    whole = maps.probability(asked, quiet)
+    computed: list[Task] = []
+    compute = MapMaker.map
+
+    def counted(maker: MapMaker, arm: str, task: Task, **keys: Any) -> FeasibilityMap:
+        computed.append(task)
+        return compute(maker, arm, task, **keys)
+
+    monkeypatch.setattr(MapMaker, "map", counted)
+
+    def stop(share: float) -> None:
+        if share > 0.7:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        maps.probability(asked, stop)
+    before = len(computed)  # of the expected pose, of four draws, and the one that was cancelled
+    assert before == 6
+    maps.explain(ExplainRequest(request, Cell(0, 2, 3)), quiet)
+    del computed[:]
+    shares: list[float] = []
+    again = maps.probability(pickle.loads(pickle.dumps(asked)), shares.append)
+    assert len(computed) == 3  # of the expected pose, and of the two draws that are left
+    assert shares[0] > 0.65
+    assert again.draws == whole.draws == 6
+    assert np.array_equal(again.feasible, whole.feasible)
+    assert (whole.feasible % 6 > 0).any()  # the draws differ
+
+    with pytest.raises(Cancelled):
+        maps.probability(asked, stop)
+    other = ProbabilityRequest(request, replace(noise, position=0.0))
+    found = maps.probability(other, quiet)
+    monkeypatch.undo()
+    monkeypatch.setattr(map_service, "DRAWS", 6)
+    assert np.array_equal(found.feasible, MapService().probability(other, quiet).feasible)
 
 
 def test_progress_may_stop_it(maps):
