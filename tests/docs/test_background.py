@@ -1,0 +1,11 @@
+"""How long the page waits for maps is measured beside a survey that runs."""
+
+from __future__ import annotations
+
+from docs.background import waits
+
+
+def test_maps_are_timed_without_and_with_a_survey():
+    found = list(waits(count=3, rounds=2))
+    assert [runs for runs, _ in found] == 2 * [*3 * [False], *3 * [True]]
+    assert all(taken > 0 for _, taken in found)
