@@ -10,6 +10,7 @@ from symgrasp.survey.success import CONFIDENCE, interval
 
 from ..state.state import State
 from .escaping import escape
+from .hint import hint_html
 
 __all__ = [
     "bimanual_html",
@@ -91,7 +92,6 @@ def _probability_text(state: State) -> str:
 
 def status_html(state: State) -> str:
     """Say what to try and what is being computed, always in the same number of lines."""
-    name = escape(state.scene.file.object.name)
     doing = "Ready."
     if state.busy and state.is_waiting:
         share = f"{100 * state.busy.share:.0f} %"
@@ -104,11 +104,7 @@ def status_html(state: State) -> str:
             doing = f"{state.busy.label} … when other browsers have had their turn"
     elif state.is_stopped:
         doing = "Stopped." if state.is_current else "Stopped: no map for this pose yet."
-    return (
-        f'<div class="sg">Drag <b>Rotation</b>: the {name} turns and its map slides along, with nothing '
-        "computed anew. Then click a green cell to see the grasp.</div>"
-        f'<div class="sg sg-faint sg-line">{escape(doing)}</div>'
-    )
+    return f'<div class="sg">{hint_html(state)}</div><div class="sg sg-faint sg-line">{escape(doing)}</div>'
 
 
 def notes_html(state: State) -> str:

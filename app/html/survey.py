@@ -60,7 +60,7 @@ def places_html(state: State) -> str:
     width, height = far - low
     shapes = [_squares(places, colors), '<g pointer-events="none">']  # clicks are meant for the places
     for robot in state.scene.robots.values():
-        shapes.append(_base(Base.of(robot.T_world_base), INK))
+        shapes.append(_base(Base.of(robot.T_world_base), "currentColor"))
     for k, stand in enumerate(survey.stands, start=1):
         shapes.append(_base(stand.base, PICK, str(k)))
     x, y = state.T_world_object[:2, 3]

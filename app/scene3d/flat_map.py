@@ -14,7 +14,7 @@ from ..render.cell_colors import cell_colors
 from ..state.state import State
 from .cell_mesh import CellMesh, OnCell, flat_quads
 from .nodes import set_pose
-from .viewpoint import Viewpoint, stand_around
+from .viewpoint import Box, Viewpoint, stand_around
 
 __all__ = ["FLAT_SIZE", "FlatMap", "close_up", "flat_map_position"]
 
@@ -71,14 +71,25 @@ class FlatMap:
         Args:
             camera: see `Camera`.
         """
+        if (view := self._faced(camera)) is not self._view:
+            self._turn(view)
+
+    def box(self, camera: Sequence[float]) -> Box:
+        """Return the box that it fills once a camera is there; see `face`."""
+        width, height = FLAT_SIZE
+        return np.array([width, height, 0.01]) / 2, self._pose(self._faced(camera))
+
+    def _faced(self, camera: Sequence[float]) -> Viewpoint:
         seen = self._view.seen_from((*camera[:3], *self._position))
-        if seen.direction @ self._view.direction < MIN_FACING:
-            self._turn(seen)
+        return seen if seen.direction @ self._view.direction < MIN_FACING else self._view
 
     def _turn(self, view: Viewpoint) -> None:
         self._view = view
+        set_pose(self.frame, self._pose(view))
+
+    def _pose(self, view: Viewpoint) -> Array:
         axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
-        set_pose(self.frame, from_rotation(axes, self._position))
+        return from_rotation(axes, self._position)
 
     def show(self, state: State) -> None:
         """Update it to a state."""

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from symgrasp.poses import Array
+from symgrasp.poses import Array, rotation_z
 
 from ..render.drawn_poses import drawn_joint_values, drawn_object_pose
 from ..state.page_link import Camera
 from ..state.state import State
-from .viewpoint import FIELD_OF_VIEW
+from .flat_map import FlatMap
+from .viewpoint import FIELD_OF_VIEW, Box, box_of, hides, link_boxes
 
-__all__ = ["followed", "points_to_follow"]
+__all__ = ["followed", "hidden_points", "objects_of_plan", "points_to_follow", "unhidden"]
 
 KEPT = 0.88
 """Share of the view, from its middle, in which everything is kept that is followed."""
 
 NEAREST = 0.15
 """Least distance (m) in front of the camera."""
+
+TURNS = np.deg2rad([0, 15, -15, 30, -30, 45, -45, 60, -60, 75, -75, 90, -90, 120, -120, 150, -150, 180])
+"""Angles (rad) that the camera may be turned by about the vertical; the first wins a tie."""
+
+ALONG, AROUND = 5, 6
+"""Heights, and points around each, of the object's surface that are to be seen."""
 
 
 def points_to_follow(state: State) -> Array:
@@ -70,3 +79,62 @@ def followed(camera: Camera, points: Array, aspect: float) -> Camera:
         return camera
     moved = across * right + upwards * up
     return tuple(float(v) for v in (*(eye + moved - back * forward), *(look_at + moved)))
+
+
+def objects_of_plan(state: State) -> list[Array]:
+    """Return points (n, 3) of the object's surface: as it is drawn, then in every task of the plan."""
+    profile = state.scene.profile
+    heights = np.linspace(profile.h_min, profile.h_max, ALONG)
+    around = np.arange(AROUND) * 2 * np.pi / AROUND
+    x, y = profile.radius(heights)[:, None] * np.stack([np.cos(around), np.sin(around)])[:, None]
+    surface = np.stack(np.broadcast_arrays(x, y, heights[:, None], 1.0), axis=-1).reshape(-1, 4)
+    tasks = state.plan.plan.tasks if state.plan else []
+    poses = [drawn_object_pose(state), *(task.object_pose_turned.array() for task in tasks)]
+    return [(surface @ pose.T)[:, :3] for pose in poses]
+
+
+def hidden_points(camera: Camera, points: Array, boxes: Sequence[Box]) -> int:
+    """Return how many of the points (n, 3) boxes hide from a camera."""
+    eye = np.array(camera[:3])
+    return int(np.any([hides(box, points, eye) for box in boxes], axis=0).sum()) if boxes else 0
+
+
+def unhidden(camera: Camera, state: State, aspect: float, flat_map: FlatMap | None = None) -> Camera:
+    """Return the camera that follows a plan and sees the object, which obstacles may hide.
+
+    Where they hide it, the camera is turned about the vertical through the object, by that of `TURNS` from
+    which least of the object is hidden: first as it is drawn, then in all tasks of the plan.
+
+    Args:
+        camera: where it is.
+        state: the state, with a plan.
+        aspect: ratio of width to height of the view.
+        flat_map: which may hide the object as well, where it is shown.
+    """
+    points, objects = points_to_follow(state), objects_of_plan(state)
+    obstacles = [box for o in state.scene.obstacles if (box := box_of(o))]
+
+    def hidden(camera: Camera) -> list[int]:
+        boxes = [*obstacles, flat_map.box(camera)] if flat_map else obstacles
+        return [hidden_points(camera, points, boxes) for points in objects]
+
+    after = followed(camera, points, aspect)
+    if not hidden(after)[0]:
+        return after
+
+    links = link_boxes(state.scene, drawn_joint_values(state))
+
+    def cost(camera: Camera) -> tuple[int, int, int]:
+        now, *later = hidden(camera)
+        return now, hidden_points(camera, objects[0], links), sum(later)
+
+    middle = objects[0].mean(axis=0)
+    turned = (followed(_turned(camera, middle, turn), points, aspect) for turn in TURNS)
+    return min(turned, key=cost)
+
+
+def _turned(camera: Camera, middle: Array, angle: float) -> Camera:
+    """Return a camera turned about the vertical through a point (3,)."""
+    ends = np.array(camera).reshape(2, 3)
+    around = (ends - middle) @ rotation_z(angle)[:3, :3].T + middle
+    return tuple(float(v) for v in around.ravel())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 import viser
@@ -15,7 +16,7 @@ from ..state.page_link import Camera
 from ..state.state import State
 from .backdrop import add_floor, add_lights, add_obstacle
 from .flat_map import FlatMap, close_up
-from .following import followed, points_to_follow
+from .following import followed, points_to_follow, unhidden
 from .ghost_view import GhostView
 from .nodes import set_pose
 from .object_view import ObjectView
@@ -106,9 +107,10 @@ class SceneView:
             self._follow(state)
 
     def camera_moved(self, camera: Camera) -> None:
-        """Turn the flat map to the camera where it can no longer be read from there."""
+        """Turn the flat map to the camera where it can no longer be read from there; on any thread."""
         if self.flat_map:
-            self.flat_map.face(camera)
+            with suppress(RuntimeError):  # it was removed: another is about to take its place
+                self.flat_map.face(camera)
 
     def _build(self, state: State) -> None:
         """Replace all nodes by those of another scene."""
@@ -168,13 +170,18 @@ class SceneView:
         self._scene = state.scene
 
     def _follow(self, state: State) -> None:
-        """Move the camera where what is shown of a plan has changed and would be out of view."""
+        """Move the camera where what is shown of a plan has changed and would be out of view or hidden."""
         before, self._followed = self._followed, _shown_of_plan(state)
         if state.shown_task is None or self._followed == before:
             return
         camera = self.client.camera
         now = tuple(float(v) for v in (*camera.position, *camera.look_at))
-        after = followed(now, points_to_follow(state), camera.image_width / max(camera.image_height, 1))
+        aspect = camera.image_width / max(camera.image_height, 1)
+        if self._followed[:-1] == before[:-1]:  # it is being played: to be turned around would confuse
+            after = followed(now, points_to_follow(state), aspect)
+        else:
+            flat_map = self.flat_map if state.display.flat_map else None
+            after = unhidden(now, state, aspect, flat_map)
         if after != now:
             camera.position, camera.look_at = np.array(after[:3]), np.array(after[3:])
 

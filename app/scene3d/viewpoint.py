@@ -12,7 +12,16 @@ from symgrasp.poses import Array, translation
 from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 
-__all__ = ["FIELD_OF_VIEW", "Viewpoint", "choose_viewpoint", "stand_around"]
+__all__ = [
+    "FIELD_OF_VIEW",
+    "Box",
+    "Viewpoint",
+    "box_of",
+    "choose_viewpoint",
+    "hides",
+    "link_boxes",
+    "stand_around",
+]
 
 
 FIELD_OF_VIEW = np.deg2rad(42)
@@ -123,11 +132,11 @@ def choose_viewpoint(
         reach = np.abs((np.concatenate([bases, points, centres]) - look_at) @ right).max() + margin
         return Viewpoint(look_at, direction, float(max(MIN_WIDTH, 2 * reach)), in_view)
 
-    boxes = [box for o in scene.obstacles if (box := _box(o))] + _link_boxes(scene, values or {})
+    boxes = [box for o in scene.obstacles if (box := box_of(o))] + link_boxes(scene, values or {})
 
     def cost(view: Viewpoint) -> float:
         eye = view.camera(aspect=1.0)
-        hidden = sum(_hides(box, point, eye) for box in boxes for point in points)
+        hidden = sum(int(hides(box, points, eye).sum()) for box in boxes)
         return hidden + 2 * abs(float(T_world_object[:3, 2] @ view.direction))
 
     return min((view(start + a) for a in AZIMUTHS), key=cost)
@@ -155,11 +164,11 @@ def stand_around(scene: Scene, T_world_object: Array) -> bool:
     return len(bases) > 1 and bool(np.linalg.norm((middle[:3] - bases.mean(axis=0))[:2]) < AROUND)
 
 
-_Box = tuple[Array, Array]
+Box = tuple[Array, Array]
 """Half of the sizes (3,) of a box, and the pose (4, 4) of its middle in the world."""
 
 
-def _box(o: Obstacle) -> _Box | None:
+def box_of(o: Obstacle) -> Box | None:
     """Return the bounding box of a box or cylinder; None for any other obstacle."""
     if o.kind == "box":
         return np.array(o.size) / 2, o.T_world_obstacle
@@ -168,7 +177,7 @@ def _box(o: Obstacle) -> _Box | None:
     return None
 
 
-def _link_boxes(scene: Scene, values: Mapping[str, Array]) -> list[_Box]:
+def link_boxes(scene: Scene, values: Mapping[str, Array]) -> list[Box]:
     """Return boxes around the pieces of the links of robots at joint values."""
     boxes = []
     for name, q in values.items():
@@ -181,13 +190,13 @@ def _link_boxes(scene: Scene, values: Mapping[str, Array]) -> list[_Box]:
     return boxes
 
 
-def _hides(box: _Box, point: Array, eye: Array) -> bool:
-    """Return whether a box intersects the line from eye to point."""
+def hides(box: Box, points: Array, eye: Array) -> Array:
+    """Return for points (n, 3) whether a box intersects the lines from the eye (3,) to them: (n,)."""
     half, T_world_box = box
     to_local = np.linalg.inv(T_world_box)
-    start, end = (to_local @ [*p, 1.0] for p in (point, eye))
-    step = end[:3] - start[:3]
+    start = points @ to_local[:3, :3].T + to_local[:3, 3]
+    step = to_local[:3, :3] @ eye + to_local[:3, 3] - start
     step = np.where(np.abs(step) < 1e-12, 1e-12, step)
-    near, far = np.sort([(-half - start[:3]) / step, (half - start[:3]) / step], axis=0)
-    enter, leave = near.max(), far.min()
-    return bool(leave > max(enter, 0.01) and enter < 1.0)
+    near, far = np.sort([(-half - start) / step, (half - start) / step], axis=0)
+    enter, leave = near.max(axis=-1), far.min(axis=-1)
+    return (leave > np.maximum(enter, 0.01)) & (enter < 1.0)

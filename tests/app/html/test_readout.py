@@ -9,6 +9,7 @@ import math
 
 from app.html.readout import grasp_html, notes_html, solution_html, status_html
 from app.state import changes, job_changes
+from app.state.plans import plan_changes
 from app.state.requests import MapResult
 from app.state.state import State
 from symgrasp.feasibility.create import create_map
@@ -46,6 +47,19 @@ def test_the_readout_says_how_and_why_not():
     assert "panda cannot hold it here: " + missed.map.why(missed.cell) in grasp_html(missed)
     assert "waits for the map" in grasp_html(changes.moved(missed, x=0.5))
     assert "No grasp picked" in grasp_html(state)
+
+
+def test_the_hint_follows_what_is_shown():
+    state = opened("pick_pour_place")
+    picked = changes.choose_cell(state, 4, 12)
+    planned = with_plan("pick_pour_place", "sequential")
+    together = with_plan("log_two_robots", "bimanual")
+    climbing = plan_changes.show_frame(with_plan("log_two_robots", "bimanual", "hill_climb"), 0)
+    hints = [status_html(shown) for shown in (state, picked, planned, together, climbing)]
+    words = ["click a green cell", "Click another cell", "common cells", "the gap", "hill climbing"]
+    for k, hint in enumerate(hints):
+        assert [word in hint for word in words] == [k == at for at in range(len(words))]
+    assert status_html(changes.clear_pick(planned)) == hints[0]
 
 
 def test_what_is_computed_but_not_drawn_yet_is_not_left_at_its_last_percent():

@@ -17,7 +17,8 @@ from app.scene3d.scene_view import SceneView
 from app.scene3d.viewpoint import FIELD_OF_VIEW
 from app.server.door.viser_server import quiet_server
 from app.state.page_link import Camera
-from app.state.plans.plan_changes import show_step
+from app.state.plans.plan_changes import show_position, show_step
+from app.state.state import State
 from tests.app.state.states import opened, with_plan
 
 SIZE = (468, 800)
@@ -115,3 +116,57 @@ def test_a_page_that_comes_back_is_seen_from_where_it_was(view, camera):
     view.camera = left
     view.show(with_plan("pick_pour_place", "sequential"), move_gizmo=True)
     assert pose(camera) == left
+
+
+def behind_obstacles(state: State, camera: Camera) -> int:
+    """How many points of the object's axis have an obstacle before them, by samples of the lines of sight."""
+    profile, eye = state.scene.profile, np.array(camera[:3])
+    heights = np.linspace(profile.h_min, profile.h_max, 9)
+    axis = np.stack([0 * heights, 0 * heights, heights, heights**0], axis=-1) @ state.T_world_object.T
+    shares = np.linspace(0.02, 1, 400)[:, None, None]
+    samples = axis[:, :3] + shares * (eye - axis[:, :3])
+    hidden = np.zeros(len(axis), dtype=bool)
+    boxes = [obstacle for obstacle in state.scene.obstacles if obstacle.kind == "box"]
+    assert len(boxes) == 3
+    for box in boxes:
+        local = (samples - box.T_world_obstacle[:3, 3]) @ box.T_world_obstacle[:3, :3]
+        hidden |= (np.abs(local) <= np.array(box.size) / 2).all(axis=-1).any(axis=0)
+    return int(hidden.sum())
+
+
+@pytest.mark.parametrize("azimuth", range(0, 360, 45))
+def test_no_obstacle_is_before_the_object_of_a_plan(view, camera, azimuth):
+    view.show(opened("pick_pour_place"), move_gizmo=True)
+    state = with_plan("pick_pour_place", "sequential")
+    assert state.plan
+    for step in range(len(state.plan.plan.tasks)):
+        state = show_step(state, step)
+        middle = state.T_world_object[:3, 3]
+        angle = np.deg2rad(azimuth)
+        eye = middle + np.array([1.2 * np.cos(angle), 1.2 * np.sin(angle), 0.1])
+        camera.position, camera.look_at = eye, middle
+        view.show(state, move_gizmo=True)
+        assert behind_obstacles(state, pose(camera)) == 0
+        assert (np.abs(seen(pose(camera), points_to_follow(state), SIZE[0] / SIZE[1])) <= KEPT + 1e-6).all()
+
+
+def test_what_plays_turns_no_camera_around(view, camera):
+    state = with_plan("pick_pour_place", "sequential")
+    view.show(state, move_gizmo=True)
+    wall = next(o for o in state.scene.obstacles if o.name == "wall").T_world_obstacle[:3, 3]
+    middle = state.T_world_object[:3, 3]
+    camera.position, camera.look_at = middle + 8 * (wall - middle) * [1, 1, 0], middle
+    before = pose(camera)
+    assert behind_obstacles(state, before)
+    view.show(show_position(state, 0.3), move_gizmo=True)
+    after = pose(camera)
+    ahead, later = (np.array(c[3:]) - c[:3] for c in (before, after))
+    assert np.cross(ahead, later) == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_a_camera_moves_while_its_scene_is_replaced(view):
+    view.show(opened("pick_pour_place"), move_gizmo=True)
+    assert view.flat_map
+    view.flat_map.frame.remove()
+    for azimuth in np.linspace(0, 2 * np.pi, 5):
+        view.camera_moved((3 * np.cos(azimuth), 3 * np.sin(azimuth), 1.0, 0.0, 0.0, 0.0))
