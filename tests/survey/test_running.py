@@ -59,6 +59,30 @@ if __name__ == "__main__":
 """
 
 
+KILLED_WRITING = """
+import os, signal, sys
+from symgrasp.survey.evaluation import Evaluator
+from symgrasp.survey.store import SurveyStore, create_store
+from symgrasp.survey.survey import Survey
+
+def written(store, state):
+    names = before(store, state)
+    yield from names[: int(sys.argv[3])]
+    os.kill(os.getpid(), signal.SIGKILL)
+
+survey = Survey.load(sys.argv[1])
+with Evaluator(survey) as evaluator:
+    batches = [{p: evaluator.point(p) for p in survey.points_of(b)} for b in (0, 1)]
+store, before = SurveyStore(sys.argv[2], survey), SurveyStore._written
+store.write(0, batches[0])
+SurveyStore._written = written
+store.write(1, batches[1])
+"""
+
+VARIABLES = ["share", "best", "margin", "cells", "feasible", "state"]
+"""Of which a batch of the survey has a chunk, as they are written."""
+
+
 @pytest.fixture(scope="module")
 def file(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("survey") / "tiny.yaml"
@@ -156,6 +180,34 @@ def test_a_killed_run_goes_on(survey, file, one_go, tmp_path):
     half_written.touch()
     run_survey(survey, out)
     assert content(out) == content(one_go)
+
+
+@pytest.mark.parametrize("count", range(len(VARIABLES)))
+def test_a_region_that_is_written_in_part_is_computed_anew(survey, file, one_go, tmp_path, count):
+    """A process is killed after some chunks of a batch were written; beside them lies half of one."""
+    out, script = tmp_path / "b.zarr", tmp_path / "killed.py"
+    create_store(out, survey)
+    script.write_text(KILLED_WRITING)
+    program = [sys.executable, str(script), str(file), str(out), str(count)]
+    assert subprocess.run(program, check=False).returncode == -signal.SIGKILL
+    (where,) = [p.parent.relative_to(one_go / "share/c") for p in chunks(one_go / "share/c")[1:2]]
+    there = {name: len(chunks(out / name / "c")) for name in VARIABLES}
+    assert there == {name: 1 + (k < count) for k, name in enumerate(VARIABLES)}
+    half = out / VARIABLES[count] / "c" / where / "a.partial"
+    half.parent.mkdir(parents=True, exist_ok=True)
+    half.write_bytes(b"half")
+    store = SurveyStore(out, survey)
+    assert store.missing() == list(range(1, survey.batches))
+    with Evaluator(survey) as evaluator:
+        for batch in store.missing():
+            store.write(batch, {p: evaluator.point(p) for p in survey.points_of(batch)})
+    store.remove_partial()
+    assert content(out) == content(one_go)
+
+
+def chunks(folder: Path) -> list[Path]:
+    """Return the chunks of a variable."""
+    return sorted(p for p in folder.rglob("*") if p.is_file())
 
 
 @pytest.fixture

@@ -123,6 +123,42 @@ def test_the_plan_for_success_holds(shared):
         assert (hold.margin_along, hold.margin_around) == pytest.approx(tuple(own))
 
 
+@pytest.mark.parametrize("shared", [True, False])
+def test_no_grasp_of_the_sequence_is_more_probable(shared):
+    """Against a plain loop: every draw of every task has its map computed alone, every grasp is tried."""
+    scene, sigma, tilt, count = load_small("pick_pour_place", 6, 12, 4), 0.03, 0.1, 5
+    found = plan_for_success(scene, PoseNoise(sigma, tilt, shared=shared), count=count, seed=4)
+    expected, drawn = [], []
+    for k, task in enumerate(scene.tasks.values()):
+        rng = np.random.default_rng(4 if shared else 4 + k)
+        expected.append(create_map(scene, task=task.name).feasible)
+        maps = []
+        for x, y, z, a, b in rng.standard_normal((count, 5)) * [sigma, sigma, sigma, tilt, tilt]:
+            T = np.eye(4)
+            T[:3, :3] = Rotation.from_rotvec([a, b, 0]).as_matrix() @ task.T_world_object[:3, :3]
+            T[:3, 3] = task.T_world_object[:3, 3] + [x, y, z]
+            own = scene.with_task(replace(task, T_world_object=T))
+            maps.append(create_map(own, task=task.name).feasible)
+        drawn.append(np.array(maps))
+
+    def probability(roll: int, row: int, columns: tuple[int, ...]) -> float:
+        held = [own[:, roll, row, column] for own, column in zip(drawn, columns, strict=True)]
+        if shared:
+            return float(np.logical_and.reduce(held).mean())
+        return float(np.prod([own.mean() for own in held]))
+
+    best = 0.0
+    for roll, row in np.ndindex(expected[0].shape[:2]):
+        choices = [np.flatnonzero(own[roll, row]).tolist() for own in expected]
+        best = max([best, *(probability(roll, row, columns) for columns in product(*choices))])
+    assert found.probability == pytest.approx(best)
+    grasp = found.plan.tasks[0].holds[0].grasp
+    cells = [scene.manifold.cell(grasp.h, grasp.theta + task.delta) for task in found.plan.tasks]
+    own = probability(ROLLS.index(grasp.roll), cells[0][0], tuple(column for _, column in cells))
+    assert found.probability == pytest.approx(own)
+    assert 0 < found.probability < 1
+
+
 def test_no_grasp_no_plan():
     scene = load_small("bottle_on_table", 3, 8, 2)
     far = replace(scene.task(), T_world_object=np.eye(4) + np.eye(4, k=3) * 5)
