@@ -12,6 +12,9 @@ from symgrasp.poses import Array
 
 __all__ = ["Balance", "Linkage", "Workspace", "new_workspace"]
 
+WAITING = 256
+"""Stretches of a line that may wait for proofs: more than there ever are, see `line_clearance`."""
+
 
 class Balance(NamedTuple):
     """What keeps robots that can fall on their feet: R robots with E edges of the areas that these span.
@@ -96,6 +99,10 @@ class Workspace(NamedTuple):
         frames: (J, 12) present joint frames in the world.
         simplex: (4, 3) for `distance_bounds`.
         q: (5, J) joint values.
+        twist: (J, 6) how each joint frame turns (3,) and moves (3,), in m per unit of the path's parameter, at
+            the origin of the world.
+        waiting: (W, 3) stretches of a line that wait for proofs: both ends, and half the length of the one
+            beside it.
         speed: (M, 2) speed and acceleration (m per unit of the path's parameter) of the points of each piece.
         load: (J, 5) mass (kg) and mass times position (kg m) in the world of all that a joint carries, and
             how far (rad) all joints before it turn together.
@@ -108,6 +115,8 @@ class Workspace(NamedTuple):
     frames: Array
     simplex: Array
     q: Array
+    twist: Array
+    waiting: Array
     speed: Array
     load: Array
     hit: np.ndarray
@@ -122,6 +131,8 @@ def new_workspace(linkage: Linkage, pieces: PackedPieces, pose: Array) -> Worksp
         frames=np.empty((joints, 12)),
         simplex=np.empty((4, 3)),
         q=np.empty((5, joints)),
+        twist=np.empty((joints, 6)),
+        waiting=np.empty((WAITING, 3)),
         speed=np.empty((len(linkage.piece), 2)),
         load=np.empty((joints, 5)),
         hit=np.full(2, -1, dtype=np.int64),

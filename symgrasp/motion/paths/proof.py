@@ -1,9 +1,9 @@
 """Proofs that straight lines in joint space are free, by conservative advancement. Compiled.
 
 At a point of the line every pair of pieces is certified to be apart by some distance, see
-`symgrasp.collision.distance`. No point of a piece moves further in the next stretch of the line than its
-speed and the largest acceleration allow, so a stretch in which no piece can use up the distance is free as a
-whole: the proof goes on at its end. Nothing is sampled.
+`symgrasp.collision.distance`. No point of a piece moves further in a stretch of the line to both sides of it
+than its speed and the largest acceleration allow, so a stretch in which no piece can use up the distance is
+free as a whole. The line is proven when such stretches cover all of it. Nothing is sampled.
 
 For joint values ``q + t·d``, a point of a piece has the speed ``Σ dⱼ ∂p/∂qⱼ`` at ``t = 0``, and since
 ``∂²p/∂qᵢ∂qⱼ`` is no longer than ``∂p/∂qⱼ`` if i comes before j in the chain, its acceleration is at most
@@ -34,6 +34,15 @@ SHARE = 0.7
 FAR = 0.1
 """No piece moves further (m) in a stretch: distances above it need not be known."""
 
+EXPECTED = 0.95
+"""Share of the length of a stretch that is expected of those beside it."""
+
+SHORTEST = 1e-12
+"""Parts of a line that are shorter are gaps by rounding between stretches that meet."""
+
+MANY = 64
+"""So many stretches may wait for proofs before the newest is looked at first."""
+
 CLOSEST_ANGLE = 1e-4
 """The same as `CLOSEST` for the angle (rad) that is left to the largest tilt."""
 
@@ -61,46 +70,72 @@ def clearances(linkage, pieces, tree, work, start, end, most, found, hits):
         hits: (E, 2) receives the pair of pieces that each blocked line meets first.
     """
     for e in range(len(start)):
-        found[e, 0], found[e, 1] = line_clearance(linkage, pieces, tree, work, start[e], end[e], most)
+        found[e, 0], found[e, 1] = line_clearance(linkage, pieces, tree, work, start[e], end[e], most, 0.5)
         hits[e, 0], hits[e, 1] = work.hit[0], work.hit[1]
 
 
 @njit(**FAST)
-def line_clearance(linkage, pieces, tree, work, start, end, most):
+def line_clearance(linkage, pieces, tree, work, start, end, most, first):
     """Return clearance and room (m), at most ``most``, that a line (J,) to (J,) is proven to have.
 
-    Both are `BLOCKED` where it is not proven free; see `clearances`.
+    Both are `BLOCKED` where it is not proven free; see `clearances`. Then ``work.hit`` names the pair of pieces.
 
-    Then ``work.hit`` names the pair of pieces.
+    Each proof at a point covers a stretch to both sides of it. What is left of the line waits in a queue, so
+    that points far from each other are looked at first, and a line that is not free is given up early.
+
+    Args:
+        linkage, pieces, tree, work, start, end, most: see `clearances`.
+        first: where on the line (0 to 1) to look first.
     """
-    q, d = work.q[0], work.q[1]
+    q, d, waiting = work.q[0], work.q[1], work.waiting
     count = len(q)
     for j in range(count):
         d[j] = end[j] - start[j]
-    t, least, room = 0.0, most, most
+    for k in range(len(linkage.piece)):
+        work.speed[k, 1] = _acceleration(linkage, d, k, -1)
+    least, room = most, most
+    low, high, t, expected = 0.0, 1.0, first, 1.0
+    head, left = 0, 0
     while True:
         for j in range(count):
             q[j] = start[j] + t * d[j] if t < 1.0 else end[j]
         place(linkage, pieces.size, work, q)
-        step = 1.0 - t
+        step = min(max(t - low, high - t), expected)
         if linkage.tilted >= 0:
             step = _tilt_step(linkage, work, d, step)
             if step < 0.0:
                 return BLOCKED, BLOCKED
+        _twists(linkage, work, d)
         for k in range(len(linkage.piece)):
-            v, a = _rates(linkage, work, d, k, -1)
-            work.speed[k, 0], work.speed[k, 1] = v, a
+            v, a = _speed(linkage, work, k, -1), work.speed[k, 1]
+            work.speed[k, 0] = v
             step = min(step, _time(FAR, v, a))
         step, least, room = _free_step(linkage, pieces, tree, work, d, step, least, room)
         if step >= 0.0 and len(linkage.balance.edge):
             step, room = _standing_step(linkage, work, d, step, room)
-        if step < 0.0:
+        if step < 0.0 or left > len(waiting) - 2:
             return BLOCKED, BLOCKED
-        if t >= 1.0:
+        for side in range(2):
+            a, b = (low, t - step) if side == 0 else (t + step, high)
+            if b - a > SHORTEST:
+                place_in_queue = (head + left) % len(waiting)
+                waiting[place_in_queue, 0], waiting[place_in_queue, 1] = a, b
+                waiting[place_in_queue, 2] = step
+                left += 1
+        if left == 0:
             return max(least, 0.0), max(room, 0.0)
-        t += step
-        if t > 1.0 - 1e-9:
-            t = 1.0
+        # The oldest stretch is the longest; the newest when many wait, so that their number stays small.
+        left -= 1
+        taken = head
+        if left < MANY:
+            head = (head + 1) % len(waiting)
+        else:
+            taken = (head + left) % len(waiting)
+        low, high, step = waiting[taken, 0], waiting[taken, 1], waiting[taken, 2]
+        # Points in the middles of equal parts need the fewest of them, if they are all as far from things.
+        parts = math.ceil((high - low) / (2.0 * EXPECTED * step))
+        t = low + (parts // 2 + 0.5) * (high - low) / parts
+        expected = (high - low) / parts
 
 
 @njit(**FAST)
@@ -143,7 +178,7 @@ def _free_step(linkage, pieces, tree, work, d, step, least, room):
         The step, -1 where a pair is too close, the clearance and the room.
     """
     box = work.box
-    for k in range(len(linkage.piece)):
+    for k in range(len(linkage.piece) - 1, -1, -1):  # the last ones move most, and hit most
         keep = linkage.margin[k] + FREE_BAND
         if keep == math.inf:
             continue
@@ -172,9 +207,9 @@ def _free_step(linkage, pieces, tree, work, d, step, least, room):
         if boxes_apart(box, own, p, box, keep + max(moved / SHARE, moved + known, CLOSEST)):
             continue
         if other >= 0 and linkage.common[i] >= 0:
-            v, a = _rates(linkage, work, d, k, linkage.common[i])
-            w, b = _rates(linkage, work, d, other, linkage.common[i])
-            v, a = v + w, a + b
+            stop = linkage.common[i]
+            v = _speed(linkage, work, k, stop) + _speed(linkage, work, other, stop)
+            a = _acceleration(linkage, d, k, stop) + _acceleration(linkage, d, other, stop)
         if linkage.rests[i]:
             step, moved, room = _pair_step(pieces, work, own, p, keep, v, a, step, room)
         else:
@@ -211,37 +246,59 @@ def _time(distance, v, a):
 
 
 @njit(**FAST)
-def _rates(linkage, work, d, k, stop):
-    """Return the largest speed and acceleration of points of moving piece k, for rates d (J,) of the joints.
-
-    Only joints after joint ``stop`` of its chain move.
-    """
-    box, frames = work.box, work.frames
-    p = linkage.piece[k]
-    c0 = 0.5 * (box[p, 0] + box[p, 3])
-    c1 = 0.5 * (box[p, 1] + box[p, 4])
-    c2 = 0.5 * (box[p, 2] + box[p, 5])
-    v0 = v1 = v2 = w0 = w1 = w2 = 0.0
-    later = a = 0.0
-    j = linkage.frame[k]
-    while j != stop:
-        f, axis, rate = frames[j], linkage.axis[j], d[j]
+def _twists(linkage, work, d):
+    """Write how each joint frame turns and moves at rates d (J,): its rotation, and what passes the origin."""
+    frames, twist = work.frames, work.twist
+    for j in range(len(d)):
+        f, axis, rate, parent = frames[j], linkage.axis[j], d[j], linkage.parent[j]
+        for i in range(6):
+            twist[j, i] = twist[parent, i] if parent >= 0 else 0.0
         x0 = rate * (f[0] * axis[0] + f[1] * axis[1] + f[2] * axis[2])
         x1 = rate * (f[3] * axis[0] + f[4] * axis[1] + f[5] * axis[2])
         x2 = rate * (f[6] * axis[0] + f[7] * axis[1] + f[8] * axis[2])
         if linkage.slides[j]:
-            v0, v1, v2 = v0 + x0, v1 + x1, v2 + x2
+            twist[j, 3] += x0
+            twist[j, 4] += x1
+            twist[j, 5] += x2
         else:
-            w0, w1, w2 = w0 + x0, w1 + x1, w2 + x2
-            r0, r1, r2 = c0 - f[9], c1 - f[10], c2 - f[11]
-            v0, v1, v2 = v0 + x1 * r2 - x2 * r1, v1 + x2 * r0 - x0 * r2, v2 + x0 * r1 - x1 * r0
-        rate = abs(rate)
+            twist[j, 0] += x0
+            twist[j, 1] += x1
+            twist[j, 2] += x2
+            twist[j, 3] += x2 * f[10] - x1 * f[11]
+            twist[j, 4] += x0 * f[11] - x2 * f[9]
+            twist[j, 5] += x1 * f[9] - x0 * f[10]
+
+
+@njit(**FAST)
+def _speed(linkage, work, k, stop):
+    """Return the largest speed of points of moving piece k, where only joints after ``stop`` move; -1: all."""
+    box, twist, p, j = work.box, work.twist, linkage.piece[k], linkage.frame[k]
+    c0 = 0.5 * (box[p, 0] + box[p, 3])
+    c1 = 0.5 * (box[p, 1] + box[p, 4])
+    c2 = 0.5 * (box[p, 2] + box[p, 5])
+    w0, w1, w2, v0, v1, v2 = twist[j, 0], twist[j, 1], twist[j, 2], twist[j, 3], twist[j, 4], twist[j, 5]
+    if stop >= 0:
+        w0, w1, w2 = w0 - twist[stop, 0], w1 - twist[stop, 1], w2 - twist[stop, 2]
+        v0, v1, v2 = v0 - twist[stop, 3], v1 - twist[stop, 4], v2 - twist[stop, 5]
+    v0 += w1 * c2 - w2 * c1
+    v1 += w2 * c0 - w0 * c2
+    v2 += w0 * c1 - w1 * c0
+    v = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    return v + math.sqrt(w0 * w0 + w1 * w1 + w2 * w2) * linkage.radius[k]
+
+
+@njit(**FAST)
+def _acceleration(linkage, d, k, stop):
+    """Return the largest acceleration of points of moving piece k at rates d (J,) of joints after ``stop``."""
+    later = a = 0.0
+    j = linkage.frame[k]
+    while j != stop:
+        rate = abs(d[j])
         if not linkage.slides[j]:
             a += 2.0 * rate * later + rate * rate * linkage.lever[k, j]
         later += rate * linkage.lever[k, j]
         j = linkage.parent[j]
-    v = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
-    return v + math.sqrt(w0 * w0 + w1 * w1 + w2 * w2) * linkage.radius[k], a
+    return a
 
 
 @njit(**FAST)
@@ -310,7 +367,7 @@ def _standing_step(linkage, work, d, step, room):
         if left < CLOSEST:
             work.hit[0] = work.hit[1] = FALLEN
             return -1.0, room
-        v = max(v, 0.0)
+        v = abs(v)  # the stretch goes both ways
         step = min(step, _time(SHARE * left, v, a))
         room = min(room, left - v * step - 0.5 * a * step * step)
     return step, room

@@ -156,10 +156,8 @@ def _extend(linkage, pieces, tree, work, trees, side, target, low, high):
             left += (target[j] - node[new, j]) ** 2
         if left >= least:  # the projection led back
             return -1, False
-    # Most lines that are not free end inside of something, and a look there costs little.
-    if line_clearance(linkage, pieces, tree, work, node[new], node[new], 0.0)[0] < 0.0 or (
-        line_clearance(linkage, pieces, tree, work, node[nearest], node[new], 0.0)[0] < 0.0
-    ):
+    # Most lines that are not free end inside of something.
+    if line_clearance(linkage, pieces, tree, work, node[nearest], node[new], 0.0, 1.0)[0] < 0.0:
         trees.met[work.hit[0]] += 1
         trees.met[work.hit[1]] += 1
         return -1, False
@@ -223,7 +221,7 @@ def shorten(linkage, pieces, tree, work, path, count, random, tries):
         random: (1,) state of the random numbers.
         tries: how many lines to try.
     """
-    a, b, middle = work.q[2], work.q[3], work.q[4]
+    a, b = work.q[2], work.q[3]
     idle = 0
     for _ in range(tries):
         if count < 3 or idle == IDLE:
@@ -239,18 +237,13 @@ def shorten(linkage, pieces, tree, work, path, count, random, tries):
         k = _at(path, count, t, b)
         if k <= i or _length(a, b) > 0.999 * (t - s):
             continue
-        for j in range(len(middle)):
-            middle[j] = 0.5 * (a[j] + b[j])
-        # Lines that are not free mostly are not in their middle, and a look there costs little.
-        if line_clearance(linkage, pieces, tree, work, middle, middle, 0.0)[0] < 0.0 or (
-            line_clearance(linkage, pieces, tree, work, a, b, 0.0)[0] < 0.0
-        ):
+        if line_clearance(linkage, pieces, tree, work, a, b, 0.0, 0.5)[0] < 0.0:
             continue
         idle = 0
         count = _replace(path, count, i, k, a, b)
     i = 1
     while i < count - 1:  # points that are not needed
-        if line_clearance(linkage, pieces, tree, work, path[i - 1], path[i + 1], 0.0)[0] < 0.0:
+        if line_clearance(linkage, pieces, tree, work, path[i - 1], path[i + 1], 0.0, 0.5)[0] < 0.0:
             i += 1
         else:
             for m in range(i, count - 1):
