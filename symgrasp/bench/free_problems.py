@@ -12,7 +12,7 @@ import numpy as np
 from symgrasp.errors import SceneError
 from symgrasp.motion.bodies.motion_scene import MotionScene
 from symgrasp.motion.bodies.situation import Situation
-from symgrasp.motion.paths.search import NoMotionError, connect, prove
+from symgrasp.motion.paths.search import FoundPath, NoMotionError, find, prove, shortened
 from symgrasp.motion.times.reach import joint_reach
 from symgrasp.poses import Array
 from symgrasp.robot.robot import Arm
@@ -65,8 +65,13 @@ class Problem:
 
     def solve(self) -> Array | None:
         """Return a path (m, n), as this project finds it, None if it finds none."""
+        found = self.search()
+        return None if found is None else shortened(found)
+
+    def search(self) -> FoundPath | None:
+        """Return a path before it is shortened, None if none is found."""
         try:
-            return connect(self.situation, self.start[None], self.goal[None], self.number)
+            return find(self.situation, self.start[None], self.goal[None], self.number)
         except NoMotionError:
             return None
 

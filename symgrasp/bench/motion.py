@@ -83,18 +83,20 @@ def whole_motions(seeds: int) -> Iterator[Figure]:
 def free_motions(kind: str, count: int) -> Iterator[Figure]:
     """Time free motions against RRT-Connect with PyBullet, and against roboplan.
 
-    All three shorten the path that they found; that is timed with and without for the others, but always
-    with for this project. What they do not find within `PATIENCE` counts with the time they took.
+    All three shorten the path that they found. They are compared with that, without it, and where it counts
+    for this project alone. What they do not find within `PATIENCE` counts with the time they took.
 
     Args:
         kind: a key of `PROBLEMS`.
         count: how many that this project solves.
     """
     own: list[Time] = []
+    own_search: list[Time] = []
     others: dict[str, list[_Rival]] = {"RRT-Connect of OMPL with PyBullet": [], "roboplan": []}
     missing = ""
     for problem in islice((p for p in PROBLEMS[kind](0) if p.solve() is not None), count):
         own.append(time_of(problem.solve))
+        own_search.append(time_of(problem.search))
         bullet, other = others.values()
         bullet.append(_rival(lambda p=problem: _with_bullet(p)))
         try:
@@ -102,13 +104,16 @@ def free_motions(kind: str, count: int) -> Iterator[Figure]:
         except ImportError:
             missing = ": not installed"
     yield times(f"free motion {kind}", "ms", own)
+    yield times("  before it is shortened", "ms", own_search)
     for name, runs in others.items():
         if not runs:
             yield Figure(f"  {name}{missing}", "×", ())
             continue
         whole = [(run.search + run.shortening, mine) for run, mine in zip(runs, own, strict=True)]
         alone = [(run.search, mine) for run, mine in zip(runs, own, strict=True)]
+        searched = [(run.search, mine) for run, mine in zip(runs, own_search, strict=True)]
         yield ratios(f"  {name}, times as long", whole)
+        yield ratios(f"  {name}, times as long before either path is shortened", searched)
         yield ratios(f"  {name}, times as long without its shortening", alone)
         yield Figure(f"  {name}, found", "", (float(np.mean([run.found for run in runs])),))
 

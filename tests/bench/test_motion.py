@@ -14,6 +14,9 @@ def test_free_motions_are_compared_with_other_planners_and_looked_at():
         whole = found[f"{own}: {rival}, times as long"].values
         alone = found[f"{own}: {rival}, times as long without its shortening"].values
         assert all(0 < a <= b for a, b in zip(alone, whole, strict=True))
+        searched = found[f"{own}: {rival}, times as long before either path is shortened"].values
+        assert len(searched) == len(whole)
+        assert all(value > 0 for value in searched)
         assert found[f"{own}: {rival}, found"].values == (1.0,)
     looked = f"3 free motions {kind}: found"
     assert found[looked].values == (1.0,)

@@ -99,8 +99,8 @@ class Workspace(NamedTuple):
         frames: (J, 12) present joint frames in the world.
         simplex: (4, 3) for `distance_bounds`.
         q: (5, J) joint values.
-        twist: (J, 6) how each joint frame turns (3,) and moves (3,), in m per unit of the path's parameter, at
-            the origin of the world.
+        twist: (J, 6) how each joint frame turns (3,), and how its point at the origin of the world moves
+            (3,), for each unit of the path's parameter.
         waiting: (W, 3) stretches of a line that wait for proofs: both ends, and half the length of the one
             beside it.
         speed: (M, 2) speed and acceleration (m per unit of the path's parameter) of the points of each piece.

@@ -78,7 +78,8 @@ def clearances(linkage, pieces, tree, work, start, end, most, found, hits):
 def line_clearance(linkage, pieces, tree, work, start, end, most, first):
     """Return clearance and room (m), at most ``most``, that a line (J,) to (J,) is proven to have.
 
-    Both are `BLOCKED` where it is not proven free; see `clearances`. Then ``work.hit`` names the pair of pieces.
+    Both are `BLOCKED` where it is not proven free; see `clearances`. Then ``work.hit`` names the pair of
+    pieces.
 
     Each proof at a point covers a stretch to both sides of it. What is left of the line waits in a queue, so
     that points far from each other are looked at first, and a line that is not free is given up early.
@@ -113,14 +114,13 @@ def line_clearance(linkage, pieces, tree, work, start, end, most, first):
         step, least, room = _free_step(linkage, pieces, tree, work, d, step, least, room)
         if step >= 0.0 and len(linkage.balance.edge):
             step, room = _standing_step(linkage, work, d, step, room)
-        if step < 0.0 or left > len(waiting) - 2:
+        if step < 0.0 or left > len(waiting) - 2:  # the latter is never seen
             return BLOCKED, BLOCKED
         for side in range(2):
             a, b = (low, t - step) if side == 0 else (t + step, high)
             if b - a > SHORTEST:
-                place_in_queue = (head + left) % len(waiting)
-                waiting[place_in_queue, 0], waiting[place_in_queue, 1] = a, b
-                waiting[place_in_queue, 2] = step
+                behind = (head + left) % len(waiting)
+                waiting[behind, 0], waiting[behind, 1], waiting[behind, 2] = a, b, step
                 left += 1
         if left == 0:
             return max(least, 0.0), max(room, 0.0)
@@ -247,7 +247,7 @@ def _time(distance, v, a):
 
 @njit(**FAST)
 def _twists(linkage, work, d):
-    """Write how each joint frame turns and moves at rates d (J,): its rotation, and what passes the origin."""
+    """Write how each joint frame turns and moves at rates d (J,), see `Workspace`."""
     frames, twist = work.frames, work.twist
     for j in range(len(d)):
         f, axis, rate, parent = frames[j], linkage.axis[j], d[j], linkage.parent[j]
@@ -271,7 +271,7 @@ def _twists(linkage, work, d):
 
 @njit(**FAST)
 def _speed(linkage, work, k, stop):
-    """Return the largest speed of points of moving piece k, where only joints after ``stop`` move; -1: all."""
+    """Return the largest speed of points of moving piece k, if only joints after joint ``stop`` move."""
     box, twist, p, j = work.box, work.twist, linkage.piece[k], linkage.frame[k]
     c0 = 0.5 * (box[p, 0] + box[p, 3])
     c1 = 0.5 * (box[p, 1] + box[p, 4])
@@ -289,7 +289,7 @@ def _speed(linkage, work, k, stop):
 
 @njit(**FAST)
 def _acceleration(linkage, d, k, stop):
-    """Return the largest acceleration of points of moving piece k at rates d (J,) of joints after ``stop``."""
+    """Return the largest acceleration of points of moving piece k, likewise, at rates d (J,)."""
     later = a = 0.0
     j = linkage.frame[k]
     while j != stop:

@@ -14,12 +14,22 @@ from symgrasp.motion.paths.trees import Trees, grow, new_trees, shorten
 from symgrasp.poses import Array
 from symgrasp.progress import Progress
 
-__all__ = ["STATED", "NoMotionError", "Proof", "blockers", "connect", "prove"]
+__all__ = [
+    "STATED",
+    "FoundPath",
+    "NoMotionError",
+    "Proof",
+    "blockers",
+    "connect",
+    "find",
+    "prove",
+    "shortened",
+]
 
 STATED = 0.05
 """Clearances of motions are proven up to this distance (m)."""
 
-ROOM = ((0.01, 1_000), (0.003, 2_000), (0.0, 20_000))
+ROOM = ((0.01, 1_000), (0.003, 2_000), (0.0, 60_000))
 """By how much more (m) than they must bodies keep apart in free motions, if such a motion is found in so many
 samples: the corners of the path are rounded later, and arms do not follow it exactly."""
 
@@ -85,6 +95,20 @@ def blockers(situation: Situation, hits: np.ndarray) -> str:
     return f"{situation.names[a]} meets {situation.names[b]}"
 
 
+class FoundPath(NamedTuple):
+    """A path as the search found it, before it is shortened.
+
+    Attributes:
+        situation: what moves and stands, with the room that all lines of the path have.
+        rows: (n, J) joint values; all lines between them are proven free.
+        random: (1,) state of the random numbers.
+    """
+
+    situation: Situation
+    rows: Array
+    random: np.ndarray
+
+
 def connect(
     situation: Situation, starts: Array, goals: Array, seed: int = 0, progress: Progress | None = None
 ) -> Array:
@@ -103,6 +127,13 @@ def connect(
     Raises:
         NoMotionError: none was found; says what is in the way most.
     """
+    return shortened(find(situation, starts, goals, seed, progress))
+
+
+def find(
+    situation: Situation, starts: Array, goals: Array, seed: int = 0, progress: Progress | None = None
+) -> FoundPath:
+    """Find a free path from one of some configurations to one of others; see `connect`."""
     s = situation
     for roots, what in ((starts, "start"), (goals, "end")):
         proof = prove(s, roots, roots)
@@ -119,13 +150,22 @@ def connect(
         for done in range(0, samples, BATCH):
             if progress:
                 progress(done / samples)
-            if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, done, BATCH):
-                return _shortened(wide, _joined(trees), trees.random)
+            if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, BATCH):
+                return FoundPath(wide, _joined(trees), trees.random)
         met, taken = trees.met[: len(s.names)], samples
     most = met.argsort()[::-1][:2]
     names = " and ".join(dict.fromkeys(str(s.names[k]) for k in most if met[k]))
     text = f"no way was found in {taken:,} samples"
     raise NoMotionError(f"{text}; mostly in the way: {names}" if names else text)
+
+
+def shortened(path: FoundPath) -> Array:
+    """Return a path (n, J) that is no longer than one that was found, all lines of it proven free."""
+    s = path.situation
+    rows = np.empty((len(path.rows) + 2 * TRIES, path.rows.shape[1]))
+    rows[: len(path.rows)] = path.rows
+    count = shorten(s.linkage, s.pieces, s.tree, s.work, rows, len(path.rows), path.random, TRIES)
+    return rows[:count].copy()
 
 
 def _sampled(situation: Situation, roots: Array) -> tuple[Array, Array]:
@@ -149,11 +189,3 @@ def _joined(trees: Trees) -> Array:
     path = np.array(halves[0][::-1] + halves[1])
     apart = np.linalg.norm(np.diff(path, axis=0), axis=1) > 1e-9
     return path[np.concatenate([[True], apart])]
-
-
-def _shortened(situation: Situation, path: Array, random: np.ndarray) -> Array:
-    s = situation
-    room = np.empty((len(path) + 2 * TRIES, path.shape[1]))
-    room[: len(path)] = path
-    count = shorten(s.linkage, s.pieces, s.tree, s.work, room, len(path), random, TRIES)
-    return room[:count].copy()

@@ -19,7 +19,7 @@ from symgrasp.poses import Array
 
 __all__ = ["Trees", "grow", "new_trees", "shorten"]
 
-STEP = 0.6
+STEP = 0.9
 """Longest line (rad) that is added to a tree."""
 
 LARGEST_TREE = 20_000
@@ -82,8 +82,10 @@ def _random(state):
 
 
 @njit(**ENTRY)
-def grow(linkage, pieces, tree, work, trees, low, high, first, count):
-    """Grow two trees alternately; return whether they meet.
+def grow(linkage, pieces, tree, work, trees, low, high, count):
+    """Grow two trees, always the one with fewer nodes; return whether they meet.
+
+    Where one of them is in a narrow place, it stays small, and samples are worth most there.
 
     Args:
         linkage: see `Linkage`.
@@ -93,12 +95,11 @@ def grow(linkage, pieces, tree, work, trees, low, high, first, count):
         trees: see `Trees`.
         low: (J,) smallest joint values that are sampled.
         high: (J,) largest ones.
-        first: number of samples that were taken before.
-        count: how many to take.
+        count: how many samples to take.
     """
     sample = work.q[2]
-    for i in range(first, first + count):
-        side = i % 2
+    for _ in range(count):
+        side = 0 if trees.filled[0] <= trees.filled[1] else 1
         if trees.filled[side] >= trees.node.shape[1] - 1 or trees.filled[1 - side] >= trees.node.shape[1] - 1:
             return False
         for j in range(len(sample)):
