@@ -113,10 +113,12 @@ class Placement:
     Attributes:
         proposals: the best bases, none near another, by falling margin.
         margins: all bases that were looked at → the margin (m) of the best plan, NaN where none exists.
+        keep_out: rectangles in which no base stands.
     """
 
     proposals: tuple[Proposal, ...]
     margins: dict[Base, float]
+    keep_out: tuple[KeepOut, ...]
 
 
 def kind_of_plan(scene: Scene) -> PlanKind:
@@ -198,7 +200,7 @@ def place_base(
             break
     if not found:
         raise NoPlanError(f"none of {len(margins)} bases of {robot} serves all tasks")
-    return Placement(tuple(sorted(found, key=lambda p: -p.margin)), margins)
+    return Placement(tuple(sorted(found, key=lambda p: -p.margin)), margins, region.keep_out)
 
 
 def _check_size(robot: str, region: Region) -> None:

@@ -20,6 +20,9 @@ __all__ = ["draw_placement"]
 ARROW = 0.12
 """Length (m) of the arrow that shows where a base looks."""
 
+BESIDE = 0.1
+"""How far (m) beyond the bases rectangles are drawn in which none stands."""
+
 
 def draw_placement(scene: Scene, robot: str, found: Placement) -> Figure:
     """Draw the bases of a robot that were tried, at each place the turn with most margin, and the proposals.
@@ -45,6 +48,13 @@ def draw_placement(scene: Scene, robot: str, found: Placement) -> Figure:
                 fontsize=8,
                 zorder=1,
             )
+    tried = np.array([(base.x, base.y) for base in found.margins])
+    low, high = tried.min(axis=0) - BESIDE, tried.max(axis=0) + BESIDE
+    for k, out in enumerate(found.keep_out):  # of a large rectangle, what is near the bases
+        (x0, y0), (x1, y1) = (np.clip(corner, low, high) for corner in zip(out.x, out.y, strict=True))
+        corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+        label = "no base may stand here" if not k else None
+        axes.fill(*zip(*corners, strict=True), fc="none", ec="#cb3b2c55", hatch="//", lw=0, label=label)
     best: dict[tuple[float, float], float] = {}
     for base, margin in found.margins.items():
         place = (base.x, base.y)
@@ -63,7 +73,7 @@ def draw_placement(scene: Scene, robot: str, found: Placement) -> Figure:
     _mark(axes, Base.of(scene.robots[robot].T_world_base), "now", "#3b3b3b")
     axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     axes.set_title(_plain(f"{scene.name}: where {robot} may stand for all tasks"))
-    if none.any():
+    if none.any() or found.keep_out:
         axes.legend(loc="upper right", fontsize=8)
     return figure
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -65,7 +66,12 @@ def test_every_base_is_what_a_plan_of_its_own_says(client, tmp_path, monkeypatch
     first = found.proposals[0]
     assert np.allclose(first.scene.robots["panda"].T_world_base[:3, 3], first.base[:3])
     assert first.plan.scene.content["robots"][0]["base"]["position"] == pytest.approx(list(first.base[:3]))
-    assert draw_placement(scene, "panda", found).axes
+    outs = (KeepOut(x=(-0.3, -0.15), y=(-0.05, 0.1)), KeepOut(x=(-9, 9), y=(5, 9)))
+    axes = draw_placement(scene, "panda", replace(found, keep_out=outs)).axes[0]
+    legend = axes.get_legend()
+    assert legend
+    assert legend.get_texts()[0].get_text() == "no base may stand here"
+    assert axes.get_ylim()[1] < 1.5
 
 
 def test_nothing_stands_where_it_may_not(client, tmp_path, monkeypatch):

@@ -126,7 +126,7 @@ def test_the_plan_for_success_holds(shared):
 @pytest.mark.parametrize("shared", [True, False])
 def test_no_grasp_of_the_sequence_is_more_probable(shared):
     """Against a plain loop: every draw of every task has its map computed alone, every grasp is tried."""
-    scene, sigma, tilt, count = load_small("pick_pour_place", 6, 12, 4), 0.03, 0.1, 5
+    scene, sigma, tilt, count = load_small("pick_pour_place", 8, 16, 4), 0.03, 0.1, 6
     found = plan_for_success(scene, PoseNoise(sigma, tilt, shared=shared), count=count, seed=4)
     expected, drawn = [], []
     for k, task in enumerate(scene.tasks.values()):
