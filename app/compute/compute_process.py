@@ -205,9 +205,11 @@ class ComputeProcess:
         """Find out where the object or the robot may stand; see `SurveyService.survey`."""
         return self._call("survey", progress, request)
 
-    def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
+    def open(
+        self, content: bytes, name: str, progress: Progress, unpacked: Scene | None = None
+    ) -> OpenedPlan:
         """Read and verify a plan file; see `PlanService.open`."""
-        return self._call("open", progress, content, name, reads=name)
+        return self._call("open", progress, content, name, unpacked, reads=name)
 
     def _results(self, requests: Sequence[MapRequest]) -> Maps:
         """Return the maps that the last call computed, as the answers to requests."""

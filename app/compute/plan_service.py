@@ -266,18 +266,30 @@ class PlanService:
                 return MotionOutcome(index, with_motion(plan, motion), reasons, listed)
         raise NoPlanError("no motion: " + "; ".join(failures_in_words(failures)))
 
-    def open(self, content: bytes, name: str, progress: Progress) -> OpenedPlan:
+    def open(self, content: bytes, name: str, unpacked: Scene | None, progress: Progress) -> OpenedPlan:
         """Read and verify a plan file; if the plan holds, return all that is needed to show it but its maps.
 
         The references to files in its scene are checked before anything is loaded.
+
+        Args:
+            content: of the file.
+            name: of the file.
+            unpacked: its scene, where that was read from an archive and its files lie elsewhere than the plan
+                says: the plan is verified with this scene.
+            progress: called with the finished share; may raise `Cancelled`.
 
         Raises:
             PlanError: the file is too large or is not a plan.
             SceneError: its scene refers to files that an uploaded scene may not use.
         """
         self.close()
-        content_of_scene = Plan.parse(content, name).scene.content
-        refuse_foreign_files(f"{name}: scene.content", content_of_scene, self._folders)
+        plan = Plan.parse(content, name)
+        if unpacked:
+            update = {"content": unpacked.content, "sha256": unpacked.sha256}
+            plan = plan.model_copy(update={"scene": plan.scene.model_copy(update=update)})
+            content = plan.to_json().encode()
+        else:
+            refuse_foreign_files(f"{name}: scene.content", plan.scene.content, self._folders)
         checked = check_plan(content, name, progress)
         report = PlanFileReport(name, checked.report.checks, tuple(map(shown_paths, checked.report.failures)))
         scene, plan = checked.scene, checked.plan

@@ -66,7 +66,8 @@ def _with_plan(
     progress: Progress,
 ) -> State:
     """Return a state with the plan of its page, if that holds."""
-    opened = process.open(plan.encode(), f"{SOURCE}: plan", lambda share: progress((1 + share) / 3))
+    unpacked = state.moved_scene() if state.assets.folders else None
+    opened = process.open(plan.encode(), f"{SOURCE}: plan", lambda share: progress((1 + share) / 3), unpacked)
     if opened.plan is None:
         raise InputError(SOURCE, "plan", opened.report.failures[0], "a plan that holds")
     holds = [(task.name, hold.arm) for task in opened.plan.plan.tasks for hold in task.holds]

@@ -311,7 +311,7 @@ def test_the_gap_that_is_shown_is_that_of_the_planner():
 )
 def test_a_plan_from_a_file_brings_its_scene(plans, name, kind):
     plan = planned(name, kind).plan.plan
-    found = plans.open(plan.to_json().encode(), "a.json", quiet)
+    found = plans.open(plan.to_json().encode(), "a.json", None, quiet)
     assert found.report.failures == ()
     assert found.report.checks > 10
     state = show_opened_plan(opened("soda_can"), found, planned(name, kind).maps)
@@ -325,7 +325,7 @@ def test_a_plan_from_a_file_brings_its_scene(plans, name, kind):
 def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans):
     text = planned("pick_pour_place", "sequential").plan.plan.to_json()
     h = planned("pick_pour_place", "sequential").plan.plan.tasks[0].holds[0].grasp.h
-    found = plans.open(text.replace(f'"h": {h!r}', f'"h": {h + 0.01!r}').encode(), "a.json", quiet)
+    found = plans.open(text.replace(f'"h": {h!r}', f'"h": {h + 0.01!r}').encode(), "a.json", None, quiet)
     assert found.plan is None
     assert any("10.0" in failure or "0.01" in failure for failure in found.report.failures)
     before = with_plan("soda_can", "sequential")
@@ -334,13 +334,17 @@ def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans)
     assert state.plan is before.plan
     assert state.plan_results.opened is found.report
     with pytest.raises(SceneError, match=r"obstacles\[1\].mesh.*expected a file of an installed package"):
-        plans.open(text.replace("package://static_scenes/bowl.obj", "/etc/passwd").encode(), "a.json", quiet)
+        plans.open(
+            text.replace("package://static_scenes/bowl.obj", "/etc/passwd").encode(), "a.json", None, quiet
+        )
     with pytest.raises(SceneError, match="or an absolute path"):
-        plans.open(text.replace("package://static_scenes/bowl.obj", "bowl.obj").encode(), "a.json", quiet)
+        plans.open(
+            text.replace("package://static_scenes/bowl.obj", "bowl.obj").encode(), "a.json", None, quiet
+        )
     with pytest.raises(PlanError, match="more than 5 MB"):
-        plans.open(b" " * (PLAN_LIMIT + 1), "a.json", quiet)
+        plans.open(b" " * (PLAN_LIMIT + 1), "a.json", None, quiet)
     with pytest.raises(PlanError, match="JSON"):
-        plans.open(b"{", "a.json", quiet)
+        plans.open(b"{", "a.json", None, quiet)
 
 
 @pytest.mark.parametrize(
