@@ -91,7 +91,7 @@ def serve_parsers(pipe: Connection, folders: tuple[Path, ...]) -> None:
         progress(0.5)
         if name == "eats":
             try:
-                np.zeros(MEMORY_LIMIT, dtype=np.uint8)
+                np.zeros(2 * MEMORY_LIMIT, dtype=np.uint8)  # some of what it had may be free by now
             except Exception as error:  # as where any error of a library is one of the file
                 raise MeshError(name, "content", str(error), "a mesh") from error
         if name == "aborts":
