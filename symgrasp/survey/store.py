@@ -242,9 +242,8 @@ def _attributes(path: Path) -> dict[str, Any]:
     try:
         attributes = dict(zarr.open_group(str(path), mode="r", use_consolidated=False).attrs)
     except Exception as error:  # zarr raises its own, and what json raises
-        raise SurveyError(
-            path, "store", type(error).__name__, "a store written by symgrasp survey run"
-        ) from error
+        what = "a folder of something else" if path.is_dir() else "a file" if path.exists() else None
+        raise SurveyError(path, "store", what, "a store written by symgrasp survey run") from error
     if attributes.get("format") != FORMAT:
         raise SurveyError(path, "format", attributes.get("format"), FORMAT)
     if attributes.get("version") not in VERSIONS:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from symgrasp.errors import SurveyError, SymgraspError, one_of
+from symgrasp.errors import InputError, SceneError, SurveyError, SymgraspError, one_of
 from symgrasp.files import LARGEST_YAML, parse_yaml, read_file
 from symgrasp.planners.planning import tasks_of_plan
 from symgrasp.poses import rotation_z
@@ -301,10 +301,17 @@ def _resolved(field: str, axis: AxisFile, file: SurveyFile, scene: Scene, source
         except ValidationError as error:
             expected = describe_error(error, changed)[-1]
             raise SurveyError(source, f"{field} ({axis.name})", labels[k], expected) from None
+        except SceneError as error:  # of a scene that was made of the value
+            where, key = f"{field}.values[{k}]", error.field.split(".")[-1]
+            where = where if isinstance(value, str) else f"{where}.{key}"
+            raise SurveyError(source, where, error.value, error.expected) from None
+        except SymgraspError as error:
+            text = str(error)
+            if isinstance(error, InputError) and error.source.startswith(source):
+                text = error.without_source
+            raise SurveyError(source, f"{field} ({axis.name})", labels[k], text) from None
         except ValueError as error:
             raise SurveyError(source, f"{field}.of", axis.of, str(error)) from None
-        except SymgraspError as error:
-            raise SurveyError(source, f"{field} ({axis.name})", labels[k], str(error)) from None
     return Axis(axis.name, axis, tuple(values), labels, tuple(notes))
 
 

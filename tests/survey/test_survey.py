@@ -79,7 +79,15 @@ def test_every_shipped_survey_loads():
         ({**X, "of": "base.x", "robot": "pandas"}, "did you mean 'panda'"),
         ({**X, "robot": "panda"}, "a robot only with"),
         ({"name": "t", "of": "task", "values": ["pick", "por"]}, "did you mean 'pour'"),
+        (
+            {"name": "o", "of": "object", "values": ["wine_botle"]},
+            "axes[0].values[0]: 'wine_botle': expected",
+        ),
         ({"name": "o", "of": "object", "values": ["wine_botle"]}, "did you mean 'wine_bottle'"),
+        (
+            {"name": "o", "of": "object", "values": [{"name": "a", "profile": [[0, 0.1], [0, 0.2]]}]},
+            "axes[0] (o): 'a': expected profile[1]: 0.0: expected a height above",
+        ),
         (
             {"name": "o", "of": "object", "values": ["tumbler", {"name": "a", "mash": "a.stl"}]},
             "axes[0].values[1].mash: 'a.stl': expected a key of the file format",
