@@ -64,31 +64,37 @@ def costs(content: Mapping[str, Any]) -> str:
         return float(np.median(figures[name].values))
 
     alone, two = "a map alone, one core", "a survey in two processes, over one"
-    over = median(f"{alone}: a point of a survey, with all that is written, over it")
+    sizes = [name for name in figures if name.endswith("with all that is written, over it")]
+    large, small = (name.split(" of ")[1].split(", with")[0] for name in sizes)
+    over, over_small = map(median, sizes)
+    writing, _ = (cpu(name) for name in figures if "writing a batch" in name)
     another = next(name for name in figures if name.startswith("a world and an engine for another scene"))
-    start = median("starting a process, and its first point")
+    start = cpu("starting a process, and its first point")
     one, scene = cpu(alone) * over / 1e3, cpu(another) / 1e3
     share = min(1.0, median(f"{two}: in CPU time") / 2)
     handing = median(f"{two}: CPU time of the scheduler and the client for a batch")
     early, late = (figures[name].values[0] for name in figures if name.startswith("memory after"))
     own = Costs(start, one, scene, handing / 1e3)
+    beside = over + handing / BATCH / cpu(alone)
     hours, scene_hours = (own.seconds(MILLION, scenes, 1.0) / 3600 for scenes in (1, MILLION))
     minutes, scene_minutes = (own.seconds(MILLION, scenes, CORES * share) / 60 for scenes in (1, MILLION))
     handed = MILLION / BATCH * own.batch / 60
     machine = content["machine"]
     return f"""
-Measured by `symgrasp bench survey` on {machine["cpus"]} cores ({machine["machine"]}): medians, and
-CPU times unless another kind is said.
+Measured by `symgrasp bench survey` on {machine["cpus"]} cores ({machine["machine"]}): medians of CPU times,
+which change little where the machine does other things as well. Where it does not, what the command says of
+two processes by the clock counts too.
 
 | what | |
 |---|---:|
 | a map of 24 × 48 × 2 cells at 16 samples, one core | {cpu(alone):.1f} ms |
-| a point of a survey, computed and written, over its map | × {over:.2f} |
-| writing a batch, of that | {cpu(f"{alone}: writing a batch"):.1f} ms |
+| a point of a survey of {large} points, computed and written, over its map | × {over:.3f} |
+| … with its share of what scheduler and client take for a batch of {BATCH} | × {beside:.3f} |
+| … of a survey of {small} points, whose batches are small, computed and written | × {over_small:.3f} |
+| writing a batch of {BATCH}, of that | {writing:.1f} ms |
 | a world and an engine for another scene | {1e3 * scene:.0f} ms |
-| starting a process until its first point is written, by the clock | {start:.1f} s |
-| two processes over one, by the clock | × {median(two):.2f} |
-| … in CPU time of the workers | × {median(f"{two}: in CPU time"):.2f} |
+| starting a process until its first point is written | {start:.1f} s |
+| two processes over one, in CPU time of the workers | × {median(f"{two}: in CPU time"):.2f} |
 | scheduler and client for a batch | {handing:.1f} ms |
 | memory of a process after 1,000 points | {early:.0f} MB |
 | … after 10,000 | {late:.0f} MB |

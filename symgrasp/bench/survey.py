@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,7 +34,7 @@ SMALL = MapSettings(heights=4, angles=12, redundancy=2)
 
 def run() -> Iterator[Figure]:
     """Run the benchmarks of surveys and yield their figures as they are measured."""
-    yield from overhead(side=16, rounds=3)
+    yield from overhead(sides=(64, 16), most=6, rounds=5)
     yield from scenes(count=12)
     yield from start(rounds=3)
     yield from efficiency(side=20, rounds=3)
@@ -50,12 +51,29 @@ def _survey(side: int, settings: MapSettings) -> Survey:
     return Survey.of(file, Scene.load(SCENE))
 
 
-def overhead(side: int, rounds: int) -> Iterator[Figure]:
-    """Time the points of a survey, computed and written, and their maps alone, on one core.
+def overhead(sides: Sequence[int], most: int, rounds: int) -> Iterator[Figure]:
+    """Time the points of surveys, computed and written, and their maps alone, on one core.
 
-    Batch by batch, in turn: what else the machine does meets both alike.
+    Args:
+        sides: each is a survey of side × side points; the more these are, the more a batch has.
+        most: batches of each survey that are timed, of equal steps between them.
+        rounds: how often.
     """
-    survey = _survey(side, GRID)
+    for k, side in enumerate(sides):
+        survey = _survey(side, GRID)
+        pairs, written = _beside_maps(survey, most, rounds)
+        if not k:
+            yield times("a map alone, one core", "ms", [alone for _, alone in pairs])
+        yield ratios(f"  a point of {survey.points:,}, with all that is written, over it", pairs)
+        yield times(f"  writing a batch of {math.prod(survey.batch_shape)}", "ms", written)
+
+
+def _beside_maps(survey: Survey, most: int, rounds: int) -> tuple[list[tuple[Time, Time]], list[Time]]:
+    """Return what a point and its map alone take, and what writing a batch takes, each in some rounds.
+
+    Batch by batch, in turn: what else the machine does meets all alike.
+    """
+    batches = range(0, survey.batches, max(1, survey.batches // most))
     pairs, written = [], []
     with _one_core(), open_world(survey.scene) as world, Evaluator(survey) as evaluator:
         maker = MapMaker(world)
@@ -64,19 +82,18 @@ def overhead(side: int, rounds: int) -> Iterator[Figure]:
         for _ in range(rounds):
             with TemporaryDirectory() as folder:
                 store = create_store(Path(folder) / "bench.zarr", survey)
-                computed, writing, alone = Time(0, 0), Time(0, 0), Time(0, 0)
-                for batch in range(survey.batches):
+                computed, writing, alone, count = Time(0, 0), Time(0, 0), Time(0, 0), 0
+                for batch in batches:
                     points = list(survey.points_of(batch))
                     tasks = [evaluator.task_at(point, survey.scene) for point in points]
                     results = {}
                     computed += time_of(lambda: results.update((p, evaluator.point(p)) for p in points))  # noqa: B023
                     writing += time_of(lambda: store.write(batch, results))  # noqa: B023
                     alone += time_of(lambda: [maker.map(task=task) for task in tasks])  # noqa: B023
-            pairs.append((computed + writing, alone))
-            written.append(writing / survey.batches)
-    yield times("a map alone, one core", "ms", [alone / survey.points for _, alone in pairs])
-    yield ratios("  a point of a survey, with all that is written, over it", pairs)
-    yield times("  writing a batch", "ms", written)
+                    count += len(points)
+            pairs.append(((computed + writing) / count, alone / count))
+            written.append(writing / len(batches))
+    return pairs, written
 
 
 def scenes(count: int) -> Iterator[Figure]:

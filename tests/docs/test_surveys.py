@@ -25,11 +25,11 @@ def test_a_survey_takes_what_its_parts_take():
 
 
 def test_points_cost_little_besides_their_maps_and_scenes_cost_time():
-    found = keyed([*survey.overhead(side=4, rounds=1), *survey.scenes(count=3)])
+    found = keyed([*survey.overhead(sides=(4,), most=4, rounds=1), *survey.scenes(count=3)])
     assert set(found) == {
         "a map alone, one core",
-        "a map alone, one core: a point of a survey, with all that is written, over it",
-        "a map alone, one core: writing a batch",
+        "a map alone, one core: a point of 16, with all that is written, over it",
+        "a map alone, one core: writing a batch of 1",
         "a world and an engine for another scene, pick_pour_place",
     }
     assert all(value > 0 for figure in found.values() for value in figure.values)
