@@ -38,8 +38,11 @@ def content() -> dict[str, Any]:
     return json.loads(motion.model_dump_json())
 
 
-def failures(motion: dict[str, Any], world: BulletWorld) -> list[str]:
-    """Return what does not hold of the content of a motion; what cannot be read counts too."""
+def failures(motion: dict[str, Any], world: BulletWorld, plan: Plan | None = None) -> list[str]:
+    """Return what does not hold of the content of a motion of a plan, which is the recorded one if None.
+
+    What cannot be read counts too.
+    """
     found: list[str] = []
 
     def expect(ok: object, failure: str) -> bool:
@@ -51,7 +54,7 @@ def failures(motion: dict[str, Any], world: BulletWorld) -> list[str]:
         record = MotionRecord.model_validate(motion)
     except ValueError as error:
         return [str(error)]
-    check_motion_module.check_motion(recorded_plan(), record, world, expect)
+    check_motion_module.check_motion(plan or recorded_plan(), record, world, expect)
     return found
 
 
@@ -112,6 +115,11 @@ def numbers(node: Any) -> Iterator[tuple[Any, Any]]:
 @pytest.fixture
 def only_changed_states(content, monkeypatch):
     """Look for collisions only in segments that are not as they were, which are known to be free."""
+    pass_over_unchanged(content, monkeypatch)
+
+
+def pass_over_unchanged(content: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let all segments of the content of a motion count as free."""
     free = {SegmentRecord.model_validate(segment).model_dump_json() for segment in content["segments"]}
 
     def check_changed(states, *rest):

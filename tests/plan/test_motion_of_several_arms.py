@@ -1,0 +1,151 @@
+"""Motions of several arms are caught when they are changed: two and four that lift a log, and a handover."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from symgrasp.motion.choosing import best_motion
+from symgrasp.plan.plan import Plan
+from symgrasp.planners.planning import bimanual_plans, handover_plans
+from symgrasp.scene.scene import Scene
+from symgrasp.world import BulletWorld, open_world
+from tests.conftest import load_small
+from tests.plan.test_motion import (
+    failures,
+    numbers,
+    pass_over_unchanged,
+    retimed,
+    reversed_segment,
+    swapped,
+    without,
+)
+
+MAKERS: dict[str, Callable[[], Plan]] = {
+    "two arms": lambda: _moving("log_two_robots", bimanual_plans, (20, 24, 6)),
+    "handover": lambda: _moving("handover_between_robots", handover_plans, (12, 24, 8)),
+    "four arms": lambda: _moving("log_four_robots", bimanual_plans, (20, 24, 6)),
+}
+
+EVERY = {"two arms": 23, "handover": 31, "four arms": 101}
+"""How many of the numbers of a motion are changed: one in so many."""
+
+
+def _moving(name: str, plans: Callable[[Scene], Any], grid: tuple[int, int, int]) -> Plan:
+    scene = load_small(name, *grid)
+    return best_motion(scene, plans(scene))[0]
+
+
+@pytest.fixture(scope="module", params=MAKERS)
+def case(request: pytest.FixtureRequest) -> Iterator[tuple[str, Plan, BulletWorld]]:
+    plan = MAKERS[request.param]()
+    assert plan.motion
+    with open_world(Scene.from_content(plan.scene.content)) as world:
+        assert failures(json.loads(plan.motion.model_dump_json()), world, plan) == []
+        yield request.param, plan, world
+
+
+@pytest.fixture
+def content(case, monkeypatch) -> dict[str, Any]:
+    motion = json.loads(case[1].motion.model_dump_json())
+    pass_over_unchanged(motion, monkeypatch)
+    return motion
+
+
+def missed(content: dict, case, changes: dict[str, Callable[[dict], object]]) -> list[str]:
+    """Return the changes of a motion that are not caught; all of them have to change something."""
+    _, plan, world = case
+    found = []
+    for name, change in changes.items():
+        changed = copy.deepcopy(content)
+        change(changed)
+        assert changed != content, name
+        if not failures(changed, world, plan):
+            found.append(name)
+    return found
+
+
+def test_segments_left_out_swapped_reversed_or_faster_are_caught(case, content):
+    count = len(content["segments"])
+    assert count >= 9
+    moving = [k for k in range(count) if len(content["segments"][k]["times"]) > 2]
+    changes: dict[str, Callable[[dict], object]] = {
+        **{f"without {k}": lambda m, k=k: without(m, k) for k in range(count)},
+        **{f"swapped {k}": lambda m, k=k: swapped(m, k) for k in range(count - 1)},
+        **{f"reversed {k}": lambda m, k=k: reversed_segment(m["segments"][k]) for k in moving},
+        **{f"faster {k}": lambda m, k=k: retimed(m, k, 0.9) for k in moving},
+    }
+    assert missed(content, case, changes) == []
+
+
+def test_what_one_arm_does_without_the_others_is_caught(case, content):
+    """Where several hold the object, none may be early, late, still, somewhere else, or not be told."""
+    changes: dict[str, Callable[[dict], object]] = {}
+    for k, segment in enumerate(content["segments"]):
+        names = list(segment["joints"])
+        for name in segment["held_by"]:
+            changes[f"{k}: not held by {name}"] = lambda m, k=k, name=name: m["segments"][k][
+                "held_by"
+            ].remove(name)
+        if len(names) < 2:
+            continue
+        for name in names:
+
+            def late(m: dict, k: int = k, name: str = name) -> None:
+                for what in ("joints", "velocities"):
+                    rows = m["segments"][k][what][name]
+                    rows[1:-1] = [rows[0], *rows[1:-2]]
+
+            def still(m: dict, k: int = k, name: str = name) -> None:
+                for what, factor in (("joints", 1.0), ("velocities", 0.0)):
+                    rows = m["segments"][k][what][name]
+                    rows[:] = [[factor * value for value in rows[0]]] * len(rows)
+
+            def left_out(m: dict, k: int = k, name: str = name) -> None:
+                for what in ("joints", "velocities"):
+                    del m["segments"][k][what][name]
+
+            changes |= {f"{k}: {name} {f.__name__}": f for f in (late, still, left_out)}
+
+        def exchanged(m: dict, k: int = k, names: list[str] = names) -> None:
+            joints = m["segments"][k]["joints"]
+            joints[names[0]], joints[names[1]] = joints[names[1]], joints[names[0]]
+
+        changes[f"{k}: exchanged"] = exchanged
+    assert missed(content, case, changes) == []
+
+
+def test_an_arm_that_never_takes_the_object_is_caught(case, content):
+    """All that the last arm does to take the object is left out, and nobody says that it holds it."""
+    taking = [s for s in content["segments"] if s["kind"] == "close"][-1]
+    (name,) = taking["gripper"]
+
+    def idle(m: dict) -> None:
+        alone = [s for s in m["segments"] if [*s["joints"]] == [name]]
+        m["segments"] = [s for s in m["segments"] if s not in alone]
+        m["duration"] -= sum(s["times"][-1] for s in alone)
+        for segment in m["segments"]:
+            segment["held_by"] = [arm for arm in segment["held_by"] if arm != name]
+
+    assert missed(content, case, {f"{name} idle": idle}) == []
+
+
+def test_changed_numbers_are_caught(case, content):
+    """Clearances may be larger in truth, see the motions of one arm."""
+    name, plan, world = case
+    changed = copy.deepcopy(content)
+    every = [entry for entry in numbers(changed) if entry[1] != "clearance"][:: EVERY[name]]
+    assert len(every) > 200
+    passed = []
+    for k, (node, key) in enumerate(every):
+        was = node[key]
+        node[key] += 1e-3 if k % 2 else -1e-3
+        if not failures(changed, world, plan):
+            passed.append((k, key, was))
+        node[key] = was
+    assert passed == []
+    assert changed == content
