@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -79,10 +79,12 @@ class _CountingWorld(BulletWorld):
 
     checks = 0
 
-    def first_collision(self, arm: Arm, among: NearBodies | None = None) -> Collision | None:
+    def first_collision(
+        self, arm: Arm, among: NearBodies | None = None, links: Collection[str] | None = None
+    ) -> Collision | None:
         """Count the check, and return its result."""
         self.checks += 1
-        return super().first_collision(arm, among)
+        return super().first_collision(arm, among, links)
 
 
 def without_the_manifold(runs: int) -> Iterator[Figure]:

@@ -27,7 +27,8 @@ def mark_near(moving, pieces, tree, scratch, T_world_base, T, row, q, reach, nea
         row: row of the grasp.
         q: (n,) joint values.
         reach: the distance (m).
-        near: (P,) bool, receives the marks of the object's and the static pieces that are near a moving one.
+        near: (P,) bool, receives the marks of the object's and the static pieces that are near a moving one,
+            and of the moving ones that are near those.
         near_pairs: (.,) bool, receives the marks of the pairs of the robot's own pieces: ``hand_pairs``,
             then ``base_pairs``, then ``arm_pairs``.
     """
@@ -51,13 +52,20 @@ def _mark(moving, pieces, tree, scratch, reach, near, near_pairs):
             i, waiting, _ = next_near(pieces, tree, scratch, k, reach, reach, waiting)
             if i < 0:
                 break
-            near[i] = near[i] or _is_near(pieces, scratch, k, i, reach)
+            _mark_near(pieces, scratch, k, i, reach, near)
         if not moving.touch[k]:
             for i in moving.objects:
-                near[i] = near[i] or _is_near(pieces, scratch, k, i, reach)
+                _mark_near(pieces, scratch, k, i, reach, near)
     first = _mark_pairs(pieces, scratch, moving.hand_pairs, reach, near_pairs, 0)
     first = _mark_pairs(pieces, scratch, moving.base_pairs, reach, near_pairs, first)
     _mark_pairs(pieces, scratch, moving.arm_pairs, reach, near_pairs, first)
+
+
+@njit(**FAST)
+def _mark_near(pieces, scratch, k, i, reach, near):
+    """Mark a moving piece k and another one i where they are near."""
+    if not (near[k] and near[i]) and _is_near(pieces, scratch, k, i, reach):
+        near[k] = near[i] = True
 
 
 @njit(**FAST)

@@ -127,6 +127,8 @@ def cover(
 @njit(**ENTRY)
 def _cover_part(nodes, scratch, branches, moving, pieces, tree, inputs, balance, rows, covered, result, part):
     """Cover the cells of one part; parts are interleaved."""
+    for k in range(len(nodes.reach)):
+        geometry_at(covered.locked, 0.4 * math.pi * k, nodes.reach[k])
     for i in range(part, len(covered.cells), inputs.parts):
         _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance, rows, covered, result, i)
 
@@ -218,8 +220,7 @@ def _out_of_reach(nodes, locked, T):
     mean = c1 = s1 = c2 = s2 = 0.0
     for k in range(5):
         angle = 0.4 * math.pi * k
-        geometry_at(locked, angle, nodes.chain.geometry[0])
-        value = 0.2 * reach_cosine(nodes.chain.geometry[0], nodes.chain.joint, T)
+        value = 0.2 * reach_cosine(nodes.reach[k], nodes.chain.joint, T)
         mean += value
         c1 += 2.0 * value * math.cos(angle)
         s1 += 2.0 * value * math.sin(angle)

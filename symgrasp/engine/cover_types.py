@@ -87,6 +87,7 @@ class Nodes(NamedTuple):
         excluded: (SLOTS, B) which branches are excluded on the part that ends at a slot.
         stack: (SLOTS,) slots of the ends of parts.
         used: (SLOTS,) which slots are taken.
+        reach: (5, m) geometries at equal parts of a turn, see `Chain.geometry`.
         end: (2, 12) poses of a pair of pieces at the other end of a part.
         half: (n,) joint values half way.
         middle: (12,) pose of a piece there.
@@ -104,6 +105,7 @@ class Nodes(NamedTuple):
     excluded: np.ndarray
     stack: np.ndarray
     used: np.ndarray
+    reach: Array
     end: Array
     half: Array
     middle: Array
@@ -124,6 +126,7 @@ def new_nodes(chain: Chain, branches: int, joints: int) -> Nodes:
         excluded=np.zeros((SLOTS, branches), dtype=bool),
         stack=np.empty(SLOTS, dtype=np.int64),
         used=np.zeros(SLOTS, dtype=bool),
+        reach=np.empty((5, chain.geometry.shape[1])),
         end=np.empty((2, 12)),
         half=np.empty(joints),
         middle=np.empty(12),

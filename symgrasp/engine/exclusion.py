@@ -23,7 +23,7 @@ import math
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.compiling import njit
 from symgrasp.engine.checks import HIT_BAND
-from symgrasp.engine.kinematics import compose, place_arm, place_frames
+from symgrasp.engine.kinematics import compose, place_frames
 from symgrasp.ik.vectors import STRICT
 from symgrasp.robot.limits import LIMIT_TOLERANCE
 
@@ -97,7 +97,7 @@ def what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, 
             known = _curve(nodes, scratch, moving, pieces, inputs, covered, left, right, b, width)
         elif not there:
             known = _none(nodes.missing[left, b], nodes.missing[right, b], width)
-        if known != HARD and there and not (here and _apart(nodes, left, b, right, b) <= SAME_CURVE):
+        if known != HARD and there and not (here and _is_near(nodes, left, b, right, b)):
             back = _curve(nodes, scratch, moving, pieces, inputs, covered, right, left, b, width)
             known = min(known, back)
         least = min(least, known)
@@ -131,17 +131,27 @@ def _root(missing):
 
 
 @njit(**STRICT)
-def _apart(nodes, one, a, other, b):
-    """Return the largest difference (rad) of the joints of two configurations."""
+def _apart(nodes, one, a, other, b, enough):
+    """Return the largest difference (rad) of the joints of two configurations, or one that is ``enough``."""
     most = 0.0
     for j in range(nodes.q.shape[2]):
         most = max(most, abs(_turn(nodes.q[other, b, j] - nodes.q[one, a, j])))
+        if most >= enough:
+            break
     return most
+
+
+@njit(**STRICT)
+def _is_near(nodes, one, a, other, b):
+    """Whether two configurations are so near that they are taken for ends of one smooth curve."""
+    return _apart(nodes, one, a, other, b, SAME_CURVE) < SAME_CURVE
 
 
 @njit(**STRICT)
 def _turn(angle):
     """Return an angle (rad) less full turns, from -π to π."""
+    if -math.pi <= angle < math.pi:  # the rule, and quicker
+        return angle
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
@@ -151,19 +161,19 @@ def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a, width
 
     It leads to the nearest configuration: at the other end, or at this one where both end in between.
     """
-    if nodes.state[other, a] != GONE and _apart(nodes, one, a, other, a) <= SAME_CURVE:
+    if nodes.state[other, a] != GONE and _is_near(nodes, one, a, other, a):
         return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, a, width)
-    nearest, at, least = -1, other, math.inf
+    nearest, at, least = -1, other, SAME_CURVE
     for b in range(nodes.state.shape[1]):
         if nodes.state[other, b] != GONE:
-            apart = _apart(nodes, one, a, other, b)
+            apart = _apart(nodes, one, a, other, b, least)
             if apart < least:
                 nearest, at, least = b, other, apart
         elif b != a and nodes.state[one, b] != GONE and nodes.state[other, a] == GONE:
-            apart = _apart(nodes, one, a, one, b)
+            apart = _apart(nodes, one, a, one, b, least)
             if apart < least:
                 nearest, at, least = b, one, apart
-    if nearest < 0 or least > SAME_CURVE:
+    if nearest < 0:
         return HARD
     return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, at, nearest, width)
 
@@ -171,7 +181,7 @@ def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a, width
 @njit(**STRICT)
 def _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b, width):
     """Return what is known of a curve between two configurations: slots and branches."""
-    apart = _apart(nodes, one, a, other, b)
+    apart = _apart(nodes, one, a, other, b, math.inf)
     ahead = DRIFT * width if other == one else 0.0  # both ends are at one side, the root is anywhere
     if _limits_exclude(nodes, one, a, other, b, (BEND * apart + LEAST_BEND) * apart + ahead):
         return EXCLUDED
@@ -237,15 +247,19 @@ def _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, othe
         for side in range(2):
             copy_pose(nodes.pose[other, b, side], nodes.end[side])
     else:
-        place_arm(moving, pieces, scratch, nodes.q[other, b])
+        place_frames(moving, nodes.q[other, b], scratch.frames)
         for side in range(2):
-            copy_pose(scratch.pose[nodes.pair[one, a, side]], nodes.end[side])
+            piece = nodes.pair[one, a, side]
+            if moving.hand.shape[1] <= piece < len(moving.frame):
+                compose(scratch.frames[moving.frame[piece]], moving.local[piece], nodes.end[side])
+            else:
+                copy_pose(scratch.pose[piece], nodes.end[side])
     turned = 0.0
     for side in range(2):
         angle = _turned(nodes.pose[one, a, side], nodes.end[side])
         turned += 0.25 * angle * _length(pieces.size, nodes.pair[one, a, side])
     bend = SAGITTA * way * way + ahead
-    if nodes.depth[one, a] <= bend + turned or alike:
+    if nodes.depth[one, a] <= bend + turned or (alike and nodes.depth[other, b] <= bend + turned):
         bend = min(bend, least + _bent(nodes, scratch, moving, pieces, one, a, other, b))
     bend += turned
     if not _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend):
@@ -255,7 +269,7 @@ def _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, othe
     for side in range(2):
         copy_pose(nodes.end[side], scratch.pose[nodes.pair[one, a, side]])
     for level in range(len(covered.inner)):
-        if _depth(scratch, moving, pieces, inputs, covered, first, second, level) > bend:
+        if _depth(scratch, moving, pieces, inputs, covered, first, second, level, bend) > bend:
             return True
     return False
 
@@ -300,7 +314,7 @@ def _deeper(nodes, scratch, moving, pieces, inputs, covered, at, b, depth):
             return False
         copy_pose(nodes.pose[at, b, 0], scratch.pose[first])
         copy_pose(nodes.pose[at, b, 1], scratch.pose[second])
-        known = _depth(scratch, moving, pieces, inputs, covered, first, second, level)
+        known = _depth(scratch, moving, pieces, inputs, covered, first, second, level, 0.0)
         nodes.depth[at, b], nodes.level[at, b] = max(nodes.depth[at, b], known), level + 1
     return True
 
@@ -329,8 +343,10 @@ def _length(size, k):
 
 
 @njit(**STRICT)
-def _depth(scratch, moving, pieces, inputs, covered, first, second, level):
-    """Return by how much (m) more than it takes two pieces are certain to collide; else it is not positive.
+def _depth(scratch, moving, pieces, inputs, covered, first, second, level, least):
+    """Return by how much (m) more than it takes two pieces are certain to collide.
+
+    Where they do by less than ``least`` (m), it may return anything less.
 
     Args:
         level: which of the bodies inside the pieces tell.
@@ -341,6 +357,6 @@ def _depth(scratch, moving, pieces, inputs, covered, first, second, level):
     if bar == -math.inf:
         return -1.0
     _, upper = distance_bounds(
-        covered.inner[level], scratch.pose, first, second, bar, math.inf, -math.inf, scratch.simplex
+        covered.inner[level], scratch.pose, first, second, bar - least, math.inf, -math.inf, scratch.simplex
     )
     return bar - upper

@@ -108,6 +108,7 @@ def search(
         undecided_count=np.zeros(m, dtype=np.int32),
         undecided_q=np.empty((m, UNDECIDED_KEPT, joints)),
         undecided_solution=np.empty((m, UNDECIDED_KEPT, 2), dtype=np.int16),
+        proven=np.zeros(m, dtype=bool),
         rows=rows,
     )
     idle: SimpleQueue[tuple[Scratch, BranchScratch]] = SimpleQueue()
@@ -196,6 +197,7 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                 hand = tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, T)
                 if hand == -math.inf:
                     _name_pair(scratch, result, cell)
+                    result.proven[cell] = True
                     return
                 scratch.hit[2] = -1
             place_arm(moving, pieces, scratch, q[b])
@@ -218,6 +220,7 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                         _name_pair(scratch, result, cell)
                     if tool == BLOCKED:  # which all candidates are then
                         result.undecided_count[cell] = 0
+                        result.proven[cell] = True
                         return
                     continue
                 if furthest == RETREAT_UNDECIDED:

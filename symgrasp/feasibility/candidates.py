@@ -6,7 +6,7 @@ limits, free of collision, and free along the straight retreat where the scene a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +71,8 @@ class CandidateChecker:
         ik: its inverse kinematics.
         approach: length (m) of the straight retreat against the approach that must be free too.
         near: returns the bodies that may collide at joint values (n,) that reach a tool pose (4, 4) in
-            the frame of the robot's base; only those are checked. All bodies are checked if None.
+            the frame of the robot's base, and the links of the arm's robot that may collide with other
+            bodies; only those are checked. All bodies are checked if None.
         holders: names of all arms that hold the object, of which each bears a part; the arm alone if it is
             not among them.
     """
@@ -82,7 +83,7 @@ class CandidateChecker:
         arm: Arm,
         ik: Solver,
         approach: float,
-        near: Callable[[Array, Array], NearBodies] | None = None,
+        near: Callable[[Array, Array], tuple[NearBodies, Collection[str]]] | None = None,
         holders: Sequence[str] = (),
     ) -> None:
         self.world, self.arm, self.ik, self._near = world, arm, ik, near
@@ -158,11 +159,11 @@ class CandidateChecker:
         return max(0.0, -float(support_margin(robot, self.arm.robot_values(q, opening), loads)))
 
     def _collision(self, T_base_tool: Array, q: Array, opening: float) -> Collision | None:
-        near = self._near(q, T_base_tool) if self._near else None
+        near, links = self._near(q, T_base_tool) if self._near else (None, None)
         if near is not None and not near:
             return None
         self.world.set_arm(self.arm, q, opening)
-        return self.world.first_collision(self.arm, near)
+        return self.world.first_collision(self.arm, near, links)
 
     def _follow(self, T_base_tool: Array, q: Array, sample: int) -> Array | None:
         """Return the configuration at the same φ that continues q to the next pose, if any does."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -205,8 +206,14 @@ def _value(table: JointTable, opening: ArrayLike) -> Array:
     """Evaluate a joint table at openings (...) (m)."""
     if isinstance(table, float | int):
         return table * np.asarray(opening)
-    at, values = np.transpose(table)
+    at, values = _knots(tuple(map(tuple, table)))
     return np.interp(np.asarray(opening, dtype=float), at, values)
+
+
+@lru_cache(maxsize=1024)
+def _knots(table: tuple[tuple[float, float], ...]) -> Array:
+    """Return the openings and the values (2, k) of a joint table."""
+    return np.array(table).T.copy()
 
 
 def _pr2(side: str) -> Hand:

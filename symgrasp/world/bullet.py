@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Self
 
@@ -143,8 +143,12 @@ class BulletWorld:
                 self._set(robot, joints)
 
     def _set(self, robot: str, values: Array) -> None:
-        self._values[robot] = values
+        before, self._values[robot] = self._values.get(robot), values.copy()
         joints = self.bodies.joints[robot]
+        if before is not None:  # PyBullet takes its time for each
+            joints = [j for j in joints if values[j.source] != before[j.source]]
+            if not joints:
+                return
         pybullet.resetJointStatesMultiDof(
             self.bodies.robots[robot],
             [j.joint for j in joints],
@@ -162,7 +166,9 @@ class BulletWorld:
 
     # -- collisions and distances ------------------------------------------------------------
 
-    def first_collision(self, arm: Arm, among: NearBodies | None = None) -> Collision | None:
+    def first_collision(
+        self, arm: Arm, among: NearBodies | None = None, links: Collection[str] | None = None
+    ) -> Collision | None:
         """Return the deepest collision of the first stage at which the arm collides, or None.
 
         The stages, in the order of `Reason`: its own robot, the object, the obstacles, other robots.
@@ -172,14 +178,20 @@ class BulletWorld:
         Args:
             arm: the arm.
             among: what to check against; everything if None.
+            links: links of the arm's robot to check against other bodies; all of them if None.
         """
+        index = self.bodies.link_indices(arm.robot.name)
         stage: list[Collision] = []
         for query in self._queries[arm.name]:
             if among is not None and query.key not in among:
                 continue
             if stage and query.reason != stage[0].reason:
                 break
-            stage += self._collisions(query)
+            if links is None or query.link_a is not None:
+                stage += self._collisions(query)
+            else:  # PyBullet measures all links otherwise, however far they are
+                for link in links:
+                    stage += self._collisions(query._replace(link_a=index[link]))
         return max(stage, key=lambda c: c.depth, default=None)
 
     def arm_collisions(self, arm: Arm, among: NearBodies | None = None) -> list[Collision]:
@@ -382,7 +394,7 @@ class BulletWorld:
         """Return the pairs of a query that are closer than a margin (m), by default that of its reason."""
         if margin is None:
             margin = self.margin_for(query.reason)
-        links = () if query.link_a is None else (query.link_a, query.link_b)
+        links = [link for link in (query.link_a, query.link_b) if link is not None]
         points = pybullet.getClosestPoints(query.a, query.b, margin, *links, physicsClientId=self._client)
         name = self.bodies.body_name
         # Fields of a point: 3 and 4 are the links of a and b, 8 is the distance, negative for penetration.

@@ -55,7 +55,7 @@ PARTS = 4
 WORTH_A_PART = 256
 """Candidates, at one branch, that take longer than a thread takes to start."""
 
-COVER_PARTS = 16
+COVER_PARTS = 8
 """Equal parts of the range of the redundancy with which covering it begins."""
 
 FIRST_COVERED = 16
@@ -327,7 +327,8 @@ class ExactEngine:
         locked = locked_joint(batch.compiled) if self._settings.redundancy == "auto" else None
         if locked is None or inputs.always_collides:
             return
-        which = np.flatnonzero(left)
+        draft.proven[tuple(part[found.proven] for part in cells)] = True
+        which = np.flatnonzero(left & ~found.proven)
         for these in portions(len(which), progress, FIRST_COVERED):
             covered = self._cover(draft, found, which[these], locked, inputs, batch, cells)
             yield from self._decide_covered(draft, which[these], covered, inputs, batch, cells)

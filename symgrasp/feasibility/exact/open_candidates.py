@@ -82,8 +82,8 @@ class OpenCandidates:
                 before = collision
         return False
 
-    def _near(self, q: Array, T_base_tool: Array, row: int) -> NearBodies:
-        """Return the bodies near the arm at joint values (n,); all others are certified free."""
+    def _near(self, q: Array, T_base_tool: Array, row: int) -> tuple[NearBodies, list[str]]:
+        """Return what is near the arm at joint values (n,), and which links are; the rest is certified free."""
         geometry, scratch = self._geometry, self._scratch
         near = np.zeros(len(geometry.names), dtype=bool)
         pairs = np.zeros(len(geometry.pairs), dtype=bool)
@@ -92,8 +92,11 @@ class OpenCandidates:
             geometry.moving_in(row), geometry.pieces, geometry.tree, scratch, self._T_world_base,
             T_base_tool, row, q, reach, near, pairs,
         )  # fmt: skip
-        bodies = {geometry.names[k].body for k in np.flatnonzero(near)}
-        return bodies | {geometry.pairs[k] for k in np.flatnonzero(pairs)}
+        moving = len(geometry.moving.frame)
+        marked = [(int(k), geometry.names[k]) for k in np.flatnonzero(near)]
+        bodies = {name.body for k, name in marked if k >= moving}
+        links = {name.link for k, name in marked if k < moving}
+        return bodies | {geometry.pairs[k] for k in np.flatnonzero(pairs)}, sorted(links)
 
     def _with_tool(self, collision: Collision) -> bool:
         """Whether the tool pose alone decides a collision: no link but those fixed to the tool moves."""
