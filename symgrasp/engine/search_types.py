@@ -99,8 +99,8 @@ class SearchResult(NamedTuple):
         undecided_count: (m,) number of undecided candidates.
         undecided_q: (m, UNDECIDED_KEPT, n) joint values of the first of them.
         undecided_solution: (m, UNDECIDED_KEPT, 2) their redundancy samples and branches.
-        proven: (m,) whether nothing is free whatever the redundancy is: what the tool pose alone places collides,
-            at the grasp or on its retreat.
+        proven: (m,) whether nothing is free whatever the redundancy is: what the tool pose alone places
+            collides, at the grasp or on its retreat.
         rows: the row checks.
     """
 

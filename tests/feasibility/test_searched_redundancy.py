@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.errors import SceneError
+from symgrasp.errors import Cancelled, SceneError
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.exact import engine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.poses import inverse
@@ -108,6 +109,32 @@ def test_more_is_found_than_at_samples_and_it_says_what_it_rests_on():
     assert m.resolution >= 1e-4
     assert sampled.resolution == 0.0
     assert not (m.proven & m.feasible).any()
+
+
+def test_it_can_be_cancelled_while_the_redundancy_is_searched(monkeypatch):
+    scene = load_small("log_iiwa_and_panda").with_settings(heights=4, angles=120, redundancy="auto")
+    search, numbers = engine.cover, []
+
+    def counted(*args):
+        numbers.append(len(args[8].cells))
+        return search(*args)
+
+    def cancel(share: float) -> None:
+        if numbers:
+            raise Cancelled
+
+    monkeypatch.setattr(engine, "cover", counted)
+    with open_world(scene) as world:
+        maker = MapMaker(world)
+        with pytest.raises(Cancelled):
+            maker.map("panda", progress=cancel)
+        assert len(numbers) == 1
+        assert numbers[0] <= 16  # not all cells of a row
+        after = maker.map("panda")
+    assert sum(numbers) > 100
+    fresh = create_map(scene, arm="panda")
+    assert np.array_equal(after.reason, fresh.reason)
+    assert np.array_equal(after.proven, fresh.proven)
 
 
 def test_what_it_rests_on_is_saved(tmp_path):

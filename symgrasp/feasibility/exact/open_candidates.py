@@ -83,7 +83,7 @@ class OpenCandidates:
         return False
 
     def _near(self, q: Array, T_base_tool: Array, row: int) -> tuple[NearBodies, list[str]]:
-        """Return what is near the arm at joint values (n,), and which links are; the rest is certified free."""
+        """Return what is near the arm at joint values (n,), and its links that are; the rest is free."""
         geometry, scratch = self._geometry, self._scratch
         near = np.zeros(len(geometry.names), dtype=bool)
         pairs = np.zeros(len(geometry.pairs), dtype=bool)
