@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,9 @@ GREY = "#c8c8c8"
 
 CELL, LEAST, MOST_INCHES = 0.16, 2.2, 7.0
 """Size (inches) of a point, and of a panel at least and at most."""
+
+LETTERS = 10
+"""Most letters of a label on an inch of the picture's height."""
 
 
 def draw_survey(survey: Survey, values: xr.DataArray) -> Figure:
@@ -55,7 +59,9 @@ def draw_survey(survey: Survey, values: xr.DataArray) -> Figure:
     across = shown[0]
     size = (_inches(len(across.values)), _inches(len(shown[1].values)) if len(shown) > 1 else 2.6)
     rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(columns * size[0] + 1.8, rows * (size[1] + 0.45) + 0.6), layout="constrained")
+    height = rows * (size[1] + 0.45) + 0.6
+    figure = Figure(figsize=(columns * size[0] + 1.8, height), layout="constrained")
+    label = fill(_plain(values.attrs["label"]), int(LETTERS * height))
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     drawn: Any = None
     low, high = _range(values)
@@ -71,9 +77,9 @@ def draw_survey(survey: Survey, values: xr.DataArray) -> Figure:
             drawn = _heat(axes, shown[0], shown[1], part.transpose(shown[1].name, shown[0].name), low, high)
         else:
             _line(axes, across, part)
-            axes.set(ylim=(min(0.0, low), 1.05 * high or 1.0), ylabel=_plain(values.attrs["label"]))
+            axes.set(ylim=(min(0.0, low), 1.05 * high or 1.0), ylabel=label)
     if drawn is not None:
-        bar = figure.colorbar(drawn, ax=list(grid.ravel()), label=_plain(values.attrs["label"]))
+        bar = figure.colorbar(drawn, ax=list(grid.ravel()), label=label)
         if values.name == "state":
             bar.set_ticks([int(s) for s in State], labels=[s.name.lower().replace("_", " ") for s in State])
     figure.suptitle(_plain(survey.file.name))

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 import yaml
 from distributed import Client, LocalCluster
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from symgrasp.cli.main import main
 from symgrasp.errors import InputError, SurveyError, SymgraspError
@@ -24,6 +26,7 @@ from symgrasp.robot.hand import HANDS
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.evaluation import Evaluator, State
 from symgrasp.survey.format import NumberAxis, SurveyFile
+from symgrasp.survey.pictures import draw_survey
 from symgrasp.survey.results import problems
 from symgrasp.survey.running import run_on
 from symgrasp.survey.shipped import list_surveys, shipped_surveys
@@ -305,6 +308,21 @@ def test_a_store_of_version_1_is_gone_on_with(tmp_path):
     path.write_text(path.read_text().replace('"version": 1', '"version": 3'))
     with pytest.raises(SurveyError, match="expected 1 or 2"):
         open_results(out)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_labels_are_not_cut_off(tmp_path, count):
+    """That of a workspace is longer than a small picture is high."""
+    axes = [X, {"name": "y", "of": "position.y", "values": [0.1 * k for k in range(count)]}]
+    label = "feasible angles of the grasp at 10.0 cm, roll 180° (%)"
+    values = xr.DataArray(np.ones((3, count)), dims=("x", "y"), attrs={"label": label})
+    figure = draw_survey(survey_of(axes, tmp_path), values)
+    FigureCanvasAgg(figure).draw()
+    shown = [panel.yaxis.label for panel in figure.axes if "feasible" in panel.get_ylabel()]
+    assert [" ".join(own.get_text().split()) for own in shown] == [label]
+    box = shown[0].get_window_extent()
+    assert 0 <= box.x0 < box.x1 <= figure.bbox.width
+    assert 0 <= box.y0 < box.y1 <= figure.bbox.height
 
 
 def test_a_plan_of_a_kind_that_the_scene_has_not_is_refused(tmp_path):
