@@ -7,8 +7,9 @@ infeasible whether one of those samples is free.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from statistics import median
 from time import process_time
 
 import numpy as np
@@ -28,7 +29,7 @@ from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import missing_extra, shipped_scenes
 from symgrasp.world import open_world
 
-__all__ = ["Guarantee", "run"]
+__all__ = ["Guarantee", "run", "summary"]
 
 RANDOM_GRID = {"heights": 8, "angles": 16}
 """Grid of the scenes whose objects are at random places."""
@@ -65,6 +66,7 @@ class Guarantee:
         refuted_proven: the same of cells that it says to be proven infeasible: each is a fault.
         tried_proven: number of those for which those were asked.
         ratio: processor time of the map, divided by that of one at 32 samples.
+        random: whether the object is at a random place, not where a shipped scene has it.
     """
 
     scene: str
@@ -84,6 +86,7 @@ class Guarantee:
     refuted_proven: int
     tried_proven: int
     ratio: float
+    random: bool = False
 
     def line(self) -> str:
         """Return the figures as one line of text."""
@@ -117,7 +120,29 @@ def run(random: int) -> Iterator[Guarantee]:
         if k % 2:
             T[:3, :3] = T[:3, :3] @ _turn(rng.normal(0.0, TURN, 3))
         small = scene.with_settings(**RANDOM_GRID)
-        yield _measured(small, Task(f"random {k}", task.arms, T), name)
+        found = _measured(small, Task(f"random {k}", task.arms, T), name)
+        yield replace(found, random=True)
+
+
+def summary(rows: Sequence[Guarantee]) -> Iterator[str]:
+    """Yield what all rows say together, as a line of text for shipped scenes and one for random places."""
+    for random, where in ((False, "shipped scenes"), (True, "random places")):
+        own = [row for row in rows if row.random == random]
+        if not own:
+            continue
+        feasible, infeasible = sum(r.feasible for r in own), sum(r.infeasible for r in own)
+        missed = 100 * sum(r.missed_sampled for r in own) / max(1, feasible)
+        most = 100 * max(r.missed_sampled / max(1, r.feasible) for r in own)
+        proven = 100 * sum(r.proven for r in own) / max(1, infeasible)
+        yield (
+            f"{where}, {len(own)} maps with {feasible} feasible cells: {AUTO_SAMPLES} samples miss "
+            f"{missed:.1f} % of them, of one map up to {most:.1f} %; auto misses "
+            f"{sum(r.missed for r in own)}; {proven:.1f} % of {infeasible} infeasible ones proven; refuted "
+            f"{sum(r.refuted for r in own)} of {sum(r.tried for r in own)} others, and of the proven "
+            f"{sum(r.refuted_proven for r in own)} of {sum(r.tried_proven for r in own)}, "
+            f"{sum(r.missed_proven for r in own)} by samples; "
+            f"median time × {median(r.ratio for r in own):.2f}"
+        )
 
 
 def _arms(scene: Scene) -> Iterator[tuple[Task, str]]:

@@ -94,14 +94,8 @@ def _guarantee(args: argparse.Namespace) -> dict[str, Any]:
     for row in guarantee.run(args.random):
         say(row.line())
         rows.append(row)
-    ratios = sorted(row.ratio for row in rows)
-    say(
-        f"{sum(row.missed for row in rows)} of {sum(row.feasible for row in rows)} feasible cells missed, "
-        f"{sum(row.refuted for row in rows)} of {sum(row.tried for row in rows)} infeasible ones refuted, "
-        f"of those that are proven {sum(row.missed_proven for row in rows)} by samples and "
-        f"{sum(row.refuted_proven for row in rows)} of {sum(row.tried_proven for row in rows)}; "
-        f"median time × {ratios[len(ratios) // 2]:.2f}"
-    )
+    for line in guarantee.summary(rows):
+        say(line)
     return with_machine("maps", rows)
 
 

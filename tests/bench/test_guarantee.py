@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symgrasp.bench.guarantee import REFUTED, _measured, _refuted
+from symgrasp.bench.guarantee import REFUTED, _measured, _refuted, summary
 from symgrasp.feasibility.create import create_map
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
@@ -21,6 +21,13 @@ def test_a_map_of_all_of_the_redundancy_misses_nothing():
     assert found.feasible > 0 and found.proven > 0
     assert (found.missed, found.missed_proven, found.refuted, found.refuted_proven) == (0, 0, 0, 0)
     assert "of the proven 0 of" in found.line()
+    missed = replace(found, missed=3, random=True, ratio=2.5)
+    shipped, random, *others = summary([found, missed, replace(missed, ratio=4.5)])
+    assert "auto misses 0;" in shipped
+    assert f"2 maps with {2 * found.feasible} feasible cells" in random
+    assert "auto misses 6;" in random
+    assert "median time × 3.50" in random
+    assert not others
 
 
 def test_cells_that_are_falsely_infeasible_are_refuted():
