@@ -203,6 +203,7 @@ class PlanService:
         self._ahead: deque[Plan] = deque()  # plans that were tried, but are not listed yet
         self._listed = 0
         self._progress: Progress | None = None
+        self._share = 0.0  # that was told last of the planner's work
 
     def close(self) -> None:
         """End the planner, which holds a physics world."""
@@ -244,7 +245,7 @@ class PlanService:
 
     def more(self, progress: Progress) -> tuple[tuple[PlanResult, ...], bool]:
         """Return the next plans of the last planner, and whether there may be more."""
-        self._progress = progress
+        self._progress, self._share = progress, SEARCH
         return self._next_plans()
 
     def motion(self, request: MotionRequest, progress: Progress) -> MotionOutcome:
@@ -253,7 +254,7 @@ class PlanService:
         Raises:
             NoPlanError: none has one; says why.
         """
-        self._progress = progress
+        self._progress, self._share = progress, 0.0
         failures: list[Failure] = []
         scene = with_poses(request.scene, request.poses)
         plans = chain(request.plans, self._not_listed() if request.more else ())
@@ -302,7 +303,8 @@ class PlanService:
         def report_progress(share: float) -> None:
             assert self._progress  # replaced by every call, so that `more` reports its own
             if not self._listed:
-                self._progress(SEARCH * share)
+                self._share = SEARCH * share
+            self._progress(self._share)  # also while plans are listed: it may cancel
 
         if request.method == "regrasp":
             return regrasp_plans(scene, request.name, maps, report_progress)
@@ -328,7 +330,8 @@ class PlanService:
             self._ahead.popleft()
             plans.append(plan_result(plan, self._scene))
             self._listed += 1
-            self._progress(SEARCH + (1 - SEARCH) * len(plans) / PLANS_PER_BATCH)
+            self._share = SEARCH + (1 - SEARCH) * len(plans) / PLANS_PER_BATCH
+            self._progress(self._share)
         more = len(plans) == PLANS_PER_BATCH
         if not more:
             self.close()

@@ -14,7 +14,7 @@ from symgrasp.motion.record import with_motion
 from symgrasp.motion.segments import Motion
 from symgrasp.motion.times.timing import timed
 from symgrasp.plan.plan import Plan
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 
@@ -83,8 +83,8 @@ def moving_plans(
         planner = MotionPlanner(scene, world)
         for number, plan in enumerate(islice(plans, MOST_TRIED), start=1):
             try:
-                moving, motion = planner.plan(plan, seed, progress)
-                motion = timed(motion, progress)
+                moving, motion = planner.plan(plan, seed, part_of(progress, 0, 2))
+                motion = timed(motion, part_of(progress, 1, 2))
             except NoPlanError as error:  # no way, or none within the limits of speed
                 failures.append(Failure(number, str(error)))
             else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from itertools import combinations, islice
 from types import MappingProxyType
@@ -111,6 +111,7 @@ class ConfigurationFinder:
         torso: Mapping[str, int] = MappingProxyType({}),
         *,
         every: bool = True,
+        trying: Callable[[], None] = lambda: None,
     ) -> list[ArmConfiguration] | None:
         """Return configurations, one an arm, that are free together, or None if there are none.
 
@@ -120,14 +121,15 @@ class ConfigurationFinder:
             cells: a feasible cell for every arm.
             torso: arm → sample of its torso, for those that share one.
             every: try all combinations of feasible configurations, not the witnesses alone.
+            trying: called before every check that takes long; may raise `Cancelled`.
         """
         at = [_At(k, cells[k], torso.get(arm.name)) for k, arm in enumerate(self.arms)]
         found = witnesses(self.arms, self.maps_at(torso), cells)
         if every:
-            found = [self._easier(*pair) for pair in zip(at, found, strict=True)]
+            found = [self._easier(*pair, trying) for pair in zip(at, found, strict=True)]
         if self.conflict(found) is None:
             return found
-        return self._first_free(at) if every else None
+        return self._first_free(at, trying) if every else None
 
     def excluding(self, cells: Sequence[Cell], torso: Mapping[str, int]) -> Iterator[tuple[int, int]]:
         """Yield pairs of arms, as indices, that cannot hold their cells together, whatever all others do.
@@ -160,7 +162,7 @@ class ConfigurationFinder:
     def _robot_pairs(self) -> RobotPairs:
         return RobotPairs(self.world)
 
-    def _easier(self, at: _At, witness: ArmConfiguration) -> ArmConfiguration:
+    def _easier(self, at: _At, witness: ArmConfiguration, trying: Callable[[], None]) -> ArmConfiguration:
         """Return the one of the easiest configurations that has the largest product of ease and clearance.
 
         The witness of the map has the largest clearance, so where its ease is 1 it is the best.
@@ -171,16 +173,18 @@ class ConfigurationFinder:
         configurations = self._choices(at).configurations
         eases = ease(arm, np.reshape([c.q for c in configurations], (-1, arm.dof)))
         order = (int(i) for i in np.argsort(-eases, kind="stable") if eases[i] > ease(arm, witness.q))
-        free = [configurations[i] for i in islice((i for i in order if self._is_feasible(at, i)), EASIEST)]
+        feasible = (i for i in order if self._is_feasible(at, i, trying))
+        free = [configurations[i] for i in islice(feasible, EASIEST)]
         self.world.set_object(self.maps[0].T_world_object)
 
         def worth(c: ArmConfiguration) -> float:
+            trying()
             self.world.set_arms([c])
             return float(ease(arm, c.q)) * self.world.clearance(arm, CLEARANCE_LIMIT, self.arms)
 
         return max([witness, *free], key=worth)
 
-    def _first_free(self, at: Sequence[_At]) -> list[ArmConfiguration] | None:
+    def _first_free(self, at: Sequence[_At], trying: Callable[[], None]) -> list[ArmConfiguration] | None:
         """Return the first free combination of the arms' feasible configurations, as a product lists them.
 
         What certainly meets is left out, and everything else checked when a combination needs it.
@@ -194,7 +198,8 @@ class ConfigurationFinder:
             picked = first_combination([own.left for own in choices], pairs, excluded)
             if picked is None:
                 return None
-            if not all([self._is_feasible(one, i) for one, i in zip(at, picked, strict=True)]):
+            trying()
+            if not all([self._is_feasible(one, i, trying) for one, i in zip(at, picked, strict=True)]):
                 continue
             found = [own.configurations[i] for own, i in zip(choices, picked, strict=True)]
             arms = self.conflict(found)
@@ -235,10 +240,11 @@ class ConfigurationFinder:
         certain = self._robot_pairs.certify(one.placed, other.placed, self.world.scene.settings.margin)
         return [sum(1 << int(j) for j in np.flatnonzero(row != COLLIDING)) for row in certain]
 
-    def _is_feasible(self, at: _At, choice: int) -> bool:
+    def _is_feasible(self, at: _At, choice: int, trying: Callable[[], None]) -> bool:
         """Whether a choice is feasible for the arm alone, the other robots at home; forget it if not."""
         own = self._choices(at)
         if not own.checked >> choice & 1:
+            trying()
             for robot in self.world.scene.robots:
                 self.world.park(robot)
             self.world.set_object(self.maps[at.arm].T_world_object)

@@ -94,8 +94,7 @@ class FreePlacements:
         placements = self._search.best_first()
         bound = np.inf
         while True:
-            if self._progress:
-                self._progress(self.tried / (self.tried + HALFWAY))
+            self._trying()
             if waiting and -waiting[0].loss >= bound:
                 attempt = heapq.heappop(waiting)
                 if self._is_listed(attempt.holding, listed):
@@ -119,6 +118,10 @@ class FreePlacements:
                 bound = -np.inf
             else:
                 return
+
+    def _trying(self) -> None:
+        if self._progress:
+            self._progress(self.tried / (self.tried + HALFWAY))
 
     def _is_listed(self, holding: Holding, listed: Sequence[FreePlacement]) -> bool:
         angles = self._finders[0].maps[0].manifold.angles
@@ -169,7 +172,7 @@ class FreePlacements:
             if self._search.torsos[t].visit == k
             for arm in self._search.torsos[t].maps
         }
-        configurations = finder.find(cells, torso)
+        configurations = finder.find(cells, torso, trying=self._trying)
         if configurations:
             return Step(turn.columns, configurations, cells, finder.maps_at(torso))
         for a, b in finder.excluding(cells, torso):

@@ -80,7 +80,7 @@ class Picky(ConfigurationFinder):
         super().__init__(world, arms, maps)
         self.seed = seed
 
-    def find(self, cells, torso=None, *, every=True):
+    def find(self, cells, torso=None, *, every=True, trying=lambda: None):
         rng = np.random.default_rng([self.seed, *chain(*cells)])
         free = rng.random() < 0.05
         return [ArmConfiguration(arm, np.full(7, rng.random()), 0.0) for arm in self.arms] if free else None

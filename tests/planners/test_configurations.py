@@ -30,7 +30,7 @@ class Slow(ConfigurationFinder):
         super().__init__(*args)
         self.known = {}
 
-    def find(self, cells, torso=None, *, every=True):
+    def find(self, cells, torso=None, *, every=True, trying=lambda: None):
         if self._is_free(found := witnesses(self.arms, self.maps, cells)):
             return found
         combinations = product(*(self._feasible(k, cell) for k, cell in enumerate(cells)))

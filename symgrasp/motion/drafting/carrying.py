@@ -114,9 +114,9 @@ def carry_alone(
         NoMotionError: no way was found.
     """
     with part_of("its start"):
-        lift, out = _off(bodies, state, grip, choices)
+        lift, out = _off(bodies, state, grip, choices, progress)
     with part_of("its end"):
-        lower, back = _off(bodies, state.with_object(goal), grip, arrivals)
+        lower, back = _off(bodies, state.with_object(goal), grip, arrivals, progress)
     held = _holding(state, grip)
     situation = bodies.situation(held, [grip.arm], held_by=[grip.arm], tilt=tilt)
     path = connect(situation, out.ends, back.ends, seed, progress)
@@ -124,14 +124,17 @@ def carry_alone(
     return [Part("lift", lift, start), Part("carry", situation, path), Part("lower", lower, end[::-1])]
 
 
-def _off(bodies: MotionScene, state: State, grip: Grip, choices: Array) -> tuple[Situation, LineTree]:
+def _off(
+    bodies: MotionScene, state: State, grip: Grip, choices: Array, progress: Progress | None
+) -> tuple[Situation, LineTree]:
     """Return the straight ways off what the object rests on, from some configurations (m, n)."""
     T = state.T_world_object
     rest = bodies.rest(T)
     held = _holding(state, grip)
     situation = bodies.situation(held, [grip.arm], held_by=[grip.arm], rest=rest)
     poses = straight(T, lifted(T, rest)) if rest.pieces else [T]
-    return situation, follow([Leg(situation, [grip.tool(pose) for pose in poses])], grip.fine, choices)
+    leg = Leg(situation, [grip.tool(pose) for pose in poses])
+    return situation, follow([leg], grip.fine, choices, progress=progress)
 
 
 def _holding(state: State, grip: Grip) -> State:
@@ -149,6 +152,7 @@ def carry_together(
     stretches: Sequence[Stretch],
     choices: Mapping[str, Array],
     tilt: float,
+    progress: Progress | None,
 ) -> list[Part]:
     """Move the object with several arms along given poses.
 
@@ -159,6 +163,7 @@ def carry_together(
         stretches: the poses.
         choices: arm → configurations (m, n) in which it may hold the object at first.
         tilt: largest tilt (rad) of the object.
+        progress: called now and then; may raise `Cancelled`.
 
     Raises:
         NoMotionError: no way was found.
@@ -179,12 +184,16 @@ def carry_together(
         ]
         furthest = _furthest(bodies.scene, grip)
         with part_of(name):
-            trees[name] = follow(legs, grip.fine, choices[name], deviation=SLIP, distance=furthest)
+            trees[name] = follow(
+                legs, grip.fine, choices[name], deviation=SLIP, distance=furthest, progress=progress
+            )
         at = at.with_arm(grip.arm, trees[name].path(0)[0], grip.closed)
     situations = [bodies.situation(at, arms, held_by=arms, rest=s.rest, tilt=tilt) for s in stretches]
     ends = np.cumsum([0, *(len(s.poses) - 1 for s in stretches)])
     hits = np.zeros((0, 2), dtype=np.int64)
     for chosen in islice(_combinations(trees), COMBINATIONS):
+        if progress:
+            progress(0.0)
         rows = situations[0].stacked(chosen)
         if any(not np.array_equal(own, chosen[name]) for name, own in situations[0].by_arm(rows).items()):
             continue  # arms of one body need one torso

@@ -72,7 +72,7 @@ class MotionDraft:
         progress: Progress | None,
     ) -> None:
         self._bodies, self._scene, self._grips = bodies, bodies.scene, grips
-        self._tasks, self._seed, self._progress = plan.tasks, seed, progress
+        self._tasks, self._seed, self._told, self._share = plan.tasks, seed, progress, 0.0
         self._lifts = plan.kind == "bimanual"
         self._course = Course(bodies, bodies.home().with_object(plan.tasks[0].object_pose_turned.array()))
         self._trees: dict[str, LineTree] = {}  # of the arms of which is not decided how they take the object
@@ -90,8 +90,7 @@ class MotionDraft:
             for name, grip in held.items():
                 self._visits[k][name] = self._course.state.joints(grip.arm)
             self._take(task)
-            if self._progress:
-                self._progress((k + 1) / (len(self._tasks) + 1))
+            self._share = (k + 1) / (len(self._tasks) + 1)
         task = self._tasks[-1]
         if self._lifts:
             self._carry_together(task, task, list(held))
@@ -99,9 +98,14 @@ class MotionDraft:
             self._release(task, list(held))
         self._decide_all(task)
         poses = [task.object_pose_turned.array() for task in self._tasks]
-        if self._progress:
-            self._progress(1.0)
+        self._share = 1.0
+        self._progress()
         return PlannedMotion(Motion(self._scene, poses, tuple(self._course.segments)), self._visits)
+
+    def _progress(self, _: float = 0.0) -> None:
+        """Tell how many tasks are done: how much is left of what calls this is not known beforehand."""
+        if self._told:
+            self._told(self._share)
 
     # -- from task to task -------------------------------------------------------------------
 
@@ -200,7 +204,9 @@ class MotionDraft:
         grips = [self._course.held[name] for name in names]
         choices = {name: self._choices(name) for name in names}
         with part_of(what):
-            parts = carry_together(self._bodies, state, grips, stretches, choices, tilt.largest)
+            parts = carry_together(
+                self._bodies, state, grips, stretches, choices, tilt.largest, self._progress
+            )
         for name, q in parts[0].situation.by_arm(parts[0].path[0]).items():
             if name in self._trees:
                 self._decide(name, before, q)
@@ -241,7 +247,7 @@ class MotionDraft:
         poses = retreating(grip, state.T_world_object, self._scene.settings.approach, self._scene.profile)
         # Followed inwards: so every configuration of the grasp that can be reached is kept.
         end = _configurations(grip, task, state.T_world_object)
-        return follow([Leg(situation, poses[::-1])], grip.fine, end=end)
+        return follow([Leg(situation, poses[::-1])], grip.fine, end=end, progress=self._progress)
 
     def _decide_all(self, task: PlanTask) -> None:
         for name in list(self._trees):
@@ -290,7 +296,8 @@ class MotionDraft:
             profile, settings = self._scene.profile, self._scene.settings
             poses = retreating(grip, course.state.T_world_object, settings.approach, profile)
             with part_of(f"the retreat of {name} in {task.name}"):
-                tree = follow([Leg(situation, poses)], grip.fine, course.state.joints(arm)[None])
+                at = course.state.joints(arm)[None]
+                tree = follow([Leg(situation, poses)], grip.fine, at, progress=self._progress)
             course.add("retreat", situation, tree.path(int(tree.value.argmax())), task.name)
             situation = self._bodies.situation(course.state, [arm], touching=course.holders())
             with part_of(f"the way home of {name} from {task.name}"):

@@ -18,6 +18,7 @@ from symgrasp.ik import Solver
 from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.search import NoMotionError, blockers, prove
 from symgrasp.poses import Array, inverse, pose_error
+from symgrasp.progress import Progress
 from symgrasp.robot.limits import moved_onto_limits
 
 __all__ = ["CLEAR", "Leg", "LineTree", "configurations", "follow"]
@@ -91,6 +92,7 @@ def follow(
     end: Array | None = None,
     deviation: float = DEVIATION,
     distance: float = NEAR_TOOL,
+    progress: Progress | None = None,
 ) -> LineTree:
     """Follow a path with an arm.
 
@@ -101,6 +103,7 @@ def follow(
         end: (m, n) configurations at the last sample to arrive at; all of them if None.
         deviation: how far (m) points may be off the path between two samples.
         distance: how far (m) they are from the tool.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Raises:
         NoMotionError: the path cannot be followed to its end; says where and why it ends.
@@ -114,6 +117,8 @@ def follow(
     layer, reached = layer[proof.free], proof.clearance[proof.free]
     layers, befores = [layer], []
     for k, (situation, before, pose) in enumerate(steps, start=1):
+        if progress:
+            progress(k / len(steps))
         last = k == len(steps)
         following = end if last and end is not None else configurations(solver, pose)
         new = _following_turns(layer, following, situation.linkage.limits)

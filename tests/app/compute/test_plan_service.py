@@ -7,7 +7,7 @@ from contextlib import closing
 import pytest
 
 from app.compute.map_service import MapService
-from app.compute.plan_service import PlanRequest, PlanService
+from app.compute.plan_service import PLANS_PER_BATCH, PlanRequest, PlanService
 from app.state.plans.plan_results import PlanKind
 from symgrasp.errors import Cancelled
 from tests.conftest import load_small
@@ -56,3 +56,27 @@ def test_a_planner_ends_where_it_is_cancelled_and_plans_again(case, share):
             service.plan(request, {}, progress)
         assert [now >= share for now in told] == [False] * (len(told) - 1) + [True]  # it went on no further
         assert service.plan(request, {}, lambda _: None).plans
+
+
+@pytest.mark.parametrize("listed", [1, 5, 9])
+def test_listing_ends_where_it_is_cancelled_between_two_plans(listed):
+    """What a planner tries between two plans may take long; it asks there as well."""
+    request = request_of("handover_between_robots", "handover", "", "")
+    told: list[float] = []
+    with closing(MapService()) as maps, closing(PlanService(maps, ())) as service:
+        service.plan(request, {}, told.append)
+    share = sorted(set(told))[listed - PLANS_PER_BATCH - 1]
+    again: list[float] = []
+
+    def progress(now: float) -> None:
+        again.append(now)
+        if again.count(share) == 2:  # once with the plan, and then while the next one is sought
+            raise Cancelled
+
+    with (
+        closing(MapService()) as maps,
+        closing(PlanService(maps, ())) as service,
+        pytest.raises(Cancelled),
+    ):
+        service.plan(request, {}, progress)
+    assert max(again) == again[-1] == share
