@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import njit
 from symgrasp.poses import Array
 
-__all__ = ["box_of", "boxes_apart", "boxes_of", "oriented_boxes_apart"]
+__all__ = ["between_centres", "box_of", "boxes_apart", "boxes_of", "oriented_boxes_gap"]
 
 
 def boxes_of(size: Array, pose: Array) -> Array:
@@ -57,8 +59,8 @@ def boxes_apart(box, a, b, other, reach):
 
 
 @njit(**FAST)
-def oriented_boxes_apart(size, pose, a, b, reach):
-    """Whether two pieces are further apart than ``reach`` (m), by their boxes in their own frames.
+def oriented_boxes_gap(size, pose, a, b, enough):
+    """Return a lower bound (m) of the distance of two pieces by the boxes around them in their own frames.
 
     Only the faces of the boxes are tried as separating planes, not pairs of their edges.
 
@@ -67,37 +69,46 @@ def oriented_boxes_apart(size, pose, a, b, reach):
         pose: (P, 12) poses of the pieces.
         a: index of a piece.
         b: index of another piece.
-        reach: the distance (m).
+        enough: bound (m) at which to stop.
+
+    Returns:
+        The bound, which is negative where no face separates the boxes, and the unit vector (3,) from b to a
+        across the face that gives it.
     """
-    reach += size[a, 0] + size[b, 0]
-    d0, d1, d2 = pose[b, 9] - pose[a, 9], pose[b, 10] - pose[a, 10], pose[b, 11] - pose[a, 11]
-    for i in range(3):
-        d = (d0, d1, d2)[i]
-        for j in range(3):
-            d += pose[b, 3 * i + j] * size[b, 3 + j] - pose[a, 3 * i + j] * size[a, 3 + j]
-        if i == 0:
-            d0 = d
-        elif i == 1:
-            d1 = d
-        else:
-            d2 = d
+    thick = size[a, 0] + size[b, 0]
+    d0, d1, d2 = between_centres(size, pose, a, b)
     # Half extents of both boxes along the axes of b, from the products of their axes.
     across0, across1, across2 = size[b, 6], size[b, 7], size[b, 8]
+    best, side, owner, axis = -math.inf, 0.0, a, 0
     for i in range(3):
-        half, along = 0.0, d0 * pose[a, i] + d1 * pose[a, 3 + i] + d2 * pose[a, 6 + i]
+        along = d0 * pose[a, i] + d1 * pose[a, 3 + i] + d2 * pose[a, 6 + i]
+        c0 = abs(pose[a, i] * pose[b, 0] + pose[a, 3 + i] * pose[b, 3] + pose[a, 6 + i] * pose[b, 6])
+        c1 = abs(pose[a, i] * pose[b, 1] + pose[a, 3 + i] * pose[b, 4] + pose[a, 6 + i] * pose[b, 7])
+        c2 = abs(pose[a, i] * pose[b, 2] + pose[a, 3 + i] * pose[b, 5] + pose[a, 6 + i] * pose[b, 8])
+        across0 += c0 * size[a, 6 + i]
+        across1 += c1 * size[a, 6 + i]
+        across2 += c2 * size[a, 6 + i]
+        half = c0 * size[b, 6] + c1 * size[b, 7] + c2 * size[b, 8] + size[a, 6 + i]
+        if abs(along) - half - thick > best:
+            best, side, axis = abs(along) - half - thick, along, i
+            if best >= enough:
+                break
+    if best < enough:
         for j in range(3):
-            c = pose[a, i] * pose[b, j] + pose[a, 3 + i] * pose[b, 3 + j] + pose[a, 6 + i] * pose[b, 6 + j]
-            half += abs(c) * size[b, 6 + j]
-            if j == 0:
-                across0 += abs(c) * size[a, 6 + i]
-            elif j == 1:
-                across1 += abs(c) * size[a, 6 + i]
-            else:
-                across2 += abs(c) * size[a, 6 + i]
-        if abs(along) > half + size[a, 6 + i] + reach:
-            return True
+            along = d0 * pose[b, j] + d1 * pose[b, 3 + j] + d2 * pose[b, 6 + j]
+            half = (across0, across1, across2)[j]
+            if abs(along) - half - thick > best:
+                best, side, owner, axis = abs(along) - half - thick, along, b, j
+    sign = 1.0 if side >= 0.0 else -1.0
+    return best, (sign * pose[owner, axis], sign * pose[owner, 3 + axis], sign * pose[owner, 6 + axis])
+
+
+@njit(**FAST)
+def between_centres(size, pose, a, b):
+    """Return the centre (3,) of the box of piece a relative to that of piece b, in the world."""
+    d0, d1, d2 = pose[a, 9] - pose[b, 9], pose[a, 10] - pose[b, 10], pose[a, 11] - pose[b, 11]
     for j in range(3):
-        along = d0 * pose[b, j] + d1 * pose[b, 3 + j] + d2 * pose[b, 6 + j]
-        if abs(along) > (across0, across1, across2)[j] + reach:
-            return True
-    return False
+        d0 += pose[a, j] * size[a, 3 + j] - pose[b, j] * size[b, 3 + j]
+        d1 += pose[a, 3 + j] * size[a, 3 + j] - pose[b, 3 + j] * size[b, 3 + j]
+        d2 += pose[a, 6 + j] * size[a, 3 + j] - pose[b, 6 + j] * size[b, 3 + j]
+    return d0, d1, d2

@@ -20,11 +20,12 @@ import math
 
 import numpy as np
 
+from symgrasp.collision.boxes import oriented_boxes_gap
 from symgrasp.collision.pieces import SEED_GRID
 from symgrasp.collision.simplex import FAST, SURROUNDS, depth_inside, reduce_to_nearest
 from symgrasp.compiling import njit
 
-__all__ = ["between_centres", "distance_bounds", "distance_bounds_from"]
+__all__ = ["distance_bounds", "distance_bounds_from"]
 
 STEPS = 40
 """Largest number of iterations; the bounds at that point are returned."""
@@ -37,6 +38,9 @@ CLOSE = 0.03
 def distance_bounds(pieces, pose, a, b, enough, sure, little, work):
     """Return a lower and an upper bound (m) of the distance of two pieces.
 
+    The faces of the boxes around them are tried first. They tell most pieces apart that are not close, and
+    the one that comes nearest to it faces the other piece, so the iterations begin across it.
+
     Args:
         pieces: the arrays of `PackedPieces`, as a tuple.
         pose: (P, 12) pose of each piece, see `pose_rows`.
@@ -48,10 +52,14 @@ def distance_bounds(pieces, pose, a, b, enough, sure, little, work):
         work: (4, 3) the simplex, overwritten.
 
     Returns:
-        The bounds. Where the pieces overlap the upper one is negative and the lower one -inf.
+        The bounds. Where the pieces overlap the upper one is negative and the lower one -inf; where the boxes
+        around them are far enough apart, the upper one is inf.
     """
+    gap, (v0, v1, v2) = oriented_boxes_gap(pieces.size, pose, a, b, enough)
+    if gap >= enough:
+        return gap, math.inf
     lower, upper, _ = distance_bounds_from(
-        pieces, pose, a, b, enough, sure, little, work, between_centres(pieces.size, pose, a, b)
+        pieces, pose, a, b, enough, sure, little, work, (v0, v1, v2, -1, -1)
     )
     return lower, upper
 
@@ -63,8 +71,8 @@ def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, begin):
     Args:
         pieces, pose, a, b, enough, sure, little, work: see `distance_bounds`.
         begin: a direction (3,) from b to a, and vertices of both to climb from, -1 where none are known: what
-            was returned when the pieces had almost the same poses, which is almost always enough, or
-            `between_centres`.
+            was returned when the pieces had almost the same poses, which is almost always enough, or the
+            direction of `between_centres` or `oriented_boxes_gap`.
 
     Returns:
         The bounds, and the last direction with its vertices.
@@ -114,24 +122,6 @@ def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, begin):
         if square < 1e-24:
             break
     return lower - thick, upper - thick, (v0, v1, v2, at_a, at_b)
-
-
-@njit(**FAST)
-def between_centres(size, pose, a, b):
-    """Return the centre of the box of piece a relative to that of piece b, to begin with, and no vertices."""
-    ca, cb = _centre(size, pose, a), _centre(size, pose, b)
-    return ca[0] - cb[0], ca[1] - cb[1], ca[2] - cb[2], -1, -1
-
-
-@njit(**FAST)
-def _centre(size, pose, k):
-    """Return the centre of the box of piece k in the world."""
-    c0, c1, c2 = size[k, 3], size[k, 4], size[k, 5]
-    return (
-        pose[k, 0] * c0 + pose[k, 1] * c1 + pose[k, 2] * c2 + pose[k, 9],
-        pose[k, 3] * c0 + pose[k, 4] * c1 + pose[k, 5] * c2 + pose[k, 10],
-        pose[k, 6] * c0 + pose[k, 7] * c1 + pose[k, 8] * c2 + pose[k, 11],
-    )
 
 
 @njit(**FAST)

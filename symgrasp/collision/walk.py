@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from symgrasp.collision.boxes import boxes_apart
-from symgrasp.collision.distance import between_centres, distance_bounds_from
+from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import njit
 
@@ -51,10 +51,7 @@ def next_near(pieces, tree, scratch, k, sure, reach, waiting):
         hull = tree.hull[node]
         if hull >= 0:
             enough = sure if tree.solid[node] else reach
-            begin = between_centres(pieces.size, scratch.pose, k, hull)
-            lower, _, _ = distance_bounds_from(
-                pieces, scratch.pose, k, hull, reach, enough, enough, scratch.simplex, begin
-            )
+            lower, _ = distance_bounds(pieces, scratch.pose, k, hull, reach, enough, enough, scratch.simplex)
             if lower >= reach:
                 continue
             if lower >= enough:

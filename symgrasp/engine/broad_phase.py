@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from symgrasp.collision.boxes import boxes_apart, oriented_boxes_apart
+from symgrasp.collision.boxes import boxes_apart
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.simplex import FAST
 from symgrasp.collision.walk import next_near
@@ -80,8 +80,6 @@ def _mark_pairs(pieces, scratch, pairs, reach, near, first):
 def _is_near(pieces, scratch, a, b, reach):
     """Whether two pieces are not certified further apart than ``reach`` (m)."""
     if boxes_apart(scratch.box, a, b, scratch.box, reach):
-        return False
-    if oriented_boxes_apart(pieces.size, scratch.pose, a, b, reach):
         return False
     lower, _ = distance_bounds(pieces, scratch.pose, a, b, reach, reach, reach, scratch.simplex)
     return lower < reach

@@ -19,7 +19,7 @@ from functools import partial
 
 import numpy as np
 
-from symgrasp.collision.boxes import box_of, boxes_apart, oriented_boxes_apart
+from symgrasp.collision.boxes import box_of, boxes_apart
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.simplex import FAST
@@ -231,8 +231,6 @@ def _free(pieces, scratch, a, b, margin, motion):
     keep = margin + FREE_BAND + ROUNDING
     reach = keep + motion
     if boxes_apart(scratch.box, a, b, scratch.box, reach):
-        return PROVEN
-    if oriented_boxes_apart(pieces.size, scratch.pose, a, b, reach):
         return PROVEN
     lower, upper = distance_bounds(pieces, scratch.pose, a, b, reach, reach, keep, scratch.simplex)
     if lower >= reach:

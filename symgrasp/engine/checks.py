@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from symgrasp.collision.boxes import boxes_apart, oriented_boxes_apart
+from symgrasp.collision.boxes import boxes_apart
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.simplex import FAST
 from symgrasp.collision.walk import next_near
@@ -164,8 +164,6 @@ def _pair(pieces, scratch, a, b, margin, gap, best):
     size = pieces.size
     sure = margin + FREE_BAND
     reach = max(gap, sure)
-    if oriented_boxes_apart(size, scratch.pose, a, b, reach):
-        return gap
     slack = size[a, 1] + size[b, 1]
     bar = max(best, margin - HIT_BAND - slack)
     lower, upper = distance_bounds(pieces, scratch.pose, a, b, reach, sure, bar, scratch.simplex)

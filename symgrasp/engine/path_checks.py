@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 
-from symgrasp.collision.boxes import boxes_apart, oriented_boxes_apart
-from symgrasp.collision.distance import between_centres, distance_bounds_from
+from symgrasp.collision.boxes import boxes_apart, oriented_boxes_gap
+from symgrasp.collision.distance import distance_bounds_from
 from symgrasp.collision.simplex import FAST
 from symgrasp.collision.walk import next_near
 from symgrasp.compiling import njit
@@ -135,11 +135,12 @@ def _pair(moving, pieces, scratch, path, row, a, b, margin):
     size, pose, middle = pieces.size, scratch.pose, len(path.frames) // 2
     sure = margin + FREE_BAND
     reach = sure + _motion(moving, path, a) + _motion(moving, path, b)
-    if oriented_boxes_apart(size, pose, a, b, reach):
+    apart, (v0, v1, v2) = oriented_boxes_gap(size, pose, a, b, reach)
+    if apart >= reach:
         return 0.0
     slack = size[a, 1] + size[b, 1]
     bar = margin - HIT_BAND - slack
-    begin = between_centres(size, pose, a, b)
+    begin = v0, v1, v2, -1, -1
     lower, upper, begin = distance_bounds_from(pieces, pose, a, b, reach, sure, bar, scratch.simplex, begin)
     gap = 0.0 if lower >= sure else UNDECIDED
     if upper >= bar and lower < reach:

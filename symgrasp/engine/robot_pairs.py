@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symgrasp.collision.boxes import boxes_apart, boxes_of, oriented_boxes_apart
+from symgrasp.collision.boxes import boxes_apart, boxes_of
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.pieces import Piece, pack, pose_rows
 from symgrasp.collision.simplex import FAST
@@ -114,8 +114,6 @@ def _certain(pieces, a, i, b, j, margin, pose, simplex):
                 continue
             second = b.pieces[t]
             _copy(b.pose[j, t], pose[second])
-            if oriented_boxes_apart(pieces.size, pose, first, second, sure):
-                continue
             deep = margin - HIT_BAND - pieces.size[first, 1] - pieces.size[second, 1]
             lower, upper = distance_bounds(pieces, pose, first, second, sure, sure, deep, simplex)
             if upper < deep:

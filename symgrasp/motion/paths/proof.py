@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from symgrasp.collision.boxes import box_of, boxes_apart, oriented_boxes_apart
+from symgrasp.collision.boxes import box_of, boxes_apart
 from symgrasp.collision.distance import distance_bounds
 from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import ENTRY, njit
@@ -224,8 +224,6 @@ def _pair_step(pieces, work, p, other, keep, v, a, step, least):
     """Return a step that is free for a pair of pieces too, how far (m) they move in it, and the clearance."""
     moved = v * step + 0.5 * a * step * step
     reach = keep + max(moved / SHARE, moved + least, CLOSEST)
-    if oriented_boxes_apart(pieces.size, work.pose, p, other, reach):
-        return step, moved, least
     near = keep + CLOSEST
     gap, _ = distance_bounds(pieces, work.pose, p, other, reach, near, near, work.simplex)
     if gap < near:
