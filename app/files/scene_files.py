@@ -21,7 +21,8 @@ from symgrasp.descriptions.srdf import find_srdf
 from symgrasp.errors import InputError, SceneError, as_written
 from symgrasp.files import LARGEST_YAML, SCENES_DIR, TEMPORARY, parse_yaml, read_file
 from symgrasp.references import package_dirs, portable, resolve
-from symgrasp.scene.format import SceneFile, describe_error, xacro_texts
+from symgrasp.scene.field_errors import describe_error
+from symgrasp.scene.format import SceneFile, xacro_texts
 from symgrasp.scene.scene import Scene
 
 from ..choices.uploaded_scene import UploadedScene

@@ -25,7 +25,8 @@ from symgrasp.feasibility.pictures import to_png
 from symgrasp.files import check_size, parse_json, read_file, write_atomically
 from symgrasp.plan.motion_record import MotionRecord
 from symgrasp.poses import Array, quat_wxyz
-from symgrasp.scene.format import MOST_TASKS, WHOLE, describe_error
+from symgrasp.scene.field_errors import describe_error
+from symgrasp.scene.format import MOST_TASKS, WHOLE
 
 if TYPE_CHECKING:  # reading plans takes neither
     from symgrasp.feasibility.map import FeasibilityMap

@@ -19,6 +19,7 @@ from symgrasp.object.profile import Profile
 from symgrasp.page import page_module
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.building import SceneBuilder, check_settings
+from symgrasp.scene.field_errors import describe_error
 from symgrasp.scene.format import (
     MOST_TASKS,
     MapSettings,
@@ -26,7 +27,6 @@ from symgrasp.scene.format import (
     PoseFile,
     SceneFile,
     TaskFile,
-    describe_error,
 )
 from symgrasp.scene.map_content import map_content
 from symgrasp.scene.parts import Obstacle, Task

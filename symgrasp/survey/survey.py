@@ -20,7 +20,8 @@ from symgrasp.errors import InputError, SceneError, SurveyError, SymgraspError, 
 from symgrasp.files import LARGEST_YAML, parse_yaml, read_file
 from symgrasp.planners.planning import tasks_of_plan
 from symgrasp.poses import rotation_z
-from symgrasp.scene.format import PoseFile, SceneFile, describe_error
+from symgrasp.scene.field_errors import describe_error
+from symgrasp.scene.format import PoseFile, SceneFile
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.format import (
     BASE,

@@ -15,7 +15,7 @@ from symgrasp.robot import assembly
 from symgrasp.robot.assembly import MOST_LINKS, Frame, Mount, assemble
 from symgrasp.robot.model import RobotModel
 from tests.hostile import chain_urdf
-from tests.meshes.test_reading import collada
+from tests.meshes.files import collada
 
 WSG = resolve("package://static_scenes/hands/wsg50.urdf", Path()) or Path()
 IIWA = resolve("package://pybullet_data/kuka_iiwa/model.urdf", Path()) or Path()

@@ -17,7 +17,7 @@ from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, BulletWorld
 from tests.conftest import write_scene
 from tests.engine.identity import assert_same, assert_true
-from tests.meshes.test_reading import collada
+from tests.meshes.files import collada
 
 
 def crate() -> trimesh.Trimesh:

@@ -15,7 +15,7 @@ from symgrasp.references import package_dir
 from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import link_names, load_urdf
 from symgrasp.world.shapes import MARGIN, link_shapes
-from tests.meshes.test_reading import collada, stl
+from tests.meshes.files import collada, stl
 
 DATA = Path(package_dir("pybullet_data") or "")
 
