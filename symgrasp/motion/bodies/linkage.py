@@ -98,7 +98,7 @@ class Workspace(NamedTuple):
         box: (P, 6) axis-aligned boxes around them.
         frames: (J, 12) present joint frames in the world.
         simplex: (4, 3) for `distance_bounds`.
-        q: (5, J) joint values.
+        q: (4, J) joint values.
         twist: (J, 6) how each joint frame turns (3,), and how its point at the origin of the world moves
             (3,), for each unit of the path's parameter.
         waiting: (W, 3) stretches of a line that wait for proofs: both ends, and half the length of the one
@@ -130,7 +130,7 @@ def new_workspace(linkage: Linkage, pieces: PackedPieces, pose: Array) -> Worksp
         box=boxes_of(pieces.size, pose),
         frames=np.empty((joints, 12)),
         simplex=np.empty((4, 3)),
-        q=np.empty((5, joints)),
+        q=np.empty((4, joints)),
         twist=np.empty((joints, 6)),
         waiting=np.empty((WAITING, 3)),
         speed=np.empty((len(linkage.piece), 2)),

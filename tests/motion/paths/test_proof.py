@@ -83,6 +83,28 @@ def lines_of_the_panda(
         yield world, arm, start, end, clearance
 
 
+def test_a_pin_in_the_hand_is_found_wherever_on_the_line_it_is():
+    """All lines pass through one configuration, at any share of their length; few are blocked otherwise."""
+    scene = load_small("pick_pour_place")
+    arm = scene.arm()
+    there, rng = arm.home, np.random.default_rng(4)
+    hand = arm.robot.model.forward(arm.robot_values(there))[arm.robot.model.link_index("panda_hand")]
+    at = (arm.robot.T_world_base @ hand @ [0.0, 0.0, 0.03, 1.0])[:3]
+    pin = {"name": "pin", "box": [1e-3, 1e-3, 1e-3], "pose": {"position": at.tolist()}}
+    share = np.concatenate([np.repeat([0.0, 1.0], 20), rng.random(460)])[:, None]
+    ways = rng.normal(0, 0.3, (len(share), arm.dof)) * rng.choice([0.1, 1.0, 3.0], (len(share), 1))
+    start, end = there - share * ways, there + (1 - share) * ways
+    free = []
+    for obstacles in ([], [pin]):
+        content = {**scene.content, "obstacles": [*scene.content["obstacles"], *obstacles]}
+        with open_world(Scene.from_content(content)) as world:
+            bodies = MotionScene(world.scene, world)
+            free.append(prove(bodies.situation(bodies.home(), [arm]), start, end).free)
+    without, with_pin = free
+    assert without.mean() > 0.5
+    assert not with_pin.any()
+
+
 def test_stated_clearance_is_below_the_true_one():
     with lines_of_the_panda(5, 300) as (world, arm, start, end, clearance):
         free = np.flatnonzero(clearance >= 0)
