@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import http.server
-import threading
 from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, expect
+
+from tests.e2e.other_host import served
 
 
 @pytest.fixture
 def foreign_page(start_server) -> Iterator[str]:
     """The address of a page on another host that shows the server's in a frame."""
     address = start_server("bottle_on_table")
-
-    class Handler(http.server.BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            self.send_response(200)
-            self.send_header("Content-Type", "text/html")
-            self.end_headers()
-            self.wfile.write(f'<iframe src="{address}" onload="document.title=\'loaded\'">'.encode())
-
-        def log_message(self, format: str, *args: object) -> None:
-            pass
-
-    with http.server.ThreadingHTTPServer(("127.0.0.2", 0), Handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.2:{server.server_port}"
-        server.shutdown()
+    html = f'<iframe src="{address}" onload="document.title=\'loaded\'">'
+    with served(html, "127.0.0.2", "127.0.0.2") as other:
+        yield other
 
 
 def test_the_page_is_not_shown_inside_another(browser: Browser, foreign_page: str):

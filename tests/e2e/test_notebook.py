@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import http.server
 import os
-import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -16,6 +14,7 @@ from nbclient import NotebookClient
 from playwright.sync_api import Browser, expect
 
 from tests.conftest import ROOT
+from tests.e2e.other_host import served
 from tests.e2e.page import WAIT
 
 CELL = """import symgrasp as sg
@@ -38,26 +37,6 @@ def shown_by(thread: ThreadPoolExecutor, tmp_path: Path) -> Iterator[list[str]]:
         yield [data["text/html"] for data in outputs if "text/html" in data]
     finally:
         thread.submit(kernel.__exit__, None, None, None).result()
-
-
-@contextmanager
-def served(html: str) -> Iterator[str]:
-    """The address of a page of another host that has this HTML in it, as the server of notebooks does."""
-
-    class Handler(http.server.BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            self.send_response(200)
-            self.send_header("Content-Type", "text/html; charset=utf-8")
-            self.end_headers()
-            self.wfile.write(f"<!DOCTYPE html><body>{html}</body>".encode())
-
-        def log_message(self, format: str, *args: object) -> None:
-            pass
-
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://localhost:{server.server_port}"
-        server.shutdown()
 
 
 @pytest.fixture
