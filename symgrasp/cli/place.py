@@ -27,7 +27,7 @@ from symgrasp.errors import InputError, one_of
 
 if TYPE_CHECKING:
     from symgrasp.scene.scene import Scene
-    from symgrasp.survey.placement import Region
+    from symgrasp.survey.placement import Base, Region
 
 __all__ = ["add_parser", "run"]
 
@@ -85,9 +85,9 @@ def run(args: argparse.Namespace) -> int:
     served = sum(not math.isnan(margin) for margin in found.margins.values())
     say(f"{served} of {len(found.margins)} bases of {robot} that were tried serve all tasks; the best:")
     for number, own in enumerate(found.proposals, start=1):
-        x, y, z, yaw = own.base
-        where = f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, turned by {yaw:.1f}°"
-        say(f"{number:3}  {where}: margin {1e3 * own.margin:.1f} mm, planned and verified")
+        say(f"{number:3}  {_where(own.base)}: margin {1e3 * own.margin:.1f} mm, planned and verified")
+    for base, why in found.refused.items():
+        say(f"left out  {_where(base)}: {why}")
     best = found.proposals[0]
     if args.out:
         options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": 120}
@@ -98,6 +98,11 @@ def run(args: argparse.Namespace) -> int:
     if args.picture:
         write_picture(args.picture, draw_placement(scene, robot, found))
     return 0
+
+
+def _where(base: Base) -> str:
+    x, y, z, yaw = base
+    return f"x {x:.3f}, y {y:.3f}, z {z:.3f} m, turned by {yaw:.1f}°"
 
 
 def _number(text: str) -> float:

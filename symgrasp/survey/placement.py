@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -114,11 +114,13 @@ class Placement:
         proposals: the best bases, none near another, by falling margin.
         margins: all bases that were looked at → the margin (m) of the best plan, NaN where none exists.
         keep_out: rectangles in which no base stands.
+        refused: bases that would be among the best by the survey → why their plan does not hold.
     """
 
     proposals: tuple[Proposal, ...]
     margins: dict[Base, float]
     keep_out: tuple[KeepOut, ...]
+    refused: dict[Base, str] = field(default_factory=dict)
 
 
 def kind_of_plan(scene: Scene) -> PlanKind:
@@ -191,16 +193,18 @@ def place_base(
         step, turn = step / 2, turn / 2
         for k, base in enumerate(_best(margins, SEEDS, region.step)):
             survey(f"refined_{number + 1}_{k + 1}", list(_around(robot, region, base, step, turn)))
-    found = []
+    found, refused = list[Proposal](), dict[Base, str]()
     for base in _best(margins, len(margins), region.step):
-        proposal = _checked(scene, robot, base, kind)
-        if proposal:
-            found.append(proposal)
+        try:
+            found.append(_checked(scene, robot, base, kind))
+        except NoPlanError as error:
+            refused[base] = str(error)
         if len(found) == most:
             break
     if not found:
-        raise NoPlanError(f"none of {len(margins)} bases of {robot} serves all tasks")
-    return Placement(tuple(sorted(found, key=lambda p: -p.margin)), margins, region.keep_out)
+        why = f"; the best by the survey: {next(iter(refused.values()))}" if refused else ""
+        raise NoPlanError(f"none of {len(margins)} bases of {robot} serves all tasks{why}")
+    return Placement(tuple(sorted(found, key=lambda p: -p.margin)), margins, region.keep_out, refused)
 
 
 def _check_size(robot: str, region: Region) -> None:
@@ -249,15 +253,22 @@ def _best(margins: dict[Base, float], most: int, step: float) -> list[Base]:
     return chosen
 
 
-def _checked(scene: Scene, robot: str, base: Base, kind: PlanKind) -> Proposal | None:
-    """Plan a scene with a robot at a base; return None unless there is a plan that holds."""
+def _checked(scene: Scene, robot: str, base: Base, kind: PlanKind) -> Proposal:
+    """Plan a scene with a robot at a base.
+
+    Raises:
+        NoPlanError: there is no plan that holds; says why.
+    """
     moved = with_base(scene, robot, base.moved(scene.robots[robot].T_world_base))
     first = next(iter(moved.tasks.values()))
     try:
         with open_world(moved) as world:
             plan = planned(MapMaker(world), moved, kind, first.arms[0], first.name)
-    except SceneError:
-        return None
-    if plan is None or not verify(plan):
-        return None
+    except SceneError as error:
+        raise NoPlanError(str(error)) from None
+    if plan is None:
+        raise NoPlanError("no plan serves all tasks")
+    report = verify(plan)
+    if not report:
+        raise NoPlanError(f"its plan does not hold: {report.failures[0]}")
     return Proposal(base, plan_margin(plan, moved.profile), plan, moved)

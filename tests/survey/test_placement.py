@@ -12,6 +12,8 @@ import pytest
 from distributed import Client, LocalCluster
 
 from symgrasp.errors import NoPlanError
+from symgrasp.plan.report import Report
+from symgrasp.plan.verify import verify
 from symgrasp.planners.planning import plan_sequential
 from symgrasp.poses import rotation_z, translation
 from symgrasp.scene.replacing import with_base
@@ -80,6 +82,20 @@ def test_nothing_stands_where_it_may_not(client, tmp_path, monkeypatch):
     region = Region((0.0, 0.65), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), 0.65, (KeepOut(x=(-1, 0.1), y=(-1, 1)),))
     with pytest.raises(NoPlanError, match="none of 2 bases of panda"):  # kept out, and inside the bottle
         place_base(scene, "panda", region, partial(plan_margins_on, client, tmp_path, None))
+
+
+def test_bases_whose_plan_does_not_hold_are_told(client, tmp_path, monkeypatch):
+    """Such a plan is a fault of the planner, which nobody would hear of."""
+    monkeypatch.setattr(placement, "ROUNDS", 0)
+    scene = load_small("pick_pour_place", 10, 24, 8)
+    surveyed = partial(plan_margins_on, client, tmp_path, None)
+    best = place_base(scene, "panda", REGION, surveyed).proposals[0].base
+    reports = iter([lambda plan: Report(checks=2, failures=["task pick: it floats"])])
+    monkeypatch.setattr(placement, "verify", lambda plan: next(reports, verify)(plan))
+    found = place_base(scene, "panda", REGION, surveyed)
+    assert found.refused == {best: "its plan does not hold: task pick: it floats"}
+    assert found.proposals
+    assert best not in [own.base for own in found.proposals]
 
 
 @pytest.mark.parametrize(
