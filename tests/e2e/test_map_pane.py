@@ -58,8 +58,9 @@ def readout(page: GraspPage, text: str) -> None:
     expect(page.page.get_by_test_id("readout")).to_contain_text(text)
 
 
-def test_the_cells_are_drawn_sharply_in_their_colours(open_page, bottle_map):
-    page = open_page()
+@pytest.mark.parametrize("size", [(1280, 800), (1111, 733)])
+def test_the_cells_are_drawn_sharply_in_their_colours(open_page, bottle_map, size):
+    page = open_page(size=size)
     x, y, width, height = cells_box(page)
     page.next_frame()
     shot = np.asarray(Image.open(io.BytesIO(page.page.screenshot())).convert("RGB"))

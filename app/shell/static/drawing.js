@@ -25,10 +25,21 @@ export function texture({ heights, angles }, index, colors, alpha = 255) {
   return picture;
 }
 
+/** Move a canvas to whole pixels of the screen: between them it would be blurred. */
+function snap(canvas, ratio) {
+  const box = canvas.getBoundingClientRect(), at = canvas.snapped ?? [0, 0];
+  const by = [box.left, box.top].map((edge, k) => Math.round((edge - at[k]) * ratio) / ratio - (edge - at[k]));
+  if (by.some((value, k) => Math.abs(value - at[k]) > 1e-3)) {
+    canvas.snapped = by;
+    canvas.style.margin = `${by[1]}px 0 0 ${by[0]}px`;
+  }
+}
+
 /** Fit the canvas to its room, and the map into it: a long object lies along the longer side. */
 export function layout(pane) {
   const { canvas, frame, cells } = pane;
   const ratio = devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
+  snap(canvas, ratio);
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
     canvas.width = Math.round(width * ratio);
     canvas.height = Math.round(height * ratio);
