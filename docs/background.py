@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from queue import SimpleQueue
 from statistics import median
 
 import numpy as np
@@ -44,9 +45,9 @@ def waits(count: int = COUNT, rounds: int = ROUNDS) -> Iterator[tuple[bool, floa
         count: how many maps a round has.
         rounds: how often rounds without and with a survey take turns.
     """
-    pool, found = ProcessPool(()), list[SurveyPart]()
+    pool, found = ProcessPool(()), SimpleQueue[SurveyPart | None]()
     maps = ComputeProcess(pool)
-    surveys = ComputeProcess(pool, part=found.append, background=True)
+    surveys = ComputeProcess(pool, part=found.put, background=True)
     state = State.of(Scene.load(SCENE), SCENE)
     state = change_survey(state, lambda own: replace(own, spacing={**own.spacing, "object": SPACING}))
     places = iter(np.linspace(0.4, 0.6, 1 + 2 * rounds * count).tolist())
@@ -77,8 +78,13 @@ def _nothing() -> Iterator[None]:
 
 
 @contextmanager
-def _running(surveys: ComputeProcess, state: State, found: list[SurveyPart]) -> Iterator[None]:
-    """Run a survey inside the ``with`` block, which begins when it has found something.
+def _running(surveys: ComputeProcess, state: State, found: SimpleQueue[SurveyPart | None]) -> Iterator[None]:
+    """Run a survey in the ``with`` block, which begins when it has found something, and until it has again.
+
+    Args:
+        surveys: the process that computes it.
+        state: says which survey.
+        found: receives what the survey finds; and None at its end.
 
     Raises:
         RuntimeError: the survey has ended by itself.
@@ -94,22 +100,26 @@ def _running(surveys: ComputeProcess, state: State, found: list[SurveyPart]) -> 
             surveys.survey(state.survey_request, progress)
         except Cancelled:
             return
+        finally:
+            found.put(None)
 
-    found.clear()
+    def goes_on() -> None:
+        """Wait until the survey finds something more."""
+        waiting = [found.get() for _ in range(max(1, found.qsize()))]
+        if None in waiting:
+            raise RuntimeError("the survey ended by itself meanwhile")
+
     thread = threading.Thread(target=run)
     thread.start()
     try:
-        while not found and thread.is_alive():
-            time.sleep(PAUSE)
-        before = len(found)
+        goes_on()
         yield
-        while len(found) == before and thread.is_alive():
-            time.sleep(PAUSE)
-        if not thread.is_alive():
-            raise RuntimeError("the survey ended by itself meanwhile")
+        goes_on()
     finally:
         stop.set()
         thread.join()
+        while not found.empty():
+            found.get()
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from symgrasp.collision.simplex import FAST
 from symgrasp.compiling import njit
 from symgrasp.poses import Array
 
-__all__ = ["between_centres", "box_of", "boxes_apart", "boxes_of", "oriented_boxes_gap"]
+__all__ = ["box_of", "boxes_apart", "boxes_of", "oriented_boxes_gap"]
 
 
 def boxes_of(size: Array, pose: Array) -> Array:
@@ -76,7 +76,7 @@ def oriented_boxes_gap(size, pose, a, b, enough):
         across the face that gives it.
     """
     thick = size[a, 0] + size[b, 0]
-    d0, d1, d2 = between_centres(size, pose, a, b)
+    d0, d1, d2 = _between_centres(size, pose, a, b)
     # Half extents of both boxes along the axes of b, from the products of their axes.
     across0, across1, across2 = size[b, 6], size[b, 7], size[b, 8]
     best, side, owner, axis = -math.inf, 0.0, a, 0
@@ -104,7 +104,7 @@ def oriented_boxes_gap(size, pose, a, b, enough):
 
 
 @njit(**FAST)
-def between_centres(size, pose, a, b):
+def _between_centres(size, pose, a, b):
     """Return the centre (3,) of the box of piece a relative to that of piece b, in the world."""
     d0, d1, d2 = pose[a, 9] - pose[b, 9], pose[a, 10] - pose[b, 10], pose[a, 11] - pose[b, 11]
     for j in range(3):

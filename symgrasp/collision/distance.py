@@ -72,7 +72,7 @@ def distance_bounds_from(pieces, pose, a, b, enough, sure, little, work, begin):
         pieces, pose, a, b, enough, sure, little, work: see `distance_bounds`.
         begin: a direction (3,) from b to a, and vertices of both to climb from, -1 where none are known: what
             was returned when the pieces had almost the same poses, which is almost always enough, or the
-            direction of `between_centres` or `oriented_boxes_gap`.
+            direction of `oriented_boxes_gap`.
 
     Returns:
         The bounds, and the last direction with its vertices.
