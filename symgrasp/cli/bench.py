@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["add_parser", "run"]
 
 POSES = 20_000
-"""Random configurations of an arm that ``bench ik`` and ``bench robots`` look for, unless told otherwise."""
+"""Random configurations of an arm that ``bench ik``, ``robots`` and ``singular`` look for, unless told
+otherwise."""
 
 
 RANDOM_MAPS = 100
@@ -30,14 +31,14 @@ def add_parser(commands: Commands) -> None:
     command = add_command(commands, "bench", run, text)
     text = (
         "measure the robots that packages ship instead: their inverse kinematics, or also a map of each, "
-        "which an independent search then tries to refute; what maps miss; what surveys cost; how fast "
-        "motions are planned; or how long the plans of all shipped scenes take"
+        "which an independent search then tries to refute; which singular poses are reached; what maps miss; "
+        "what surveys cost; how fast motions are planned; or how long the plans of all shipped scenes take"
     )
-    kinds = ("ik", "robots", "guarantee", "survey", "motion", "plans")
+    kinds = ("ik", "robots", "singular", "guarantee", "survey", "motion", "plans")
     command.add_argument("what", metavar="|".join(kinds), nargs="?", choices=kinds, help=text)
     text = "bench motion: with few runs of each"
     command.add_argument("--quick", action="store_true", help=text)
-    text = "random configurations that `bench ik` and `bench robots` look for (default: %(default)s)"
+    text = "random configurations that `bench ik`, `robots` and `singular` look for (default: %(default)s)"
     command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
     text = "maps of `bench guarantee` with objects at random places (default: %(default)s)"
     command.add_argument("--random", metavar="N", type=whole(0), default=RANDOM_MAPS, help=text)
@@ -53,7 +54,13 @@ def run(args: argparse.Namespace) -> int:
         if args.compare:
             expected = "only times of maps and planners: no other kind of bench"
             raise InputError("command line", "--compare", args.what, expected)
-        others = {"guarantee": _guarantee, "survey": _surveys, "motion": _motion, "plans": _plans}
+        others = {
+            "singular": _singular,
+            "guarantee": _guarantee,
+            "survey": _surveys,
+            "motion": _motion,
+            "plans": _plans,
+        }
         _write(args.out, others.get(args.what, _robots)(args))
         return 0
     from symgrasp import bench
@@ -97,6 +104,20 @@ def _guarantee(args: argparse.Namespace) -> dict[str, Any]:
     for line in guarantee.summary(rows):
         say(line)
     return with_machine("maps", rows)
+
+
+def _singular(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure which poses are reached inside the limits, singular ones and others."""
+    from symgrasp.bench import singular
+    from symgrasp.bench.figures import with_machine
+
+    rows = []
+    for row in singular.run(args.poses):
+        say(row.line())
+        rows.append(row)
+    for line in singular.summary(rows):
+        say(line)
+    return with_machine("arms", rows)
 
 
 def _motion(args: argparse.Namespace) -> dict[str, Any]:

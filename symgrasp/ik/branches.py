@@ -20,6 +20,7 @@ from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.ik.pair.polynomial import POLYNOMIAL_NUMBERS
 from symgrasp.ik.pair.solver import PAIR_BRANCHES, STARTS, VIEWS, pair_branches
 from symgrasp.ik.parallel import parallel_branches
+from symgrasp.ik.self_motion import into_limits
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
@@ -29,6 +30,9 @@ __all__ = ["Memory", "branch_count", "branches_at", "branches_near", "new_memory
 
 CLOSED_FORM_BRANCHES = 8
 """Branches of every closed form here: three times two values."""
+
+MEMBERS = 16
+"""Members of a family of configurations from which one inside the limits is sought."""
 
 
 class Memory(NamedTuple):
@@ -49,6 +53,11 @@ class Memory(NamedTuple):
         missing: (B,) why a branch does not exist, where the last closed form was solved outside the limits
             too: the radicand (at least -9) of its root that is negative, less 10 times the root's number;
             else 0.
+        free: (2,) the angle (rad) that a joint takes which may take any, NaN for whichever rounding makes it;
+            and 2 where there was such a joint, 1 where branches all but coincide, else 0.
+        q: (B, n) branches with other angles of such a joint.
+        exists: (B,) which of them there are.
+        inside: (B,) which are inside the limits.
     """
 
     J: Array
@@ -63,6 +72,10 @@ class Memory(NamedTuple):
     row: Array
     near: Array
     missing: Array
+    free: Array
+    q: Array
+    exists: np.ndarray
+    inside: np.ndarray
 
 
 def new_memory(joints: int) -> Memory:
@@ -80,6 +93,10 @@ def new_memory(joints: int) -> Memory:
         np.empty(joints),
         np.empty((6, joints)),
         np.zeros(PAIR_BRANCHES),
+        np.zeros(2),
+        np.empty((PAIR_BRANCHES, joints)),
+        np.empty(PAIR_BRANCHES, dtype=bool),
+        np.empty(PAIR_BRANCHES, dtype=bool),
     )
 
 
@@ -129,10 +146,8 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
             if inside[b]:
                 onto_limits(chain.limits, q[b])
         return solvable and some
-    if joint[8] == THREE_PARALLEL:
-        solvable = parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, memory.numbers)
-    else:
-        solvable = spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, memory.missing)
+    memory.free[0], memory.free[1] = math.nan, 0.0
+    solvable = _closed_form(g, joint, limits, T, inside_only, q, exists, inside, memory)
     for b in range(exists.shape[0]):
         if exists[b] and joint[9]:
             exists[b] = polish_in(chain.forward, chain.fixed, q[b], T, memory.J, memory.A)
@@ -144,7 +159,48 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         exists[b] = exists[b] and _in_cell(chain, q[b])
         if inside[b]:
             onto_limits(chain.limits, q[b])
+    if memory.free[1] != 0.0:
+        _move_inside(chain, g, T, q, exists, inside, memory)
     return solvable
+
+
+@njit(**STRICT)
+def _closed_form(g, joint, limits, T, inside_only, q, exists, inside, memory):
+    """Solve one pose by the closed form of the arm's family; see `branches_at`."""
+    if joint[8] == THREE_PARALLEL:
+        return parallel_branches(
+            g, joint, limits, T, inside_only, q, exists, inside, memory.numbers, memory.free
+        )
+    return spherical_branches(
+        g, joint, limits, T, inside_only, q, exists, inside, memory.missing, memory.free
+    )
+
+
+@njit(**STRICT)
+def _move_inside(chain, g, T, q, exists, inside, memory):
+    """Replace branches outside the limits by configurations inside that share the work of joints otherwise.
+
+    At a singular pose, where axes align, a branch stands for a family of configurations. Each is sought from
+    several of its members: the families may be curved, and inside the limits in more than one part. Beside
+    one, rounding may have put a branch beyond a limit.
+    """
+    for i in range(MEMBERS if memory.free[1] > 1.0 else 1):
+        for b in range(exists.shape[0]):
+            memory.exists[b] = False
+        memory.free[0] = 2.0 * math.pi * i / MEMBERS
+        _closed_form(g, chain.joint, chain.leeway, T, False, memory.q, memory.exists, memory.inside, memory)
+        left = False
+        for b in range(exists.shape[0]):
+            if inside[b] or not memory.exists[b]:
+                continue
+            left = True
+            row = memory.q[b]
+            if into_limits(chain, row, T, memory.J, memory.A) and _in_cell(chain, row):
+                for j in range(row.shape[0]):
+                    q[b, j] = row[j]
+                exists[b] = inside[b] = True
+        if not left:
+            break
 
 
 @njit(**STRICT)

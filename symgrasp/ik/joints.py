@@ -6,11 +6,25 @@ import math
 
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import P0, R0
-from symgrasp.ik.vectors import STRICT, column, dot, minus, plus, rotate, row, transposed_times, vec
+from symgrasp.ik.vectors import (
+    STRICT,
+    column,
+    cross,
+    dot,
+    minus,
+    plus,
+    rotate,
+    row,
+    subproblem1,
+    transposed_times,
+    vec,
+)
 from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = [
     "ROOT_TOLERANCE",
+    "aligned_below",
+    "blurs",
     "miss",
     "misses",
     "nearest_turn",
@@ -19,6 +33,7 @@ __all__ = [
     "settle",
     "sine",
     "tool_motion",
+    "turn_between",
     "within",
     "write_branch",
 ]
@@ -26,6 +41,56 @@ __all__ = [
 ROOT_TOLERANCE = 1e-12
 """A radicand (dimensionless, or m²) above minus this counts as zero: at the limit of the reach two
 branches coincide, and rounding decides on which side of zero it falls."""
+
+ALIGNED = 1e-7
+"""A vector whose part across an axis is shorter than this (m, or of a unit vector) is along the axis:
+rounding leaves up to 2e-8 of one that is."""
+
+NEARLY_ALIGNED = 1e-20
+"""Square of the product of such parts below which they are computed with more digits."""
+
+ROUNDED_ALIGNED, MOST_ALIGNED = 10.0, 1e-3
+"""The same of an arm whose geometry is rounded, as a share of the slack of its roots, and at most."""
+
+BLURRED = 1e-4
+"""Sine of a joint below which two branches are so near that other joints may be off by more than the
+tolerance of limits: by the rounding of numbers, 2e-16, divided by its square."""
+
+
+@njit(**STRICT)
+def aligned_below(slack):
+    """Return the length below which a part across an axis is none; slack is that of roots, see `sine`."""
+    return max(ALIGNED, min(ROUNDED_ALIGNED * slack, MOST_ALIGNED))
+
+
+@njit(**STRICT)
+def blurs(s, slack):
+    """Whether two branches all but coincide, by the sine of a joint; slack is that of roots, see `sine`."""
+    return s * s <= max(BLURRED * BLURRED, slack)
+
+
+@njit(**STRICT)
+def turn_between(axis, a, b, aligned, free):
+    """Subproblem 1: y and x of the angle ``atan2(y, x)`` about an axis that turns a into b.
+
+    Args:
+        axis: unit axis (3,).
+        a, b: vectors (3,).
+        aligned: length of the part of a or b across the axis below which any angle will do.
+        free: see `symgrasp.ik.branches.Memory`.
+    """
+    y, x = subproblem1(axis, a, b)
+    if y * y + x * x > max(NEARLY_ALIGNED, aligned * aligned):
+        return y, x
+    along_a, along_b = dot(axis, a), dot(axis, b)
+    a = (a[0] - along_a * axis[0], a[1] - along_a * axis[1], a[2] - along_a * axis[2])
+    b = (b[0] - along_b * axis[0], b[1] - along_b * axis[1], b[2] - along_b * axis[2])
+    if min(dot(a, a), dot(b, b)) < aligned * aligned:
+        free[1] = 2.0
+        if not math.isnan(free[0]):
+            return math.sin(free[0]), math.cos(free[0])
+        return y, x
+    return dot(axis, cross(a, b)), dot(a, b)
 
 
 @njit(**STRICT)

@@ -18,7 +18,7 @@ import numpy as np
 from symgrasp.compiling import njit
 from symgrasp.ik.vectors import STRICT, column, cross, dot, minus, plus, rotate, row
 
-__all__ = ["POLISHED", "polish", "polish_in"]
+__all__ = ["POLISHED", "linearise", "normal_equations", "polish", "polish_in", "solve_normal"]
 
 POLISHED = 1e-9
 """Largest error (m and rad) of the tool at a configuration that counts as polished."""
@@ -55,25 +55,26 @@ def polish(forward, fixed, q, T):
 @njit(**STRICT)
 def polish_in(forward, fixed, q, T, J, A):
     """Do what `polish` does, in memory that is given: J (n, 6) and A (n, n + 1)."""
-    free, move, turn, twist = _linearise(forward, fixed, q, T, J)
+    free, move, turn, twist = linearise(forward, fixed, q, T, J)
     for _ in range(STEPS):
         if (move <= NO_BETTER and turn <= NO_BETTER) or not math.isfinite(move + turn):
             break
-        _solve(J, twist, free, max(move * move + turn * turn, LEAST_DAMPING), A)
+        normal_equations(J, twist, free, max(move * move + turn * turn, LEAST_DAMPING), A)
+        solve_normal(A, free)
         k = 0
         for j in range(q.shape[0]):
             if not fixed[j]:
                 q[j] += A[k, free]
                 k += 1
         before = max(move, turn)
-        free, move, turn, twist = _linearise(forward, fixed, q, T, J)
+        free, move, turn, twist = linearise(forward, fixed, q, T, J)
         if before <= POLISHED and max(move, turn) > 0.5 * before:
             break  # all that rounding of the pose allows
     return move <= POLISHED and turn <= POLISHED
 
 
 @njit(**STRICT)
-def _linearise(forward, fixed, q, T, J):
+def linearise(forward, fixed, q, T, J):
     """Compare the tool with a pose, and write the twists of the m free joints into the first rows of J.
 
     Returns:
@@ -109,21 +110,35 @@ def _linearise(forward, fixed, q, T, J):
 
 
 @njit(**STRICT)
-def _solve(J, twist, m, damping, A):
-    """Write (Jᵀ J + damping I)⁻¹ Jᵀ twist into column m of A, by Cholesky's method; J has m rows."""
+def normal_equations(J, twist, m, damping, A):
+    """Write the lower half of Jᵀ J + damping I, and Jᵀ twist into column m of A; J has m rows."""
     for i in range(m):
         for j in range(i + 1):
             total = damping if i == j else 0.0
             for k in range(6):
                 total += J[i, k] * J[j, k]
+            A[i, j] = total
+        total = 0.0
+        for k in range(6):
+            total += J[i, k] * twist[k]
+        A[i, m] = total
+
+
+@njit(**STRICT)
+def solve_normal(A, m):
+    """Solve m equations by Cholesky's method, of which A has the lower half, and the right side in column m.
+
+    The solution is written there; the half is overwritten.
+    """
+    for i in range(m):
+        for j in range(i + 1):
+            total = A[i, j]
             for k in range(j):
                 total -= A[i, k] * A[j, k]
             # Rounding may leave less than nothing of the damping.
             A[i, j] = math.sqrt(max(total, LEAST_DAMPING)) if i == j else total / A[j, j]
     for i in range(m):
-        total = 0.0
-        for k in range(6):
-            total += J[i, k] * twist[k]
+        total = A[i, m]
         for k in range(i):
             total -= A[i, k] * A[k, m]
         A[i, m] = total / A[i, i]

@@ -44,7 +44,18 @@ from symgrasp.ik.chain import (
     SKEW,
     TURN,
 )
-from symgrasp.ik.joints import ROOT_TOLERANCE, nearest_turn, outside, sine, tool_motion, within, write_branch
+from symgrasp.ik.joints import (
+    ROOT_TOLERANCE,
+    aligned_below,
+    blurs,
+    nearest_turn,
+    outside,
+    sine,
+    tool_motion,
+    turn_between,
+    within,
+    write_branch,
+)
 from symgrasp.ik.roots import find_roots, size2, start_circle_quartic
 from symgrasp.ik.vectors import (
     STRICT,
@@ -65,14 +76,14 @@ __all__ = ["parallel_branches"]
 
 
 @njit(**STRICT)
-def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, work):
+def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, work, free):
     """Solve one pose (4, 4); see `symgrasp.ik.branches.branches_at` for arguments and result.
 
-    Work is memory for nine complex numbers.
+    Work is memory for nine complex numbers, free (2,) `Memory.free`.
     """
     R, p = tool_motion(g, joint[7], T)
     if g[SKEW]:
-        return _skew_branches(g, joint, limits, R, p, inside_only, q, exists, inside, work)
+        return _skew_branches(g, joint, limits, R, p, inside_only, q, exists, inside, work, free)
     h1, h2 = vec(g, AXES), vec(g, AXES + 3)
     base, wrist = vec(g, BASE), vec(g, MEETING)
     a = minus(plus(times(R, wrist), p), base)  # G W, seen from joint 1
@@ -80,7 +91,12 @@ def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, work)
     part = dot(h1, a) * dot(h1, h2)
     sy, sx = dot(h2, cross(h1, a)), dot(h2, a) - part
     length = math.sqrt(sy * sy + sx * sx)
-    c = (dot(h2, minus(wrist, base)) - part) / length
+    aligned, needed = aligned_below(g[PARALLEL_SLACK]), dot(h2, minus(wrist, base)) - part
+    if length < aligned and abs(needed) < aligned:  # W is on the axis of joint 1, wherever that turns
+        free[1] = 2.0
+        if not math.isnan(free[0]):
+            sy, sx, length, needed = math.sin(free[0]), math.cos(free[0]), 1.0, 1.0
+    c = needed / length
     s = sine(c, g[PARALLEL_SLACK])
     if not s >= 0.0:
         return False
@@ -94,12 +110,12 @@ def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, work)
         if inside_only and not within(limits, joint[0], q1):
             continue
         seen = plus(rotate(h1, -s1, c1, a), base)  # e1⁻¹ G W
-        _wrist(g, joint, limits, R, seen, q1, s1, c1, 4 * i, inside_only, q, exists, inside)
+        _wrist(g, joint, limits, R, seen, q1, s1, c1, 4 * i, inside_only, q, exists, inside, free)
     return True
 
 
 @njit(**STRICT)
-def _wrist(g, joint, limits, R, seen, q1, s1, c1, branch, inside_only, q, exists, inside):
+def _wrist(g, joint, limits, R, seen, q1, s1, c1, branch, inside_only, q, exists, inside, free):
     """Joint 5, then the others, for a value of joint 1."""
     h1, h2, h6 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 15)
     middle, length, part = vec(g, TURN)
@@ -117,12 +133,13 @@ def _wrist(g, joint, limits, R, seen, q1, s1, c1, branch, inside_only, q, exists
         if inside_only and not within(limits, joint[4], q5):
             continue
         _hand(
-            g, joint, limits, R, seen, q1, s1, c1, q5, s5, c5, branch + 2 * i, inside_only, q, exists, inside
-        )
+            g, joint, limits, R, seen, q1, s1, c1, q5, s5, c5, branch + 2 * i, inside_only, q, exists,
+            inside, free,
+        )  # fmt: skip
 
 
 @njit(**STRICT)
-def _skew_branches(g, joint, limits, R, p, inside_only, q, exists, inside, work):
+def _skew_branches(g, joint, limits, R, p, inside_only, q, exists, inside, work, free):
     """Joints 1 and 5 where the axes of joints 5 and 6 do not meet, then the others."""
     h1, h2, base, o5 = vec(g, AXES), vec(g, AXES + 3), vec(g, BASE), minus(vec(g, MEETING), vec(g, OFFSET))
     a, v = minus(plus(times(R, vec(g, MEETING)), p), base), times(R, vec(g, AXES + 15))
@@ -157,8 +174,9 @@ def _skew_branches(g, joint, limits, R, p, inside_only, q, exists, inside, work)
             continue
         seen = plus(rotate(h1, -sin1, cos1, a), base)
         _hand(
-            g, joint, limits, R, seen, q1, sin1, cos1, q5, sin5, cos5, 2 * i, inside_only, q, exists, inside
-        )
+            g, joint, limits, R, seen, q1, sin1, cos1, q5, sin5, cos5, 2 * i, inside_only, q, exists,
+            inside, free,
+        )  # fmt: skip
     return solvable
 
 
@@ -169,11 +187,11 @@ def _combined(x, v, y, w):
 
 
 @njit(**STRICT)
-def _hand(g, joint, limits, R, seen, q1, s1, c1, q5, s5, c5, branch, inside_only, q, exists, inside):
+def _hand(g, joint, limits, R, seen, q1, s1, c1, q5, s5, c5, branch, inside_only, q, exists, inside, free):
     """Joint 6 and the sum of joints 2, 3 and 4, for values of joints 1 and 5."""
     h1, h2, h5, h6 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 12), vec(g, AXES + 15)
     before = transposed_times(R, rotate(h1, s1, c1, h2))  # R_G⁻¹ R1 h2
-    y6, x6 = subproblem1(h6, before, rotate(h5, -s5, c5, h2))
+    y6, x6 = turn_between(h6, before, rotate(h5, -s5, c5, h2), aligned_below(g[PARALLEL_SLACK]), free)
     s6, c6 = unit(y6, x6)
     if inside_only and outside(limits, joint[5], s6, c6):
         return
@@ -186,11 +204,11 @@ def _hand(g, joint, limits, R, seen, q1, s1, c1, q5, s5, c5, branch, inside_only
     sum_s, sum_c = unit(y, x)
     reach = plus(vec(g, HAND), rotate(h5, s5, c5, vec(g, OFFSET)))
     t = minus(minus(seen, rotate(h2, sum_s, sum_c, reach)), vec(g, SHOULDER))
-    _elbow(g, joint, limits, t, math.atan2(y, x), q1, q5, q6, branch, inside_only, q, exists, inside)
+    _elbow(g, joint, limits, t, math.atan2(y, x), q1, q5, q6, branch, inside_only, q, exists, inside, free)
 
 
 @njit(**STRICT)
-def _elbow(g, joint, limits, t, total, q1, q5, q6, branch, inside_only, q, exists, inside):
+def _elbow(g, joint, limits, t, total, q1, q5, q6, branch, inside_only, q, exists, inside, free):
     """Subproblem 3: |R3 (O4 − O3) − (O2 − O3)| = |t| gives joint 3, then joints 2 and 4; write the branch."""
     h2, h3, h4 = vec(g, AXES + 3), vec(g, AXES + 6), vec(g, AXES + 9)
     middle, length, part = vec(g, BEND)
@@ -198,14 +216,20 @@ def _elbow(g, joint, limits, t, total, q1, q5, q6, branch, inside_only, q, exist
     c = (-0.5 * dot(t, t) - part) / length
     s = sine(c, g[PARALLEL_SLACK])
     if s < 0.0:
-        return
+        if math.isnan(free[0]):
+            return
+        c, s = math.copysign(1.0, c), 0.0  # the nearest; see `turn_between`
+    aligned = aligned_below(g[PARALLEL_SLACK])
+    if blurs(s, g[PARALLEL_SLACK]):
+        free[1] = max(free[1], 1.0)
     from_shoulder = minus(vec(g, ELBOW), vec(g, SHOULDER))
     for i in range(2):
         way = s if i == 0 else -s
         s3, c3 = sm * c + cm * way, cm * c - sm * way
         if inside_only and outside(limits, joint[2], s3, c3):
             continue
-        y2, x2 = subproblem1(h2, plus(rotate(h3, s3, c3, vec(g, FOREARM)), from_shoulder), t)
+        elbow_out = plus(rotate(h3, s3, c3, vec(g, FOREARM)), from_shoulder)
+        y2, x2 = turn_between(h2, elbow_out, t, aligned, free)
         angle2, angle3 = math.atan2(y2, x2), middle + math.atan2(way, c)
         # h3 and h4 may point against h2.
         angle4 = dot(h2, h4) * (total - angle2 - dot(h2, h3) * angle3)

@@ -22,11 +22,14 @@ from symgrasp.compiling import njit
 from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, P0, PHI, R0, SLACK, TRIPLE, WRIST, WRIST_SEEN
 from symgrasp.ik.joints import (
     ROOT_TOLERANCE,
+    aligned_below,
+    blurs,
     miss,
     nearest_turn,
     outside,
     sine,
     tool_motion,
+    turn_between,
     within,
     write_branch,
 )
@@ -54,10 +57,10 @@ CERTAIN = 1e-7
 
 
 @njit(**STRICT)
-def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, missing):
+def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, missing, free):
     """Solve one pose (4, 4); see `symgrasp.ik.branches.branches_at` for arguments and result.
 
-    Missing (B,) is `Memory.missing`.
+    Missing (B,) is `Memory.missing`, free (2,) `Memory.free`.
     """
     if inside_only:
         sure, reaches = _sure_reach(g, joint, limits, T)
@@ -72,6 +75,8 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, miss
     if s < 0.0:
         miss(missing, 0, 8, 1, 1.0 - c * c)
         return False
+    if blurs(s, g[SLACK]):
+        free[1] = max(free[1], 1.0)
     offset = math.atan2(s, c)
     for i in range(2):
         if i == 0:
@@ -84,7 +89,7 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, miss
         if inside_only and not within(limits, joint[3], q4):
             continue
         u = minus(rotate(vec(g, AXES + 9), -s4, c4, a), vec(g, WRIST_SEEN))  # e4⁻¹ S − W
-        _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside, missing)
+        _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside, missing, free)
     return True
 
 
@@ -140,7 +145,7 @@ def reach_cosine(g, joint, T):
 
 
 @njit(**STRICT)
-def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside, missing):
+def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, inside, missing, free):
     """Subproblem 2: R5⁻¹ u = R6 t gives q5 and q6 for a value of the middle joint."""
     h4, h5, h6 = vec(g, AXES + 9), vec(g, AXES + 12), vec(g, AXES + 15)
     c = dot(h5, h6)
@@ -154,6 +159,7 @@ def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, insi
         miss(missing, 4 * i, 4, 2, rest / dot(u, u))
         return
     gamma = math.sqrt(max(rest, slack))
+    aligned = aligned_below(g[SLACK])
     normal = cross(h5, h6)
     h3 = vec(g, AXES + 6)
     side = perpendicular(h3)
@@ -165,11 +171,11 @@ def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, insi
             alpha * h5[1] + beta * h6[1] + out * normal[1],
             alpha * h5[2] + beta * h6[2] + out * normal[2],
         )
-        y6, x6 = subproblem1(h6, t, z)
+        y6, x6 = turn_between(h6, t, z, aligned, free)
         s6, c6 = unit(y6, x6)
         if inside_only and outside(limits, joint[5], s6, c6):
             continue
-        y5, x5 = subproblem1(h5, z, u)
+        y5, x5 = turn_between(h5, z, u, aligned, free)
         s5, c5 = unit(y5, x5)
         if inside_only and outside(limits, joint[4], s5, c5):
             continue
@@ -184,12 +190,15 @@ def _pair(g, joint, limits, R, t, u, q4, s4, c4, i, inside_only, q, exists, insi
         Mside = times(R, rotate(h6, -s6, c6, rotate(h5, -s5, c5, vside)))
         branch = 4 * i + 2 * j
         _triple(
-            g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside, missing
-        )
+            g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside, missing,
+            free,
+        )  # fmt: skip
 
 
 @njit(**STRICT)
-def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside, missing):
+def _triple(
+    g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, q, exists, inside, missing, free
+):
     """Subproblem 4: R1 R2 R3 = M, so h1ᵀ R2 h3 = h1ᵀ M h3, gives q1, q2 and q3; write the branch."""
     h1, h2, h3 = vec(g, AXES), vec(g, AXES + 3), vec(g, AXES + 6)
     middle, length, part = vec(g, TRIPLE)
@@ -197,18 +206,23 @@ def _triple(g, joint, limits, M3, Mside, side, q4, q5, q6, branch, inside_only, 
     c = (dot(h1, M3) - part) / length
     s = sine(c, g[SLACK])
     if s < 0.0:
-        miss(missing, branch, 2, 3, 1.0 - c * c)
-        return
+        if math.isnan(free[0]):
+            miss(missing, branch, 2, 3, 1.0 - c * c)
+            return
+        c, s = math.copysign(1.0, c), 0.0  # the nearest; see `turn_between`
+    aligned = aligned_below(g[SLACK])
+    if blurs(s, g[SLACK]):
+        free[1] = max(free[1], 1.0)
     for i in range(2):
         way = s if i == 0 else -s
         s2, c2 = sm * c + cm * way, cm * c - sm * way
         if inside_only and outside(limits, joint[1], s2, c2):
             continue
-        y1, x1 = subproblem1(h1, rotate(h2, s2, c2, h3), M3)
+        y1, x1 = turn_between(h1, rotate(h2, s2, c2, h3), M3, aligned, free)
         s1, c1 = unit(y1, x1)
         if inside_only and outside(limits, joint[0], s1, c1):
             continue
-        # q3 from R2⁻¹ R1⁻¹ M with the q1 found: where h1 and h3 align, any q1 will do and q3 compensates.
+        # q3 from R2⁻¹ R1⁻¹ M with the q1 found: where h1 and h3 align, q3 compensates for any q1.
         y3, x3 = subproblem1(h3, side, rotate(h2, -s2, c2, rotate(h1, -s1, c1, Mside)))
         q2 = nearest_turn(limits, joint[1], middle + math.atan2(way, c))
         if inside_only and not within(limits, joint[1], q2):

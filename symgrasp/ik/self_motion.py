@@ -1,0 +1,91 @@
+"""Self-motion of an arm at a singular pose: moving joints into their limits while the tool stays. Compiled.
+
+At a singular pose the joints that move the tool nowhere have a combination along which they turn freely. The
+steps are those of Newton's method (`symgrasp.ik.newton`) with an equation for each joint outside its limits
+that moves it onto the limit, of so little weight w that it only counts along such combinations:
+
+    dq = (Jᵀ J + w² D + μ I)⁻¹ (Jᵀ e + w² D r),
+
+with D = diag(1 where a joint is outside, else 0) and r the way back to the limits. At other poses the joints
+stay where they are, up to about w².
+"""
+
+from __future__ import annotations
+
+import math
+
+from symgrasp.compiling import njit
+from symgrasp.ik.joints import onto_limits, settle
+from symgrasp.ik.newton import POLISHED, linearise, normal_equations, solve_normal
+from symgrasp.ik.vectors import STRICT
+
+__all__ = ["into_limits"]
+
+WEIGHT2 = 1e-6
+"""Square of the weight w (m/rad, or none)."""
+
+DAMPING = 1e-13
+"""Least damping μ, far below w², so that joints reach their limits up to 1e-7 of the way in one step; further
+from the pose it is |e|²."""
+
+NEAR = 1e-3
+"""Error (m and rad) of the tool up to which it is told whether there is a way back to the limits."""
+
+LARGEST_STEP = 0.5
+"""Largest way back (rad) in one step: families are curved."""
+
+STEPS = 12
+"""Steps, at most."""
+
+CLOSE = 1e-7
+"""Error (m and rad) of the tool that is small enough beside a singular pose, where the last digits of it
+depend on joints being outside."""
+
+LEAST_GAIN, WAITS = 0.9, 3
+"""Where the largest way back does not shrink to this share in a step, from this step on, there is none."""
+
+
+@njit(**STRICT)
+def into_limits(chain, q, T, J, A):
+    """Move an arm, whose tool is almost at a pose, inside its limits with the tool at the pose.
+
+    Args:
+        chain: the arm.
+        q: (n,) joint values (rad), changed in place.
+        T: tool pose (4, 4) in the base.
+        J, A: memory (n, 6) and (n, n + 1).
+
+    Returns:
+        Whether it is inside the limits, and the tool within `POLISHED` of the pose, or, where that leads
+        outside again, `CLOSE`.
+    """
+    limits, before = chain.limits, math.inf
+    for step in range(STEPS):
+        fits = settle(limits, q)
+        if fits:
+            onto_limits(limits, q)
+        free, move, turn, twist = linearise(chain.forward, chain.fixed, q, T, J)
+        error = max(move, turn)
+        if fits and (error <= POLISHED or (step >= WAITS and error <= CLOSE)):
+            return True
+        furthest = 0.0
+        normal_equations(J, twist, free, max(move * move + turn * turn, DAMPING), A)
+        k = 0
+        for j in range(q.shape[0]):
+            if not chain.fixed[j]:
+                back = min(max(q[j], limits[0, j]), limits[1, j]) - q[j]
+                if back != 0.0:
+                    furthest = max(furthest, abs(back))
+                    A[k, k] += WEIGHT2
+                    A[k, free] += WEIGHT2 * min(max(back, -LARGEST_STEP), LARGEST_STEP)
+                k += 1
+        if step >= WAITS and error < NEAR and furthest > LEAST_GAIN * before:
+            return False
+        before = furthest
+        solve_normal(A, free)
+        k = 0
+        for j in range(q.shape[0]):
+            if not chain.fixed[j]:
+                q[j] += A[k, free]
+                k += 1
+    return False

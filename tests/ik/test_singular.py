@@ -1,0 +1,91 @@
+"""Poses are reached inside the limits at singular poses too, and where joints stand at limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symgrasp.bench.ik import bare_arm, sampled_solver
+from symgrasp.bench.singular import configuration_sets, reached
+from symgrasp.compiling import ENTRY, njit
+from symgrasp.errors import InputError
+from symgrasp.ik import ArmIK, CompiledIK, solver_for
+from symgrasp.ik.branches import branch_count, branches_at, new_memory
+from symgrasp.references import resolve
+from symgrasp.robot.catalogue import CATALOGUE
+from tests.ik.redundancy import solve_at
+from tests.ik.synthetic import samples
+
+pinocchio = pytest.importorskip("pinocchio")
+compiled_branches_at = njit(**ENTRY)(branches_at)
+
+RANDOM, EACH = 200, 25
+
+SEARCHED = ("xarm6", "gen3", "tiago_pro", "baxter", "g1", "alex", "vega")
+"""Arms without a closed form; a search may miss some of their singular poses."""
+
+
+def solver_of(name: str) -> ArmIK:
+    robot = next(robot for robot in CATALOGUE if robot.name == name)
+    try:
+        return sampled_solver(solver_for(bare_arm(robot, robot.arms[0]), 1))
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("name", [robot.name for robot in CATALOGUE if robot.name not in SEARCHED])
+def test_every_pose_is_reached_inside_the_limits(name):
+    """Of random joints, with each about zero or several at zero, and with each at its limits."""
+    ik = solver_of(name)
+    for kind, q in configuration_sets(ik.arm, RANDOM, EACH, 1):
+        lost = q[~reached(ik, q)]
+        assert not len(lost), f"{kind}: {len(lost)} of {len(q)} lost, the first {lost[0].tolist()}"
+
+
+@pytest.mark.parametrize("elbow", [1e-6, 1e-9, 0.0])
+def test_a_straight_elbow_by_the_kinematics_of_pinocchio(elbow):
+    ik = solver_of("iiwa")
+    arm, robot = ik.arm, next(robot for robot in CATALOGUE if robot.name == "iiwa")
+    path = resolve(robot.urdf, Path())
+    assert path
+    model = pinocchio.buildModelFromUrdf(str(path))
+    data, tool = model.createData(), model.getFrameId(robot.arms[0].tool)
+    chance = np.random.default_rng(3)
+    for row in samples(arm, 50, 2):
+        row[[1, 3, 5]] = np.where(chance.random(3) < 0.5, chance.uniform(-elbow, elbow, 3), row[[1, 3, 5]])
+        pinocchio.framesForwardKinematics(model, data, row)
+        T = data.oMf[tool].homogeneous
+        found = solve_at(ik, T, float(row[ik.locked]))
+        assert found.inside.any()
+        for q in found.q[found.inside]:
+            assert ((q >= arm.lower) & (q <= arm.upper)).all()
+            pinocchio.framesForwardKinematics(model, data, q)
+            np.testing.assert_allclose(data.oMf[tool].homogeneous, T, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["pr2", "romeo", "ur5", "z1", "xarm7"])
+def test_an_answer_does_not_depend_on_what_is_left_out(name):
+    """Bit for bit, with branches outside the limits left out early or not, at singular poses."""
+    ik = solver_of(name)
+    assert isinstance(ik, CompiledIK)
+    for _, q in configuration_sets(ik.arm, 1, 10, 3):
+        at = ik if ik.locked is None else ik.at(q[:, ik.locked])
+        for k, T in enumerate(ik.arm.tool_pose(q)):
+            every, early = (rows_inside(at, 0 if ik.locked is None else k, T, only) for only in (False, True))
+            np.testing.assert_array_equal(early[0], every[0])
+            np.testing.assert_array_equal(early[1], every[1])
+
+
+def rows_inside(ik: CompiledIK, k: int, T: np.ndarray, inside_only: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the configurations inside the limits at a sample, and which branches they are."""
+    count = branch_count(ik.chain)
+    q, exists, inside = (
+        np.empty((count, ik.arm.dof)),
+        np.empty(count, dtype=bool),
+        np.empty(count, dtype=bool),
+    )
+    T = np.ascontiguousarray(T)
+    compiled_branches_at(ik.chain, k, T, inside_only, q, exists, inside, new_memory(ik.arm.dof))
+    return q[inside], np.flatnonzero(inside)
