@@ -38,7 +38,9 @@ def test_a_pose_outside_the_limits_is_not_reached(ik):
     kept = arm.upper.copy(), arm.lower.copy()
     arm.lower, arm.upper = q[0] + 0.1, q[0] + 0.2
     try:
-        assert not reached(solver_for(arm, 1), q).any()
+        narrower = solver_for(arm, 1)
+        assert isinstance(narrower, ArmIK)
+        assert not reached(narrower, q).any()
     finally:
         arm.upper, arm.lower = kept
 
