@@ -17,7 +17,7 @@ from ..state.state import State
 from .escaping import escape
 from .readout import count_text
 from .solutions import worst_margin_texts
-from .stack import margin_texts
+from .stack import margin_texts, proven_html
 
 __all__ = ["climb_comparison_html", "climb_html", "hands_html"]
 
@@ -86,7 +86,7 @@ def _hands(task: PlanTask) -> list[str]:
         roll = np.rad2deg(hold.grasp.roll)
         title = f"{escape(hold.arm)}, roll {roll:.0f}°: room {along}, {around}; {clear} clear"
         lines.append(f'<div class="sg sg-small">{_swatch(i) if several else ""}{title}</div>')
-    return lines
+    return [*lines, proven_html([task])]
 
 
 def _progress(climb: ClimbReplay, frame: int) -> str:

@@ -8,13 +8,13 @@ from itertools import groupby
 import numpy as np
 
 from symgrasp.object.manifold import turn_text
-from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold
+from symgrasp.plan.plan import CLEARANCE_LIMIT, Grasp, Hold, PlanTask
 
 from ..state.state import State
 from .escaping import escape
 from .readout import pitch_text
 
-__all__ = ["margin_texts", "stack_html"]
+__all__ = ["margin_texts", "proven_html", "stack_html"]
 
 HEADINGS = ("task", "δ", "along", "around", "clear")
 
@@ -32,7 +32,14 @@ def stack_html(state: State) -> str:
         for k, task, hold in group:
             now = "sg-now" if k == state.step else ""
             rows.append(_row((f"{k + 1} · {task.name}", turn_text(task.delta), *margin_texts(hold)), now))
-    return f'<div class="sg-stack">{"".join(rows)}</div>'
+    return f'<div class="sg-stack">{"".join(rows)}</div>{proven_html(state.plan.plan.tasks)}'
+
+
+def proven_html(tasks: Sequence[PlanTask]) -> str:
+    """Say that the margins of all holds of some tasks are proven; nothing where they are not."""
+    if not all(hold.margins == "proven" for task in tasks for hold in task.holds):
+        return ""
+    return '<div class="sg sg-small sg-faint">Margins are proven: all grasps within them are feasible.</div>'
 
 
 def margin_texts(hold: Hold) -> tuple[str, str, str]:

@@ -71,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
             share = 100 * proven / max(1, count)
             say(f"  {proven} of {count} {what} cells ({share:.1f} %) are proven to be so as a whole")
     if the_map.refined is not None:
-        say(f"  feasible area, with cells split to parts: {the_map.refined.area}")
+        split = "" if scene.settings.resolution is None else ", with cells split to parts"
+        say(f"  feasible area{split}: {the_map.refined.area}")
     if Reason.NOT_FOUND in the_map.counts():
         say("  (not found: by a search for configurations, which is no proof that there is none)")
     if args.out:

@@ -61,18 +61,23 @@ class MapMaker:
         manifold: Manifold | None = None,
         progress: Progress | None = None,
         certify: bool | None = None,
+        only: np.ndarray | None = None,
     ) -> FeasibilityMap:
-        """Compute a map; see `create_map`. The task need not be one of the scene's."""
+        """Compute a map; see `create_map`. The task need not be one of the scene's.
+
+        Of some cells alone if ``only`` (R, H, A) is given: the others are then neither feasible nor proven,
+        unless Algorithm 1 computes the map, which does all.
+        """
         the_arm, the_task = self._chosen(arm, task)
         grid = manifold or self.scene.manifold
         if method == "reference":
             return create_map_reference(self.world, the_arm, the_task, grid, progress)
         if the_arm.robot.torso is not None:
             maps = self.maps_by_torso(
-                the_arm.name, the_task, manifold=grid, progress=progress, certify=certify
+                the_arm.name, the_task, manifold=grid, progress=progress, certify=certify, only=only
             )
             return merged(maps)
-        return self._map(the_arm, None, the_task, grid, progress, certify=certify)
+        return self._map(the_arm, None, the_task, grid, progress, certify=certify, only=only)
 
     def maps_by_torso(
         self,
@@ -82,6 +87,7 @@ class MapMaker:
         manifold: Manifold | None = None,
         progress: Progress | None = None,
         certify: bool | None = None,
+        only: np.ndarray | None = None,
     ) -> list[FeasibilityMap]:
         """Compute the map of an arm for every sample of its robot's torso; see `map` for the arguments."""
         the_arm, the_task = self._chosen(arm, task)
@@ -90,7 +96,7 @@ class MapMaker:
         maps = []
         for t in range(len(the_arm.robot.torso)):
             tell = part_of(progress, t, len(the_arm.robot.torso))
-            own = self._map(the_arm.at(t), t, the_task, grid, tell, certify=certify)
+            own = self._map(the_arm.at(t), t, the_task, grid, tell, certify=certify, only=only)
             maps.append(at_torso(own, the_arm, t, self._samples(the_arm)))
         return maps
 
@@ -124,6 +130,7 @@ class MapMaker:
         progress: Progress | None,
         pitch: float | None = None,
         certify: bool | None = None,
+        only: np.ndarray | None = None,
     ) -> FeasibilityMap:
         """Compute the map of an arm without a torso, or with its torso at a sample."""
         engine = self._engine(arm, torso, grid)
@@ -133,10 +140,11 @@ class MapMaker:
         settings = self.scene.settings
         if certify is None:
             certify = settings.resolution is not None
-        splits = certify and not arm.pitched and settings.resolution is not None
+        # Else no feasible cell is proven, see `CellProver`, and no margin could be.
+        splits = certify and not arm.pitched and not settings.approach
         finer = settings.finer(grid) if splits else []
         tell = part_of(progress, 0, 1 + len(finer))
-        found = engine.map(task, grid, tell, pitch, certify)
+        found = engine.map(task, grid, tell, pitch, certify, only)
         if not splits:
             return found
 
@@ -146,7 +154,7 @@ class MapMaker:
             assert own is not None  # as there is one for the map
             return own.map(task, parts, part_of(progress, level, 1 + len(finer)), None, True, wanted)
 
-        return replace(found, refined=refined(found, finer, map_on))
+        return replace(found, refined=refined(found, finer, map_on, only))
 
     def explain(
         self,
@@ -233,8 +241,8 @@ def create_map(
         manifold: another grid than the scene's.
         progress: called with the finished share; may raise `Cancelled`.
         certify: whether to prove which cells hold as a whole, see `FeasibilityMap.certified`; if None, where
-            the scene asks for a resolution, to which cells are then split too. Algorithm 1 proves none, and
-            cells of arms with five joints are not split.
+            the scene asks for a resolution, to which cells are then split too, and margins are proven.
+            Algorithm 1 proves none; nor are feasible cells of arms with five joints or with a retreat.
 
     Raises:
         SceneError: there is no such arm or task.

@@ -73,8 +73,8 @@ class FeasibilityMap:
         certified: (R, H, A) bool, whether it is proven that a cell holds as a whole: a feasible one is so at
             every height and angle inside it, an infeasible one at none; the others may be mixed. None where
             that was not asked for.
-        refined: the cells that may be mixed, split down to the resolution that the scene asks for; None where
-            it asks for none.
+        refined: the cells that may be mixed, split down to the resolution that the scene asks for, or as they
+            are where it asks for none; None where no feasible cell can be certified.
         preliminary: whether cells have the reasons of coarser ones, of which few configurations were tried;
             then there are no witnesses.
         probability: (R, H, A) how probable it is that a cell is feasible where the object's pose is
@@ -183,11 +183,17 @@ class FeasibilityMap:
         order = np.argsort(-counts, kind="stable")
         return {Reason(int(values[k])): int(counts[k]) for k in order}
 
+    @property
+    def margins_proven(self) -> bool:
+        """Whether `margins` are proven lower bounds; else they are counted in cells."""
+        return self.refined is not None
+
     @cached_property
     def margins(self) -> Array:
         """(R, H, A, 2) how far from cells' centres grasps stay feasible, along (m) and around (rad) the axis.
 
-        Where the scene asks for a resolution, these are proven lower bounds; else `cell_margins`.
+        Proven lower bounds where cells are certified (`margins_proven`): no grasp that is off by less, along
+        or around, is infeasible. Else `cell_margins`.
         """
         if self.refined is None:
             return self.cell_margins

@@ -15,7 +15,9 @@ __all__ = ["from_plan", "to_record", "with_motion"]
 
 def with_motion(plan: Plan, motion: Motion) -> Plan:
     """Return a plan with a timed motion."""
-    return plan.model_copy(update={"schema_version": 2, "motion": to_record(motion)})
+    return plan.model_copy(
+        update={"schema_version": max(2, plan.schema_version), "motion": to_record(motion)}
+    )
 
 
 def to_record(motion: Motion) -> MotionRecord:

@@ -66,13 +66,14 @@ def to_tsr(plan: Plan) -> str:
     A region holds every tool pose ``T_world_object · T_ref_tsr · Rz(yaw)·Trans(0, 0, z) · Tw_e``
     with z and yaw inside Bw (rows x, y, z, roll, pitch, yaw): the whole turn about the object's
     axis, and the heights around the grasp, inside its margin in every task, that the hand can hold
-    with the same opening.
+    with the same opening. A margin that is counted in cells ends with the last feasible cell, half a
+    cell before the middle of the infeasible one.
     """
     scene = Scene.from_content(plan.scene.content, "plan: scene.content")
     tightest: dict[tuple[str, float, float, float], Hold] = {}
     for hold in (hold for task in plan.tasks for hold in task.holds):
         key = hold.arm, hold.grasp.h, hold.grasp.roll, hold.grasp.pitch
-        if hold.margin_along < tightest.setdefault(key, hold).margin_along:
+        if _room_along(scene, hold) < _room_along(scene, tightest.setdefault(key, hold)):
             tightest[key] = hold
     regions = [_region(plan, scene, hold) for hold in tightest.values()]
     return yaml.safe_dump_all(regions, sort_keys=False, allow_unicode=True)
@@ -97,6 +98,11 @@ def _region(plan: Plan, scene: Scene, hold: Hold) -> dict[str, Any]:
     }
 
 
+def _room_along(scene: Scene, hold: Hold) -> float:
+    """Return how far (m) a grasp may be off along the axis in cells that are feasible, or as is proven."""
+    return hold.margin_along - (0.5 * scene.manifold.dh if hold.margins == "cells" else 0.0)
+
+
 def _height_range(scene: Scene, arm: Arm, hold: Hold) -> tuple[float, float]:
     """Return the heights (m) around a grasp, inside its margin, that the same opening can hold."""
     profile, hand, h = scene.profile, arm.hand, hold.grasp.h
@@ -111,7 +117,7 @@ def _height_range(scene: Scene, arm: Arm, hold: Hold) -> tuple[float, float]:
 
     ends = []
     for sign in (-1.0, 1.0):
-        steps = h + sign * np.linspace(0.0, hold.margin_along, 101)
+        steps = h + sign * np.linspace(0.0, _room_along(scene, hold), 101)
         reached = next((k for k, height in enumerate(steps) if not same(float(height))), len(steps))
         ends.append(float(steps[max(reached - 1, 0)]))
     return ends[0], ends[1]

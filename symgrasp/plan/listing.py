@@ -17,7 +17,8 @@ def plan_in_words(plan: Plan) -> str:
     around = math.degrees(min(hold.margin_around for hold in holds))
     clear = 1e3 * min(hold.clearance for hold in holds)
     where = "; ".join(f"{arm} at {place}" for arm, place in grasps)
-    text = f"{where}: margins {along:.1f} mm, {around:.1f}°; {clear:.1f} mm clear"
+    proven = ", proven" if all(hold.margins == "proven" for hold in holds) else ""
+    text = f"{where}: margins {along:.1f} mm, {around:.1f}°{proven}; {clear:.1f} mm clear"
     slacks = [hold.limit_slack for hold in holds if hold.limit_slack is not None]
     return f"{text}; {math.degrees(min(slacks)):.1f}° from limits" if slacks else text
 

@@ -57,7 +57,6 @@ NUMBERS = re.compile(r"\[\n\s*([-+\d.eE,\s]+?)\n\s*\]")
 """An array of numbers over several lines; in a string there is no line break."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 Count = Annotated[StrictInt, Field(ge=0)]
 Package = Literal["python", "symgrasp", "numpy", "pybullet"]
 VERSION = r"^[0-9][0-9A-Za-z.+_-]{0,99}$"
@@ -134,8 +133,14 @@ class Hold(_Part):
         le=CLEARANCE_LIMIT,
         description=f"smallest distance (m) of bodies that may not touch; {CLEARANCE_LIMIT} stands for more",
     )
-    margin_along: Positive = Field(description="distance along the axis to an infeasible cell (m)")
-    margin_around: Positive = Field(description="angle about the axis to an infeasible cell (rad)")
+    margin_along: Finite = Field(ge=0, description="how far (m) the grasp may be off along the axis")
+    margin_around: Finite = Field(ge=0, description="how far (rad) the grasp may be off about the axis")
+    margins: Literal["cells", "proven"] = Field(
+        default="cells",
+        description="what the margins are: cells, the distances to the next infeasible cells of the map, all "
+        "nearer cells being feasible at their centres; or proven, lower bounds within which every grasp is "
+        "feasible, 0 where nothing is proven",
+    )
     limit_slack: Finite | None = Field(
         default=None, ge=0, description="distance (rad) of the nearest joint from its limit, at most π"
     )
@@ -179,9 +184,9 @@ class SceneRecord(_Part):
 
 
 class Plan(_Part):
-    """A plan, format version 2: version 1 has no motion."""
+    """A plan, format version 3: version 1 has no motion, and version 2 no proven margins."""
 
-    schema_version: Annotated[Literal[1, 2], WHOLE]
+    schema_version: Annotated[Literal[1, 2, 3], WHOLE]
     kind: Literal["sequential", "bimanual", "handover"]
     scene: SceneRecord
     versions: dict[Package, Annotated[str, Field(pattern=VERSION)]]
@@ -196,6 +201,13 @@ class Plan(_Part):
     def _motion_since_version_2(self) -> Plan:
         if self.motion is not None and self.schema_version == 1:
             raise ValueError("schema_version 2 of a plan with a motion")
+        return self
+
+    @model_validator(mode="after")
+    def _proven_margins_since_version_3(self) -> Plan:
+        proven = any(hold.margins == "proven" for task in self.tasks for hold in task.holds)
+        if proven and self.schema_version < 3:
+            raise ValueError("schema_version 3 of a plan with proven margins")
         return self
 
     def to_json(self) -> str:

@@ -1,14 +1,17 @@
 """Checks a plan without trusting the planner that made it.
 
 Everything is built anew from what the plan itself holds: the scene from its content, poses from
-its numbers, configurations put through the URDF and into PyBullet. No code of a planner or of a
-map takes part. Each module ``check_…`` beside this one has one theme.
+its numbers, configurations put through the URDF and into PyBullet. No code of a planner takes part, and
+of maps nothing but the proof of margins that are stated as proven, beside grasps that are tried within
+them, and the value of the redundancy at which a grasp is tried. Each module ``check_…`` beside this one
+has one theme.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from symgrasp.feasibility.create import MapMaker
 from symgrasp.plan.check_holds import check_holds
 from symgrasp.plan.check_margins import check_margins
 from symgrasp.plan.check_motion import check_motion
@@ -66,8 +69,9 @@ def verify(
             if posed[k]:
                 check_holds(task, places[k], world, report)
         if not report.failures:  # margins are those of grasps that hold
+            maker = MapMaker(world)
             for done, (k, task, hold) in enumerate(holds, start=len(plan.tasks)):
-                check_margins(hold, task, places[k], world, report, part_of(progress, done, parts))
+                check_margins(hold, task, places[k], maker, report, part_of(progress, done, parts))
         if plan.motion is not None and not report.failures:
             check_motion(plan, plan.motion, world, report.expect, strict=strict)
     if progress:

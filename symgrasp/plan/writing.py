@@ -76,7 +76,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
     margins = support_margins(world.scene, turned, [h.configuration for h in held])
     entries = []
     for (arm, q, opening), m, cell, grasp, offset in held:
-        along, around = m.cell_margins[cell].tolist()
+        along, around = m.margins[cell].tolist()
         h, theta = float(m.manifold.h[grasp.row]), float(m.manifold.theta[grasp.column])
         theta = float(wrap(theta + offset)) if offset else theta
         own, pitch = m.roll_and_pitch(grasp.roll)
@@ -93,6 +93,7 @@ def write_task(world: BulletWorld, task: Task, delta: float, held: Sequence[Held
                 opening=opening,
                 margin_along=along,
                 margin_around=around,
+                margins="proven" if m.margins_proven else "cells",
                 **_of_configuration(world, arm, q, arms),
             )
         )
@@ -158,7 +159,7 @@ def write_plan(
     """Write the plan of a scene."""
     packages = ("symgrasp", "numpy", "pybullet")
     return Plan(
-        schema_version=2,
+        schema_version=3,
         kind=kind,
         scene=SceneRecord(name=scene.name, sha256=scene.sha256, content=scene.content),
         versions={"python": platform.python_version(), **{name: version(name) for name in packages}},

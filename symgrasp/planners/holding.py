@@ -25,7 +25,7 @@ from symgrasp.planners.column_sets import doubled
 from symgrasp.planners.gaps import GapTable, PrintGaps
 from symgrasp.planners.placements import Problem, best_placement, placements_of
 from symgrasp.planners.ruled_out import Grasp, RuledOut
-from symgrasp.planners.sequential import check_same_grid
+from symgrasp.planners.sequential import check_same_grid, clearance_steps
 from symgrasp.planners.stations import SharedTorso, Station, Turn, best_turns
 from symgrasp.poses import Array
 
@@ -152,7 +152,8 @@ class HoldingSearch:
         In falling order of the score, so the first is the best, and nothing yielded means that
         nothing exists. Last come those whose prints overlap and whose hands may still pass each
         other. Turning all grasps and tasks of the sequence together changes nothing, so the first
-        hold keeps column 0. Of equal scores of a single hold, the larger clearance comes first.
+        hold keeps column 0. Of equal scores of a single hold, the larger clearance comes first, by
+        `clearance_steps`.
         """
         if len(self.holds) == 1:
             yield from self._lines()
@@ -206,7 +207,7 @@ class HoldingSearch:
         return _filled(reached, INFEASIBLE)
 
     def _lines(self) -> Iterator[Holding]:
-        """Yield every line of a single hold; a larger clearance breaks ties."""
+        """Yield every line of a single hold, in the order of `common_grasps`."""
         (alone,) = self._alone
         lines = np.flatnonzero(alone >= 0)
         clearance = [
@@ -216,7 +217,7 @@ class HoldingSearch:
             )
             for line in lines
         ]
-        for k in np.lexsort((-np.array(clearance), -alone[lines])):
+        for k in np.lexsort((-clearance_steps(clearance), -alone[lines])):
             yield self._holding(np.array([[lines[k], 0]]), float(alone[lines[k]]))
 
     def _below(self, ceiling: float, problem: Problem) -> Iterator[Holding]:

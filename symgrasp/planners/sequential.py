@@ -21,7 +21,17 @@ from symgrasp.object.manifold import wrap
 from symgrasp.planners.conflicts import ConflictError, find_conflict
 from symgrasp.poses import Array
 
-__all__ = ["CommonGrasp", "SequentialGrasp", "common_grasps", "first_common_grasp", "intervals_in_words"]
+__all__ = [
+    "CommonGrasp",
+    "SequentialGrasp",
+    "clearance_steps",
+    "common_grasps",
+    "first_common_grasp",
+    "intervals_in_words",
+]
+
+CLEARANCE_STEP = 0.005
+"""To so much (m) clearances count where they decide between grasps: to so much maps know the largest ones."""
 
 
 class SequentialGrasp(NamedTuple):
@@ -82,6 +92,8 @@ def first_common_grasp(
 def common_grasps(maps: Sequence[FeasibilityMap]) -> list[CommonGrasp]:
     """List every height and roll that serves all tasks: best margin first, of equal ones best clearance.
 
+    Clearances count by `clearance_steps`; what is equal still stays in the order of rolls and heights.
+
     Raises:
         InputError: there is no map, or the grids differ.
     """
@@ -103,23 +115,33 @@ def common_grasps(maps: Sequence[FeasibilityMap]) -> list[CommonGrasp]:
             float(worst[roll, row]),
             float(clear[roll, row]),
         )
-        for roll, row in np.argwhere(worst > 0).tolist()
+        for roll, row in np.argwhere(np.logical_and.reduce([m.feasible.any(axis=2) for m in maps])).tolist()
     ]
-    return sorted(found, key=lambda g: (-g.margin, -g.clearance))
+    return sorted(found, key=lambda g: (-g.margin, -int(clearance_steps(g.clearance))))
+
+
+def clearance_steps(clearance: ArrayLike) -> np.ndarray:
+    """Return clearances (...) (m) as whole steps (...), rounded down; below 0 where there is none (NaN).
+
+    A map tells the largest clearance of a cell to 2 mm and 3 % only, which is at most one step. Finer
+    differences say nothing, and must not decide which of two grasps comes first.
+    """
+    return np.floor(np.nan_to_num(clearance, nan=-1.0) / CLEARANCE_STEP + 1e-9).astype(int)
 
 
 def surface_margin(m: FeasibilityMap, ease: ArrayLike | None = None) -> Array:
     """Return (R, H, A) how far (m) the hand may be off on the surface, either way, 0 where infeasible.
 
-    Angles count by the arc that they cover at the cell's radius. Where the arm stands near a limit or a
-    singular pose only a part counts, its ease.
+    These are the margins of the map, which a plan states: proven ones where they are, and 0 then also where
+    nothing is proven of a feasible cell. Angles count by the arc that they cover at the cell's radius. Where
+    the arm stands near a limit or a singular pose only a part counts, its ease.
 
     Args:
         m: the map.
         ease: how easily the arm stands in the cells; that of the map if None.
     """
     radius = m.manifold.profile.radius(m.manifold.h)
-    along, around = np.moveaxis(m.cell_margins, -1, 0)
+    along, around = np.moveaxis(m.margins, -1, 0)
     margin = np.minimum(along, around * radius[None, :, None])
     ease = m.ease if ease is None else ease
     return margin if ease is None else margin * ease

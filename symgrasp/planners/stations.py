@@ -11,7 +11,7 @@ import numpy as np
 
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.planners.sequential import surface_margin
+from symgrasp.planners.sequential import clearance_steps, surface_margin
 from symgrasp.poses import Array
 
 __all__ = ["SharedTorso", "Station", "Turn", "best_turns"]
@@ -92,7 +92,7 @@ def best_turns(stations: Sequence[Station], cells: Sequence[Cell], heights: int,
     """Return the turns, with values of the torsos, at which all stations of a group are feasible.
 
     Best margin first; margins from ``enough`` (m) on count as equal, and of equal ones the larger clearance
-    comes first.
+    comes first, by `clearance_steps`; then the larger margin, then the smaller turn.
     """
     margins = [station.turned(station.margins, cells, heights) for station in stations]
     clearances = [station.turned(station.clearances, cells, heights) for station in stations]
@@ -104,7 +104,11 @@ def best_turns(stations: Sequence[Station], cells: Sequence[Cell], heights: int,
         turns += [
             Turn(int(k), float(margin[k]), float(clearance[k]), torsos) for k in np.flatnonzero(margin >= 0)
         ]
-    return sorted(turns, key=lambda turn: (-min(turn.margin, enough), -turn.clearance, -turn.margin))
+
+    def order(turn: Turn) -> tuple[float, int, float]:
+        return -min(turn.margin, enough), -int(clearance_steps(turn.clearance)), -turn.margin
+
+    return sorted(turns, key=order)
 
 
 def _margin(m: FeasibilityMap) -> Array:

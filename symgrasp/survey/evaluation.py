@@ -21,7 +21,7 @@ from symgrasp.planners.planning import (
     plan_sequential,
     tasks_of_plan,
 )
-from symgrasp.planners.sequential import surface_margin
+from symgrasp.planners.sequential import clearance_steps, surface_margin
 from symgrasp.poses import from_position_rpy
 from symgrasp.reason import Reason
 from symgrasp.scene.parts import Task
@@ -219,11 +219,14 @@ class Evaluator:
 
 
 def best_cell(m: FeasibilityMap) -> tuple[tuple[int, int, int], float]:
-    """Return the cell with the largest margin (m) and that margin; the larger clearance breaks ties."""
+    """Return the cell with the largest margin (m) and that margin; the larger clearance breaks ties.
+
+    Clearances count by `clearance_steps`, and of equal cells the first is returned.
+    """
     if not m.feasible.any():
         return (-1, -1, -1), 0.0
     margin = np.where(m.feasible, surface_margin(m), -1.0)
-    clearance = np.where(m.feasible & (margin == margin.max()), m.clearance, -1.0)
+    clearance = np.where(m.feasible & (margin == margin.max()), clearance_steps(m.clearance), -1)
     roll, row, column = np.unravel_index(int(clearance.argmax()), margin.shape)
     return (int(roll), int(row), int(column)), float(margin.max())
 

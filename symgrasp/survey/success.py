@@ -216,12 +216,9 @@ def _with_margins(plan: Plan, maps: Sequence[FeasibilityMap], roll: int, row: in
     tasks = []
     for task, m, column in zip(plan.tasks, maps, chosen.columns, strict=True):
         (hold,) = task.holds
-        along, around = m.cell_margins[roll, row, column].tolist()
-        tasks.append(
-            task.model_copy(
-                update={"holds": (hold.model_copy(update={"margin_along": along, "margin_around": around}),)}
-            )
-        )
+        along, around = m.margins[roll, row, column].tolist()
+        own = hold.model_copy(update={"margin_along": along, "margin_around": around})
+        tasks.append(task.model_copy(update={"holds": (own,)}))
     return plan.model_copy(update={"tasks": tuple(tasks)})
 
 

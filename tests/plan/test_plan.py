@@ -246,7 +246,7 @@ def test_no_plan_says_why():
     ("change", "field"),
     [
         (lambda c: c.pop("tasks"), "tasks"),
-        (lambda c: c.update(schema_version=3), "schema_version"),
+        (lambda c: c.update(schema_version=4), "schema_version"),
         (lambda c: c["tasks"][0].update(delta="x"), "tasks[0].delta"),
         (lambda c: c.update(tasks=c["tasks"][:1] * (MOST_TASKS + 1)), "tasks"),
         (lambda c: c.update(tasks=[{}] * 100_000), "tasks[0].name"),

@@ -28,7 +28,7 @@ from symgrasp.planners.conflicts import (
 )
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch
-from symgrasp.planners.sequential import common_grasps, first_common_grasp
+from symgrasp.planners.sequential import clearance_steps, common_grasps, first_common_grasp
 from symgrasp.reason import Reason
 from tests.conftest import load_small
 
@@ -136,6 +136,24 @@ def test_best_common_grasp_by_brute_force(maps):
     assert common_grasps(maps)[0][3:] == pytest.approx(best)
     listed = [(cell.roll, cell.row) for (cell,) in (h.cells for h in search.best_first())]
     assert listed == [(g.roll, g.row) for g in common_grasps(maps)]
+
+
+@given(st.integers(1, 4).flatmap(random_maps), st.integers(0, 2**32 - 1))
+@settings(max_examples=100, deadline=None)
+def test_what_a_map_cannot_know_of_clearances_orders_nothing(maps, seed):
+    """Clearances are known to a step: whatever else they are within it, the list is the same."""
+    rng = np.random.default_rng(seed)
+    orders = []
+    for _ in range(2):
+        steps = [5e-3 * (m.clearance - 1 + rng.uniform(0.01, 0.99, m.clearance.shape)) for m in maps]
+        own = [replace(m, clearance=clearance) for m, clearance in zip(maps, steps, strict=True)]
+        search = HoldingSearch([{"arm": m} for m in own], no_gaps())
+        listed = [h.cells for h in search.best_first()]
+        turns = [[(t.columns, t.torsos) for t in search.turns(c, k)] for c in listed for k in range(len(own))]
+        orders.append((listed, turns, [(g.roll, g.row) for g in common_grasps(own)]))
+    assert orders[0] == orders[1]
+    ranks = [(-g.margin, -int(clearance_steps(g.clearance)), g.roll, g.row) for g in common_grasps(maps)]
+    assert ranks == sorted(ranks)
 
 
 @given(st.integers(1, 4).flatmap(random_maps))
