@@ -20,7 +20,7 @@ PALE_OPACITY, HIT_OPACITY = 0.35, 0.75
 
 
 class GhostView:
-    """Shows the collision shapes of the ghost; nodes are added when they are first needed.
+    """Shows the collision shapes of the ghost; those that it hits are added when they are first needed.
 
     Args:
         client: the browser.
@@ -51,17 +51,23 @@ class GhostView:
         if shown:
             self._pose(shown)
 
+    def prepare(self, robot: str) -> None:
+        """Add the links of a robot, hidden, unless they are there: later they only have to be shown."""
+        if robot in self._robots:
+            return
+        model = self.scene.robots[robot].model
+        meshes = {link: link_mesh(model, link) for link in model.colliding_links()}
+        self._robots[robot] = {
+            link: (
+                self._add(f"{robot}/{link}/pale", mesh, PALE, PALE_OPACITY),
+                self._add(f"{robot}/{link}/hit", mesh, HIT, HIT_OPACITY),
+            )
+            for link, mesh in meshes.items()
+        }
+
     def _make(self, shown: Ghost, state: State) -> None:
         """Add the nodes that it needs and that were not needed before."""
-        model = self.scene.robots[shown.robot].model
-        if shown.robot not in self._robots:
-            self._robots[shown.robot] = {
-                link: (
-                    self._add(f"{shown.robot}/{link}/pale", link_mesh(model, link), PALE, PALE_OPACITY),
-                    self._add(f"{shown.robot}/{link}/hit", link_mesh(model, link), HIT, HIT_OPACITY),
-                )
-                for link in model.colliding_links()
-            }
+        self.prepare(shown.robot)
         for body in shown.others() - set(self._bodies):
             mesh, pose = body_mesh(self.scene, body, state.T_world_object)
             node = self._bodies[body] = self._add(f"hit{len(self._bodies)}", mesh, HIT, HIT_OPACITY)
@@ -79,5 +85,5 @@ class GhostView:
     ) -> viser.MeshHandle:
         return self.client.scene.add_mesh_simple(
             f"{self.root}/{name}", mesh.vertices, mesh.faces, color=color, opacity=opacity,
-            flat_shading=True, cast_shadow=False, receive_shadow=False,
+            flat_shading=True, cast_shadow=False, receive_shadow=False, visible=False,
         )  # fmt: skip

@@ -105,6 +105,8 @@ class SceneView:
             if self.flat_map:
                 self.flat_map.show(state)
             self._follow(state)
+        if state.result is not None:  # cells may be pointed at: after all else, as nobody sees it yet
+            self.ghost.prepare(state.robot.name)
 
     def camera_moved(self, camera: Camera) -> None:
         """Turn the flat map to the camera where it can no longer be read from there; on any thread."""
