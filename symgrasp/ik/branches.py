@@ -20,7 +20,7 @@ from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.ik.pair.polynomial import POLYNOMIAL_NUMBERS
 from symgrasp.ik.pair.solver import PAIR_BRANCHES, STARTS, VIEWS, pair_branches
 from symgrasp.ik.parallel import parallel_branches
-from symgrasp.ik.self_motion import into_limits
+from symgrasp.ik.self_motion import PULLS, into_limits
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
@@ -195,7 +195,7 @@ def _move_inside(chain, g, T, q, exists, inside, memory):
                 continue
             left = True
             row = memory.q[b]
-            if into_limits(chain, row, T, memory.J, memory.A) and _in_cell(chain, row):
+            if into_limits(chain, row, T, PULLS, memory.J, memory.A) and _in_cell(chain, row):
                 for j in range(row.shape[0]):
                     q[b, j] = row[j]
                 exists[b] = inside[b] = True

@@ -43,6 +43,9 @@ closed form of axes where they are meant to be only says where Newton's method s
 PARALLEL = 1e-6
 """Unit axes whose cross product is shorter than this do not meet in a point that can be computed."""
 
+BESIDE = 1e-3
+"""How far (rad) from a value of the locked joint at which axes are parallel they are taken to meet."""
+
 LEAST_OFFSET = 1e-3
 """Axes of joints 5 and 6 that come closer than this (m) are taken to meet, up to rounding, or not solved."""
 
@@ -119,7 +122,12 @@ def _geometries(
             ):
                 nowhere = known[0]._replace(W=np.full(3, np.nan))  # nothing is found there
                 filled = zip(rows, phi, strict=True)
-                return precision, [row or nowhere._replace(phi=float(value)) for row, value in filled]
+                return precision, [
+                    row
+                    or _beside(arm, locked, float(value), known[0], precision)
+                    or nowhere._replace(phi=float(value))
+                    for row, value in filled
+                ]
             if len(known) == len(rows):
                 return precision, known
     return None
@@ -224,6 +232,19 @@ def _meeting_pair(joints: _Joints, precision: Precision) -> PairGeometry | None:
     backwards, h, o, R0, p0, phi = joints
     pair = _common_point(h[4:], o[4:], precision)
     return None if pair is None else pair_geometry(backwards, h, o, R0, p0, pair[0], phi)
+
+
+def _beside(
+    arm: _Screws, locked: int | None, phi: float, known: ChainGeometry, precision: Precision
+) -> PairGeometry | None:
+    """Return the geometry of a pair that is parallel at φ, as it is at a value beside it.
+
+    A search begins with it, and ends with the arm's own kinematics. None of another family.
+    """
+    if not isinstance(known, PairGeometry):
+        return None
+    beside = _meeting_pair(_joints(arm, locked, phi + BESIDE, known.backwards), precision)
+    return None if beside is None else beside._replace(phi=phi, shifted=1.0)
 
 
 _FAMILIES: tuple[tuple[Precision, Callable[[_Joints, Precision], ChainGeometry | None]], ...] = (

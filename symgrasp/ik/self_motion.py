@@ -19,7 +19,7 @@ from symgrasp.ik.joints import onto_limits, settle
 from symgrasp.ik.newton import POLISHED, linearise, normal_equations, solve_normal
 from symgrasp.ik.vectors import STRICT
 
-__all__ = ["into_limits"]
+__all__ = ["PULLS", "into_limits"]
 
 WEIGHT2 = 1e-6
 """Square of the weight w (m/rad, or none)."""
@@ -34,8 +34,8 @@ NEAR = 1e-3
 LARGEST_STEP = 0.5
 """Largest way back (rad) in one step: families are curved."""
 
-STEPS = 12
-"""Steps, at most."""
+PULLS = 12
+"""Steps, at most, of an arm whose tool is almost at the pose."""
 
 CLOSE = 1e-7
 """Error (m and rad) of the tool that is small enough beside a singular pose, where the last digits of it
@@ -46,13 +46,14 @@ LEAST_GAIN, WAITS = 0.9, 3
 
 
 @njit(**STRICT)
-def into_limits(chain, q, T, J, A):
-    """Move an arm, whose tool is almost at a pose, inside its limits with the tool at the pose.
+def into_limits(chain, q, T, steps, J, A):
+    """Move an arm inside its limits with the tool at a pose.
 
     Args:
         chain: the arm.
         q: (n,) joint values (rad), changed in place.
         T: tool pose (4, 4) in the base.
+        steps: steps, at most.
         J, A: memory (n, 6) and (n, n + 1).
 
     Returns:
@@ -60,7 +61,7 @@ def into_limits(chain, q, T, J, A):
         outside again, `CLOSE`.
     """
     limits, before = chain.limits, math.inf
-    for step in range(STEPS):
+    for step in range(steps):
         fits = settle(limits, q)
         if fits:
             onto_limits(limits, q)

@@ -148,7 +148,7 @@ def test_samples_mean_the_same_in_every_row():
 
 @pytest.mark.parametrize("name", OFFSETS)
 def test_steep_pitches_are_sampled_too(name):
-    """Near ±90° the last two axes are nearly parallel; at 90° they are, and nothing is found there alone."""
+    """Near ±90° the last two axes are nearly parallel; at 90° they are, and only a search finds anything."""
     arm = arm_with(name).pitching((0.0, 0.0), (-1.7, 1.7), 0.1)
     ik = solver_for(arm, 64)
     assert isinstance(ik, PitchedIK)
@@ -165,7 +165,8 @@ def test_steep_pitches_are_sampled_too(name):
     upright = sampled.at(np.array([0.2, 0.5, np.pi / 2]))
     assert not upright.complete
     configurations[:, PITCH] = np.pi / 2
-    assert not any(len(upright.solve_sample(arm.tool_pose(q), 2).q) for q in configurations)
+    found = sum(len(upright.solve_sample(arm.tool_pose(q), 2).q) > 0 for q in configurations)
+    assert found >= 60 if upright.family.startswith("search") else found == 0
 
 
 def test_only_azimuths_beyond_the_cell_are_out_of_reach():

@@ -11,13 +11,13 @@ from symgrasp.poses import Array
 
 __all__ = [
     "CHAIN_DIRECTION", "CHAIN_POINT", "COSINE", "COSINE_56", "FIRST_AXIS", "FIRST_POINT", "FRAME", "GENERAL",
-    "KIND", "LENGTH", "MEETING", "MEETING_PAIR", "OUTER_LAST", "PAIR_PHI", "PARALLEL", "SHOULDER_POINT",
-    "SINE", "WRIST_POINT", "PairGeometry", "pair_geometry",
+    "KIND", "LENGTH", "MEETING", "MEETING_PAIR", "OUTER_LAST", "PAIR_PHI", "PARALLEL", "SHIFTED",
+    "SHOULDER_POINT", "SINE", "WRIST_POINT", "PairGeometry", "pair_geometry",
 ]  # fmt: skip
 
 WRIST_POINT, SHOULDER_POINT, FRAME, FIRST_AXIS, FIRST_POINT = 30, 33, 36, 45, 48
 CHAIN_POINT, CHAIN_DIRECTION, LENGTH, COSINE, SINE, COSINE_56 = 51, 60, 69, 70, 71, 72
-KIND, OUTER_LAST, PAIR_PHI = 73, 74, 75
+KIND, OUTER_LAST, PAIR_PHI, SHIFTED = 73, 74, 75, 76
 """Where the parts of a `PairGeometry` begin that other geometries do not have."""
 
 MEETING_PAIR = 2
@@ -66,6 +66,7 @@ class PairGeometry(NamedTuple):
         kind: `GENERAL`, `MEETING` or `PARALLEL`.
         outer_last: 1 where joint 4 is the outer joint, 0 where joint 1 is.
         phi: the value φ (rad).
+        shifted: 1 where the pair is parallel at φ, and the geometry that of a value beside it; else 0.
     """
 
     backwards: bool
@@ -86,6 +87,7 @@ class PairGeometry(NamedTuple):
     kind: float
     outer_last: float
     phi: float
+    shifted: float = 0.0
 
     @property
     def family(self) -> int:
@@ -93,7 +95,7 @@ class PairGeometry(NamedTuple):
         return MEETING_PAIR
 
     def packed(self) -> Array:
-        """Return all parts but the first in one row (76,)."""
+        """Return all parts but the first in one row (77,)."""
         return np.concatenate([np.ravel(part) for part in self[1:]])
 
 

@@ -37,6 +37,9 @@ QUARTIC, INNER = 0, 5
 SMALL_STEP = 1e-6
 """Step, as a share of b, up to which it is improved: larger ones are between values that all but coincide."""
 
+ON_AXIS = 1e-5
+"""Distance (m) from an axis up to which a point is on it."""
+
 BEYOND = 1e-9
 """Distance (m) that rounding is given where the reach ends."""
 
@@ -265,7 +268,8 @@ def _root_near(z, to):
 def residual_at(equations, c, s, work, i):
     """Return the residual of the direction at a solution of `solve_inner`, and exp(i q) of three joints.
 
-    They are the inner one, and the two in the middle.
+    They are the inner one, and the two in the middle. Last comes the square of how far (m) the point is
+    from the axis of one of these: on it, the joint may have any value, and has whichever rounding makes it.
     """
     arm, polynomial, direction, (outer, outer_direction) = equations
     a, cosine, sine, wanted, _ = arm
@@ -276,7 +280,7 @@ def residual_at(equations, c, s, work, i):
     z = low * back + rest + high * b
     z_ = high.conjugate() * back + rest.conjugate() + low.conjugate() * b
     zh = along + along1 * b + along1.conjugate() * back
-    e, e_ = _turn(P + 1j * Q, P - 1j * Q, z, z_)
+    e, e_, far = _turn(P + 1j * Q, P - 1j * Q, z, z_)
     low, rest, high, along, along1 = direction
     d = (low * back + rest + high * b) * e
     d_ = (high.conjugate() * back + rest.conjugate() + low.conjugate() * b) * e_
@@ -284,16 +288,25 @@ def residual_at(equations, c, s, work, i):
     x, y = 0.5 * (d + d_), -0.5j * (d - d_)
     y, h = cosine * y - sine * dh, cosine * dh + sine * y
     side = cosine * Q - sine * zh
-    f, f_ = _turn(complex(w[0], w[1]), complex(w[0], -w[1]), P + a + 1j * side, P + a - 1j * side)
+    f, f_, further = _turn(complex(w[0], w[1]), complex(w[0], -w[1]), P + a + 1j * side, P + a - 1j * side)
     u, u_ = (x + 1j * y) * f, (x - 1j * y) * f_
     r = 0.5 * (complex(m[0], -m[1]) * u + complex(m[0], m[1]) * u_) + m[2] * h - wanted
-    return r, b, e, f
+    return r, b, e, f, min(far, further)
 
 
 @njit(**STRICT)
 def _turn(to, to_, of, of_):
-    """Return ``e = exp(i q)`` and 1/e of a rotation: ``to = e of`` and ``to_ = of_ / e``."""
+    """Return ``e = exp(i q)`` and 1/e of a rotation: ``to = e of`` and ``to_ = of_ / e``.
+
+    Last comes the largest square of their sizes.
+    """
+    largest = max(size2(to), size2(to_), size2(of), size2(of_))
+    if largest < ON_AXIS * ON_AXIS:
+        angle = math.atan2(to.imag, to.real) - math.atan2(of.imag, of.real)
+        e = complex(math.cos(angle), math.sin(angle))
+        return e, e.conjugate(), largest
     return (
         to * inverse_of(of) if size2(of) > size2(to_) else of_ * inverse_of(to_),
         to_ * inverse_of(of_) if size2(of_) > size2(to) else of * inverse_of(to),
+        largest,
     )

@@ -36,6 +36,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from symgrasp.compiling import njit
 from symgrasp.ik.arcs import (
     ARCS,
@@ -53,9 +55,10 @@ from symgrasp.ik.arcs import (
 from symgrasp.ik.chain import AXES
 from symgrasp.ik.joints import misses, nearest_turn, settle, tool_motion, within, write_branch
 from symgrasp.ik.newton import polish_in
-from symgrasp.ik.pair.geometry import OUTER_LAST, PAIR_PHI
+from symgrasp.ik.pair.geometry import OUTER_LAST, PAIR_PHI, SHIFTED
 from symgrasp.ik.pair.polynomial import equations_of, may_reach, product, residual_at, solve_inner
 from symgrasp.ik.roots import size2
+from symgrasp.ik.self_motion import PULLS, into_limits
 from symgrasp.ik.vectors import STRICT, perpendicular, rotate, subproblem1, times, vec
 from symgrasp.robot.limits import LIMIT_TOLERANCE
 
@@ -82,6 +85,20 @@ WIDEST, LEAST_STRETCH = 0.4, 1e-4
 NEARLY_ZERO, NEARLY_REAL = 0.02, 0.05
 """Residual, and imaginary part of angles (rad), up to which a zero of N is tried."""
 
+ALMOST_ON_AXIS = 1e-3
+"""Distance (m) of a point from an axis up to which the pose may be singular: zeros that coincide are known
+less well than others."""
+
+NARROW = 3e-4
+"""Width (rad) of a part in which N is faint below which the pose may be singular, too."""
+
+MORE_STARTS, MORE_STEPS = 24, 20
+"""Joint values all over the range from which a singular pose is sought where nothing else leads inside the
+limits, and steps from each."""
+
+SPREAD = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
+"""Numbers whose multiples, less whole ones, spread evenly (R. Kronecker's sequence), one for each joint."""
+
 SAME = 1e-7
 """Largest difference (rad) of the joints of configurations that count as one."""
 
@@ -98,14 +115,16 @@ def pair_branches(chain, k, T, inside_only, q, exists, inside, memory):
     if not may_reach(equations):
         return False
     memory.counts[0] = memory.counts[1] = 0
+    memory.free[1] = g[SHIFTED]
     for beyond in range(1 if inside_only else 2):
         count, view = 1, 0
         while view < count:
             count = _search_view(chain, g, R, equations, memory, view, count, beyond)
             view += 1
-    found = 0
+    found, reached = 0, False
+    singular = memory.free[1] != 0.0
     # Those that start inside the limits come first: which rows they get does not depend on the others.
-    for beyond in range(1 if inside_only else 2):
+    for beyond in range(1 if inside_only and not singular else 2):
         for i in range(memory.counts[beyond]):
             if found == q.shape[0]:
                 break
@@ -113,11 +132,42 @@ def pair_branches(chain, k, T, inside_only, q, exists, inside, memory):
             for j in range(row.shape[0]):
                 row[j] = start[j]
             reaches = polish_in(chain.forward, chain.fixed, row, T, memory.J, memory.A)
+            fits = reaches and settle(chain.limits, row) and not beyond
+            if singular and not fits:
+                for j in range(row.shape[0]):
+                    memory.row[j] = start[j]
+                if into_limits(chain, memory.row, T, PULLS, memory.J, memory.A):
+                    reaches = fits = True
+                    for j in range(row.shape[0]):
+                        row[j] = memory.row[j]
             if not reaches or misses(chain.forward, row, T) or _is_known(q, found):
                 continue
-            exists[found], inside[found] = True, settle(chain.limits, row) and not beyond
+            exists[found], inside[found] = True, fits
             found += 1
+            reached |= fits
+    if singular and not reached and found < q.shape[0]:
+        found = _search_everywhere(chain, g, T, q, exists, inside, memory, found)
     return found > 0 or inside_only
+
+
+@njit(**STRICT)
+def _search_everywhere(chain, g, T, q, exists, inside, memory, found):
+    """Look for a configuration inside the limits from joint values all over; return how many there are."""
+    for i in range(MORE_STARTS):
+        row = memory.row
+        for j in range(row.shape[0]):
+            first = max(chain.limits[0, j], chain.limits[2, j] - math.pi)
+            last = min(chain.limits[1, j], chain.limits[2, j] + math.pi)
+            share = (i + 1) * SPREAD[j]
+            row[j] = first + (share - math.floor(share)) * (last - first)
+        if chain.joint[6] >= 0:
+            row[chain.joint[6]] = nearest_turn(chain.limits, chain.joint[6], g[PAIR_PHI])
+        if into_limits(chain, row, T, MORE_STEPS, memory.J, memory.A):
+            for j in range(row.shape[0]):
+                q[found, j] = row[j]
+            exists[found] = inside[found] = True
+            return found + 1
+    return found
 
 
 @njit(**STRICT)
@@ -207,7 +257,10 @@ def _search_arc(chain, g, R, equations, memory, where, noise, count):
             spans[top + 1, 0], spans[top + 1, 1] = first, middle
             top += 2
         elif where[1] > LEAST_STRETCH and count < VIEWS:
-            count = _add_view(memory.views, _angle(where, first), _angle(where, last), where, count)
+            begin, end = _angle(where, first), _angle(where, last)
+            count = _add_view(memory.views, begin, end, where, count)
+            if end - begin < NARROW:
+                memory.free[1] = 1.0
         else:
             u, v = double_zero(c)
             _add_starts(chain, g, R, equations, memory, _angle(where, first + (last - first) * u))
@@ -240,8 +293,10 @@ def _add_starts(chain, g, R, equations, memory, x):
     c, s = math.cos(x), math.sin(x)
     solve_inner(equations, c, s, memory.numbers)
     for i in range(4):
-        r, b, e, f = residual_at(equations, c, s, memory.numbers, i)
-        if not (
+        r, b, e, f, far2 = residual_at(equations, c, s, memory.numbers, i)
+        if far2 < ALMOST_ON_AXIS * ALMOST_ON_AXIS and size2(r) < 1.0 and _nearly_real(b):
+            memory.free[1] = 1.0
+        elif not (
             size2(r) < NEARLY_ZERO * NEARLY_ZERO and _nearly_real(b) and _nearly_real(e) and _nearly_real(f)
         ):
             continue
