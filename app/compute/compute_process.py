@@ -32,6 +32,8 @@ from ..state.requests import (
     Maps,
     Probability,
     ProbabilityRequest,
+    Windows,
+    WindowsRequest,
 )
 from ..state.surveys.survey import Stand, SurveyRequest
 from .channel import Call, Cancel, Compiling, ComputedMap, Failure, Part, ProgressReport
@@ -128,6 +130,10 @@ class ComputeProcess:
     def probability(self, request: ProbabilityRequest, progress: Progress) -> Probability:
         """Compute how probable the grasps of a map are."""
         return self._call("probability", progress, request)
+
+    def windows(self, request: WindowsRequest, shown: FeasibilityMap, progress: Progress) -> Windows:
+        """Compute how wide the windows of a map's cells are."""
+        return self._call("windows", progress, request, shown)
 
     def read_scene(self, name: str, content: bytes, folder: Path | None, progress: Progress) -> UploadedScene:
         """Read an uploaded scene; see `UploadService.read_scene`."""

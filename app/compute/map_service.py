@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from symgrasp.engine.search import is_search_compiled
+from symgrasp.errors import InputError
 from symgrasp.feasibility.coarse import coarse_map
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
@@ -27,6 +28,8 @@ from ..state.requests import (
     Maps,
     Probability,
     ProbabilityRequest,
+    Windows,
+    WindowsRequest,
 )
 
 __all__ = ["DRAWS", "MapService"]
@@ -133,6 +136,21 @@ class MapService:
         )
         self._draws = None
         return Probability(request, found.feasible.sum(axis=0), len(found.feasible))
+
+    def windows(self, request: WindowsRequest, shown: FeasibilityMap, progress: Progress) -> Windows:
+        """Compute how wide the windows of the cells of a map are; none is known of arms without redundancy.
+
+        Args:
+            request: which map.
+            shown: that map, for the object that is not turned.
+            progress: called with the finished share; may raise `Cancelled`.
+        """
+        maker = self._maker_for(request.map.scene)
+        try:
+            widest = maker.with_windows(shown, progress).widest
+        except InputError:
+            widest = None
+        return Windows(request, np.full(shown.reason.shape, np.nan) if widest is None else widest)
 
     def _maker_for(self, scene: Scene) -> MapMaker:
         """Return the present map maker if it is for the same robots, obstacles and object, else a new one."""

@@ -74,7 +74,7 @@ class _Server:
         plans, uploads = PlanService(self._maps, folders), UploadService(folders)
         self._methods: dict[str, Callable[..., Any]] = {
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
-            "probability": self._maps.probability,
+            "probability": self._maps.probability, "windows": self._maps.windows,
             "plan": plans.plan, "more": plans.more, "motion": plans.motion, "open": plans.open,
             "read_scene": uploads.read_scene, "file_kind": uploads.file_kind,
             "measure": uploads.measure, "mount": uploads.mount,

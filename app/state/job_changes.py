@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .requests import Busy, Comparison, ExplainResult, MapResult, Probability, Request
+from .requests import Busy, Comparison, ExplainResult, MapResult, Probability, Request, Windows
 from .state import State
 
 __all__ = [
@@ -91,7 +91,9 @@ def preliminary_arrived(state: State, result: MapResult) -> State:
     return state if state.is_current or result.request != state.request else replace(state, result=result)
 
 
-def result_arrived(state: State, job_id: int, result: Comparison | ExplainResult | Probability) -> State:
+def result_arrived(
+    state: State, job_id: int, result: Comparison | ExplainResult | Probability | Windows
+) -> State:
     """Show a comparison, an explanation or probabilities, unless it is about another map."""
     if not is_awaited(state, job_id):
         return state

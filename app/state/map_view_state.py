@@ -21,6 +21,8 @@ from .requests import (
     Probability,
     ProbabilityRequest,
     Request,
+    Windows,
+    WindowsRequest,
 )
 
 __all__ = ["NOISE", "MapViewState", "RollChoice"]
@@ -76,6 +78,7 @@ class MapViewState:
         hovered: the cell of the unshifted map that is pointed at.
         noise: how uncertain the object's pose is where the colours show probabilities.
         probability: the newest result of that.
+        windows: how wide the windows of cells are, the newest result.
     """
 
     roll: RollChoice = RollChoice.EITHER
@@ -90,6 +93,7 @@ class MapViewState:
     hovered: Cell | None = None
     noise: PoseNoise = NOISE
     probability: Probability | None = None
+    windows: Windows | None = None
 
     @property
     def input_values(self) -> tuple[object, ...]:
@@ -117,7 +121,14 @@ class MapViewState:
                 return explain
         if self.color_by is ColorBy.PROBABILITY and self.probability_of(request) is None:
             return ProbabilityRequest(request, self.noise)
+        if self.color_by is ColorBy.WINDOW and self.windows_of(request) is None:
+            return WindowsRequest(request)
         return None
+
+    def windows_of(self, request: MapRequest) -> Windows | None:
+        """Return how wide the windows of a map's cells are, if that is shown and known."""
+        found = self.windows if self.color_by is ColorBy.WINDOW else None
+        return found if found and found.request == WindowsRequest(request) else None
 
     def probability_of(self, request: MapRequest) -> Probability | None:
         """Return how probable the grasps of a map are, if that is shown and known."""
@@ -133,10 +144,12 @@ class MapViewState:
         count = len(self.explained.explanation.candidates) if self.explained else 0
         return replace(self, candidate=int(np.clip(candidate, 0, count - 1)) if count else None)
 
-    def with_result(self, result: Comparison | ExplainResult | Probability) -> MapViewState:
+    def with_result(self, result: Comparison | ExplainResult | Probability | Windows) -> MapViewState:
         """Store a result about the map."""
         if isinstance(result, Probability):
             return replace(self, probability=result)
+        if isinstance(result, Windows):
+            return replace(self, windows=result)
         if isinstance(result, Comparison):
             return replace(self, comparison=result if self.compare else None)
         # A candidate without an explanation was restored by an undo: keep it.
@@ -144,7 +157,7 @@ class MapViewState:
 
     def without_results(self) -> MapViewState:
         """Drop what was computed."""
-        return replace(self, comparison=None, explained=None, hovered=None, probability=None)
+        return replace(self, comparison=None, explained=None, hovered=None, probability=None, windows=None)
 
     def for_another_scene(self) -> MapViewState:
         """Return it for another scene: both rolls, the same display options, nothing computed."""

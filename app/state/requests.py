@@ -31,6 +31,8 @@ __all__ = [
     "Probability",
     "ProbabilityRequest",
     "Request",
+    "Windows",
+    "WindowsRequest",
 ]
 
 MapKey = tuple[str, str, bytes]
@@ -168,7 +170,22 @@ class ProbabilityRequest:
         return False
 
 
-Request = MapRequest | CompareRequest | ExplainRequest | ProbabilityRequest
+@dataclass(frozen=True)
+class WindowsRequest:
+    """A map of which is to be known how wide the windows of its cells are.
+
+    Attributes:
+        map: the map.
+    """
+
+    map: MapRequest
+
+    def differs_only_in_pose(self, other: object) -> bool:
+        """Return False: it takes as long as maps, and is not waited for where another is wanted."""
+        return False
+
+
+Request = MapRequest | CompareRequest | ExplainRequest | ProbabilityRequest | WindowsRequest
 """What a state may need computed; it is started without an action of a person."""
 
 
@@ -241,3 +258,16 @@ class Busy:
         if self.request is None or self.request == request:
             return True
         return not self.late and self.request.differs_only_in_pose(request)
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """How wide the windows of a map's cells are.
+
+    Attributes:
+        request: what it answers.
+        widest: (R, H, A) width (rad) of the widest window of each cell, NaN where there is none to be known.
+    """
+
+    request: WindowsRequest
+    widest: np.ndarray

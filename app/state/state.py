@@ -263,9 +263,14 @@ class State:
 
     @cached
     def base_map(self) -> FeasibilityMap | None:
-        """The newest map before it is shifted by δ, with the probabilities that are shown."""
-        if self.result is None or self.probability is None:
-            return self.result and self.result.map
+        """The newest map before it is shifted by δ, with the probabilities or windows that are shown."""
+        if self.result is None:
+            return None
+        windows = self.map_view.windows_of(self.request) if self.is_current else None
+        if windows is not None:
+            return replace(self.result.map, widest=windows.widest)
+        if self.probability is None:
+            return self.result.map
         return replace(self.result.map, probability=self.probability.feasible / self.probability.draws)
 
     @cached

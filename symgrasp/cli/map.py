@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from typing import TYPE_CHECKING
 
 from symgrasp.cli.shared import (
@@ -21,9 +22,15 @@ from symgrasp.cli.shared import (
 )
 
 if TYPE_CHECKING:
+    from symgrasp.feasibility.color_by import ColorBy
     from symgrasp.feasibility.map import FeasibilityMap
 
 __all__ = ["add_parser", "run"]
+
+COLORS = (
+    "reason", "feasible", "clearance", "margin-along", "margin-around", "hand-opening", "elbow-window",
+)  # fmt: skip
+"""What `symgrasp.feasibility.color_by.ColorBy` calls them, but for the spaces."""
 
 ENDINGS = (".npz", ".png", ".svg", ".json")
 
@@ -38,6 +45,8 @@ def add_parser(commands: Commands) -> None:
     command.add_argument("--redundancy", metavar="N|auto", type=_redundancy, help=text)
     text = "prove of every cell that it holds as a whole, where that can be proven"
     command.add_argument("--certify", action="store_true", default=None, help=text)
+    text = "what the colours of a picture show (default: reason); elbow-window: how far the elbow may swing"
+    command.add_argument("--color-by", choices=COLORS, default=COLORS[0], help=text)
     add_out(command, "write the map: .npz, .png, .svg or .json")
 
 
@@ -49,11 +58,17 @@ def run(args: argparse.Namespace) -> int:
     if args.redundancy is not None:
         scene = scene.with_settings(redundancy=args.redundancy)
 
-    from symgrasp.feasibility.create import create_map
+    from symgrasp.feasibility.color_by import ColorBy
+    from symgrasp.feasibility.create import MapMaker, create_map
     from symgrasp.reason import Reason
+    from symgrasp.world import open_world
 
+    color_by = ColorBy(args.color_by.replace("-", " "))
     with progress_of(f"map of {task.name}") as progress:
         the_map = create_map(scene, task=task.name, arm=arm.name, progress=progress, certify=args.certify)
+    if color_by is ColorBy.WINDOW:
+        with progress_of("windows of its cells") as progress, open_world(scene) as world:
+            the_map = MapMaker(world).with_windows(the_map, progress)
     cells = the_map.reason.size
     say(f"{scene.name}: {task.name} with {arm.name}, {cells} cells")
     for reason, count in the_map.counts().items():
@@ -75,8 +90,12 @@ def run(args: argparse.Namespace) -> int:
         say(f"  feasible area{split}: {the_map.refined.area}")
     if Reason.NOT_FOUND in the_map.counts():
         say("  (not found: by a search for configurations, which is no proof that there is none)")
+    if the_map.widest is not None and the_map.feasible.any():
+        widths = sorted(map(math.degrees, the_map.widest[the_map.feasible].tolist()))
+        middle, most = widths[len(widths) // 2], widths[-1]
+        say(f"  widest elbow window of a feasible cell: {middle:.1f}° in the median, at most {most:.1f}°")
     if args.out:
-        write_out(args.out, _content(the_map, args.out.suffix))
+        write_out(args.out, _content(the_map, args.out.suffix, color_by))
     return 0
 
 
@@ -85,14 +104,14 @@ def _redundancy(text: str) -> int | str:
     return text if text == "auto" else whole(1)(text)
 
 
-def _content(the_map: FeasibilityMap, ending: str) -> bytes:
+def _content(the_map: FeasibilityMap, ending: str, color_by: ColorBy) -> bytes:
     """Return what a file of this ending holds."""
-    from symgrasp.feasibility.pictures import to_svg
+    from symgrasp.feasibility.pictures import to_png, to_svg
 
     if ending == ".png":
-        return the_map._repr_png_()
+        return to_png(the_map.plot(color_by))
     if ending == ".svg":
-        return to_svg(the_map.plot())
+        return to_svg(the_map.plot(color_by))
     if ending == ".json":
         return (json.dumps(the_map.to_dict(), allow_nan=False) + "\n").encode()
     return the_map.to_npz()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from symgrasp.poses import Array
 
-__all__ = ["CLEARANCE_LIMIT", "Cell", "Margin", "Witness"]
+__all__ = ["CLEARANCE_LIMIT", "Cell", "Margin", "Window", "Witness"]
 
 
 CLEARANCE_LIMIT = 0.05
@@ -56,3 +56,26 @@ class Margin(NamedTuple):
 
     along: float
     around: float
+
+
+class Window(NamedTuple):
+    """An interval of the redundancy φ on which a branch holds a grasp.
+
+    Attributes:
+        branch: branch of the closed form.
+        low: where it begins (rad).
+        high: where it ends (rad).
+        whole: whether the clearances along it allow no collision in between, nor the joints a limit, by what
+            is usual for how arms move with φ. Else that is so at values of φ at most 0.001 rad apart, 0.005
+            with a retreat or where the robot could fall, on parts of it.
+    """
+
+    branch: int
+    low: float
+    high: float
+    whole: bool
+
+    @property
+    def width(self) -> float:
+        """Its width (rad)."""
+        return self.high - self.low

@@ -26,6 +26,7 @@ class ColorBy(StrEnum):
     AROUND = "margin around"
     OPENING = "hand opening"
     PROBABILITY = "probability"
+    WINDOW = "elbow window"
 
     @property
     def unit(self) -> str:
@@ -34,7 +35,7 @@ class ColorBy(StrEnum):
 
 
 _UNITS = {ColorBy.CLEARANCE: "mm", ColorBy.ALONG: "mm", ColorBy.AROUND: "°", ColorBy.OPENING: "mm",
-          ColorBy.PROBABILITY: "%"}  # fmt: skip
+          ColorBy.PROBABILITY: "%", ColorBy.WINDOW: "°"}  # fmt: skip
 
 FEASIBLE = (0x5F, 0xBF, 0x77)
 INFEASIBLE = (0xA3, 0x1D, 0x2A)
@@ -149,6 +150,9 @@ def _colored(color_by: ColorBy, reason: np.ndarray, values: Array) -> ColoredMap
     known = ~np.isnan(values)
     high = _nice(float(values[known].max())) if known.any() else 1.0
     swatches = (Swatch(_hex(NONE), "not feasible", rest),)
+    if color_by is ColorBy.WINDOW and (feasible & ~known).any():
+        unknown = int(np.count_nonzero(~known))
+        swatches = (Swatch(_hex(NONE), "not feasible, or not known", unknown),)
     if color_by is ColorBy.PROBABILITY:
         high, unknown = 100.0, int(np.count_nonzero(~known))
         swatches = (Swatch(_hex(NONE), "not computed yet", unknown),) if unknown else ()

@@ -12,7 +12,7 @@ import numpy as np
 
 from symgrasp.errors import InputError
 from symgrasp.feasibility.algorithm1 import create_map_reference
-from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.cell import Cell, Window
 from symgrasp.feasibility.exact.certified import LEVELS
 from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.feasibility.explain import Explanation, explain_cell
@@ -186,6 +186,58 @@ class MapMaker:
                 ik = solver_for(the_arm, self.scene.settings.samples, more=[witness.phi])
         return explain_cell(self.world, ik, the_task, grid, where, progress)
 
+    def windows(
+        self, m: FeasibilityMap, cells: np.ndarray, progress: Progress | None = None, *, settle: bool = True
+    ) -> list[tuple[Window, ...]]:
+        """Find the windows of cells of a map, see `FeasibilityMap.windows`; of arms on a torso, those at the
+        value of the torso at which the cell's witness is, none of infeasible cells.
+
+        Args:
+            m: the map, of the maker's scene.
+            cells: (c, 3) the cells.
+            progress: called with the finished share; may raise `Cancelled`.
+            settle: whether windows end where PyBullet says; else up to half a millimetre before a collision.
+
+        Raises:
+            InputError: the arm has no redundancy, or none that is known at any value.
+        """
+        arm, known = self.scene.arm(m.arm), self.scene.tasks.get(m.task)
+        holders = (m.arm,) if known is None else known.arms
+        task = Task(m.task, holders, m.T_world_object)
+        cells = np.asarray(cells, dtype=np.int64).reshape(-1, 3)
+        torso, at = arm.robot.torso, np.zeros(len(cells), dtype=int)
+        if torso is not None:
+            count = len(torso.joint_names)
+            for k, cell in enumerate(map(tuple, cells)):
+                at[k] = torso.samples_at(m.q[cell][:count].tolist())[0] if m.feasible[cell] else -1
+        found: list[tuple[Window, ...]] = [()] * len(cells)
+        values = [t for t in np.unique(at).tolist() if t >= 0]
+        for k, t in enumerate(values):
+            own = arm if torso is None else arm.at(t)
+            engine = None if arm.pitched else self._engine(own, None if torso is None else t, m.manifold)
+            if engine is None:
+                raise InputError(
+                    "windows", "arm", arm.name, "one of seven joints that the exact engine knows"
+                )
+            these = np.flatnonzero(at == t)
+            step = part_of(progress, k, len(values))
+            for c, windows in zip(
+                these, engine.windows(task, cells[these], m.manifold, step, settle=settle), strict=True
+            ):
+                found[int(c)] = windows
+        return found
+
+    def with_windows(self, m: FeasibilityMap, progress: Progress | None = None) -> FeasibilityMap:
+        """Return a map that knows how wide the widest window of each feasible cell is.
+
+        Arguments and errors are those of `windows`; widths end up to half a millimetre before a collision.
+        """
+        cells = np.argwhere(m.feasible)
+        found = self.windows(m, cells, progress, settle=False)
+        widest = np.full(m.reason.shape, np.nan)
+        widest[m.feasible] = [max((w.width for w in own), default=0.0) for own in found]
+        return replace(m, widest=widest)
+
     def _samples(self, arm: Arm) -> int:
         """Return the number of redundancy samples of an arm alone."""
         alone = arm.at(0)
@@ -251,7 +303,14 @@ def create_map(
     with open_world(scene) as world:
         maker = MapMaker(world)
         found = maker.map(arm, task, method=method, manifold=manifold, progress=progress, certify=certify)
-    return replace(found, shown_in=scene)
+    return replace(found, shown_in=scene, find_windows=_windows_of)
+
+
+def _windows_of(m: FeasibilityMap, cell: Cell) -> tuple[Window, ...]:
+    """Return the windows of a cell of a map that knows its scene."""
+    assert m.shown_in is not None
+    with open_world(m.shown_in) as world:
+        return MapMaker(world).windows(m, np.array([cell]))[0]
 
 
 def explain(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 from symgrasp import page
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import pictures
-from symgrasp.feasibility.cell import Cell, Margin, Witness
+from symgrasp.feasibility.cell import Cell, Margin, Window, Witness
 from symgrasp.feasibility.color_by import ColorBy, color_map
 from symgrasp.feasibility.map_files import ARRAYS, FORMAT_VERSION, read_map
 from symgrasp.feasibility.margins import cells_to_infeasible
@@ -79,6 +79,9 @@ class FeasibilityMap:
             then there are no witnesses.
         probability: (R, H, A) how probable it is that a cell is feasible where the object's pose is
             uncertain, see `symgrasp.survey.success`; None where that was not asked for. It is not saved.
+        widest: (R, H, A) width (rad) of the widest of each cell's `windows`, NaN where infeasible; None where
+            that was not asked for. It is not saved.
+        find_windows: finds the windows of a cell; None where the map does not know its scene.
     """
 
     scene: str
@@ -105,6 +108,8 @@ class FeasibilityMap:
     refined: Refined | None = None
     preliminary: bool = False
     probability: Array | None = None
+    widest: Array | None = None
+    find_windows: Callable[[FeasibilityMap, Cell], tuple[Window, ...]] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of the attributes to pickle: another thread may cache one meanwhile."""
@@ -218,6 +223,30 @@ class FeasibilityMap:
         """Return how far a grasp may be off a cell's centre along and around the object, see `margins`."""
         return Margin(*self.margins[Cell(*cell)].tolist())
 
+    def windows(self, cell: Cell | tuple[int, int, int]) -> tuple[Window, ...]:
+        """Find all intervals of the redundancy φ on which the arm holds a cell's grasp, branch by branch.
+
+        Along a window the elbow may move while the hand stays. The range of φ is halved until each branch is
+        excluded on a part or free all along it: at values of φ 0.001 rad apart at most (0.005 with a retreat
+        or where the robot could fall), and by what is usual for how arms move in between, which is a bound
+        that was measured, not proven; see `Window.whole`. Windows end to 1e-4 rad; narrower ones, and
+        narrower gaps, may be missed. Where the range is a full turn, one over its end is in two.
+
+        Args:
+            cell: the cell, at its centre.
+
+        Returns:
+            The windows, by branch, then by φ; none where nothing is free, and of an arm on a torso only at
+            the value of the torso at which the witness is.
+
+        Raises:
+            InputError: the arm has six joints or fewer, of which a grasp leaves none free.
+            SymgraspError: the map does not know its scene: it was loaded from a file, say.
+        """
+        if self.find_windows is None:
+            raise SymgraspError("windows need the scene of the map, which maps of `create_map` know")
+        return self.find_windows(self, Cell(*cell))
+
     def shift(self, delta: float) -> FeasibilityMap:
         """Return the map for the object turned by ``delta`` (rad) about its axis, without recomputing it.
 
@@ -229,7 +258,7 @@ class FeasibilityMap:
             name: np.roll(getattr(self, name), -k, axis=2)
             for name in ("reason", "q", "sample", "branch", "clearance", "pair", "depth", "proven")
         }
-        for name in ("ease", "certified", "probability"):
+        for name in ("ease", "certified", "probability", "widest"):
             if (cells := getattr(self, name)) is not None:
                 rolled[name] = np.roll(cells, -k, axis=2)
         if self.refined is not None:
@@ -251,6 +280,7 @@ class FeasibilityMap:
             certified=None if self.certified is None else self.certified & ~drop,
             refined=self.refined and self.refined.masked(~drop),
             probability=None,
+            widest=None,
         )
 
     def values(self, color_by: ColorBy) -> Array:
@@ -259,6 +289,8 @@ class FeasibilityMap:
             return 1e3 * self.clearance
         if color_by is ColorBy.PROBABILITY:  # also of cells that are infeasible where the object should be
             return np.full(self.reason.shape, np.nan) if self.probability is None else 100 * self.probability
+        if color_by is ColorBy.WINDOW:
+            return np.full(self.reason.shape, np.nan) if self.widest is None else np.rad2deg(self.widest)
         if color_by is ColorBy.ALONG:
             found = 1e3 * self.margins[..., 0]
         elif color_by is ColorBy.AROUND:

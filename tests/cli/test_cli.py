@@ -337,3 +337,15 @@ def test_a_package_that_an_option_names(content, tmp_path, capsys, monkeypatch):
     assert main(["map", str(scene), "--package", f"stones={tmp_path}"]) == 0
     (found,) = (o for o in Scene.load(scene).file.obstacles if o.name == "rock")
     assert found.mesh == str(tmp_path / "a rock.obj")
+
+
+def test_a_map_in_the_colours_of_its_windows(tmp_path, capsys):
+    pictures = {}
+    for color in ("reason", "elbow-window"):
+        out = tmp_path / f"{color}.png"
+        assert main(["map", "soda_can", "--color-by", color, "--out", str(out)]) == 0
+        assert ("widest elbow window of a feasible cell: " in capsys.readouterr().out) == (color != "reason")
+        pictures[color] = out.read_bytes()
+    assert pictures["reason"] != pictures["elbow-window"]
+    assert main(["map", "ur5_bottle", "--color-by", "elbow-window"]) == 2  # its arm has six joints
+    assert "expected one of seven joints" in capsys.readouterr().err

@@ -29,7 +29,14 @@ from ...state.first_grasp import with_first_grasp
 from ...state.page_link import Camera
 from ...state.plans.plan_changes import change_plan_results
 from ...state.plans.plan_results import PlanResults
-from ...state.requests import CompareRequest, ExplainRequest, MapRequest, ProbabilityRequest, Request
+from ...state.requests import (
+    CompareRequest,
+    ExplainRequest,
+    MapRequest,
+    ProbabilityRequest,
+    Request,
+    WindowsRequest,
+)
 from ...state.resumed import resumed
 from ...state.state import State
 from ...state.surveys import survey_changes
@@ -254,6 +261,10 @@ class Session:
         elif isinstance(request, ProbabilityRequest):
             label = "Computing how probable grasps are"
             run = lambda progress: process.probability(request, progress)  # noqa: E731
+        elif isinstance(request, WindowsRequest):
+            assert state.result  # windows are requested only while their map is shown
+            label, known = "Computing how far the elbow may swing", state.result.map
+            run = lambda progress: process.windows(request, known, progress)  # noqa: E731
         else:
             assert isinstance(request, ExplainRequest)
             label = "Trying every way to hold it here"

@@ -15,7 +15,7 @@ import numpy as np
 
 from symgrasp.collision.boxes import boxes_of
 from symgrasp.collision.inner_pieces import inner_pieces
-from symgrasp.collision.pieces import pose_rows
+from symgrasp.collision.pieces import PackedPieces, pose_rows
 from symgrasp.engine import search
 from symgrasp.engine.balance import loaded
 from symgrasp.engine.checks import HIT_BAND
@@ -26,16 +26,19 @@ from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
 from symgrasp.engine.reach import Reach, reach_of
 from symgrasp.engine.threads import core_count
-from symgrasp.feasibility.cell import CLEARANCE_LIMIT
+from symgrasp.engine.windows import MOST_OPEN, windows
+from symgrasp.errors import InputError
+from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Window
 from symgrasp.feasibility.exact.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.exact.certified import LEVELS, CellProver
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
 from symgrasp.feasibility.exact.recording import FixedBodies, PieceBodies, record_search
+from symgrasp.feasibility.exact.settling import settled
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.torso_maps import merged
-from symgrasp.ik import GridSolvers, solver_for
+from symgrasp.ik import CompiledIK, GridSolvers, solver_for
 from symgrasp.ik.at_phi import Locked, locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
@@ -145,20 +148,7 @@ class ExactEngine:
             ValueError: the grid has other heights.
         """
         grid = manifold or self.manifold
-        if not np.array_equal(grid.h, self.manifold.h):
-            raise ValueError("the exact engine was built for a grid with other heights")
-        self._place_object(task.T_world_object)
-        self._open.holders = task.arms
-        if len(self._balance.edges):  # else it stands, whatever it bears
-            scene, T = self.world.scene, task.T_world_object
-            loads = [load_of_hand(scene, self.arm, task.arms, T, float(h)) for h in grid.h]
-            self._balance = loaded(self._geometry.balance, loads)
-        known = self._solvers.manifold.angles == grid.angles and self._solvers.arm.pitch == pitch
-        if not known:
-            self._solvers = self._new_solvers(grid, pitch)
-        T_base_tool = inverse(self.arm.robot.T_world_base) @ self.arm.hand.tool_poses(
-            grid, task.T_world_object
-        )
+        T_base_tool = self._begin(task, grid, pitch)
         drafts = []
         parts = 2 if self.arm.pitched else 1
         steps = parts + int(certify)
@@ -175,6 +165,25 @@ class ExactEngine:
             found = replace(found, certified=proven)
         self.world.set_arms(())
         return found
+
+    def _begin(self, task: Task, grid: Manifold, pitch: float | None = None) -> Array:
+        """Put the object where a task has it, and return the tool poses (R, H, A, 4, 4) in the robot's base.
+
+        Raises:
+            ValueError: the grid has other heights.
+        """
+        if not np.array_equal(grid.h, self.manifold.h):
+            raise ValueError("the exact engine was built for a grid with other heights")
+        self._place_object(task.T_world_object)
+        self._open.holders = task.arms
+        if len(self._balance.edges):  # else it stands, whatever it bears
+            scene, T = self.world.scene, task.T_world_object
+            loads = [load_of_hand(scene, self.arm, task.arms, T, float(h)) for h in grid.h]
+            self._balance = loaded(self._geometry.balance, loads)
+        known = self._solvers.manifold.angles == grid.angles and self._solvers.arm.pitch == pitch
+        if not known:
+            self._solvers = self._new_solvers(grid, pitch)
+        return inverse(self.arm.robot.T_world_base) @ self.arm.hand.tool_poses(grid, task.T_world_object)
 
     def _certified(
         self, found: FeasibilityMap, task: Task, only: np.ndarray | None, progress: Progress | None
@@ -291,19 +300,7 @@ class ExactEngine:
             runs = cells[1]  # each cell for itself
             if not len(runs):
                 return
-        tries = len(cells[0]) * len(batch.order)
-        inputs = search.SearchInput(
-            sample_order=batch.order,
-            T_world_base=self._T_world_base,
-            T_base_tool=np.ascontiguousarray(T_base_tool[cells]),
-            row=runs,
-            retreat=-retreat_distances(self._settings.approach),
-            turns=retreat_turns(self.arm.velocity, self._settings.approach),
-            margin=float(self._settings.margin),
-            clearance=fixed.gap,
-            always_collides=fixed.collision is not None,
-            parts=min(PARTS * core_count(), 1 + tries // WORTH_A_PART),
-        )
+        inputs = self._inputs(np.ascontiguousarray(T_base_tool[cells]), runs, batch, fixed)
         found = search.search(
             batch.compiled.chain,
             batch.moving,
@@ -332,6 +329,96 @@ class ExactEngine:
         for these in portions(len(which), progress, FIRST_COVERED):
             covered = self._cover(draft, found, which[these], locked, inputs, batch, cells)
             yield from self._decide_covered(draft, which[these], covered, inputs, batch, cells)
+
+    def _inputs(
+        self, T_base_tool: Array, runs: np.ndarray, batch: Batch, fixed: FixedBodies
+    ) -> search.SearchInput:
+        """Return what the compiled search is told of cells: tool poses (m, 4, 4), in runs of rows (r,)."""
+        tries = len(T_base_tool) * len(batch.order)
+        return search.SearchInput(
+            sample_order=batch.order,
+            T_world_base=self._T_world_base,
+            T_base_tool=T_base_tool,
+            row=runs,
+            retreat=-retreat_distances(self._settings.approach),
+            turns=retreat_turns(self.arm.velocity, self._settings.approach),
+            margin=float(self._settings.margin),
+            clearance=fixed.gap,
+            always_collides=fixed.collision is not None,
+            parts=min(PARTS * core_count(), 1 + tries // WORTH_A_PART),
+        )
+
+    def windows(
+        self,
+        task: Task,
+        cells: np.ndarray,
+        manifold: Manifold,
+        progress: Progress | None = None,
+        *,
+        settle: bool = True,
+    ) -> list[tuple[Window, ...]]:
+        """Find the windows of cells, see `symgrasp.engine.windows`.
+
+        Args:
+            task: the task; it need not be one of the scene's.
+            cells: (c, 3) the cells.
+            manifold: the grid, with the engine's heights.
+            progress: called with the finished share; may raise `Cancelled`.
+            settle: whether PyBullet decides what pieces that all but touch leave open, at the ends of
+                windows; else only where nothing else is free.
+
+        Returns:
+            The windows of each cell, by branch, then by φ.
+
+        Raises:
+            InputError: the arm has no redundancy, or none that is known at any value.
+        """
+        T_base_tool = self._begin(task, manifold)
+        batch = next(batches(self._solvers, self._geometry, np.arange(manifold.heights), 0))
+        locked = locked_joint(batch.compiled)
+        if locked is None:
+            expected = "one of seven joints, whose redundancy is known at any value"
+            raise InputError("windows", "arm", self.arm.name, expected)
+        fixed = self._fixed_bodies()
+        found: list[tuple[Window, ...]] = [()] * len(cells)
+        fits = np.array([self._misfit[row] is None for row in cells[:, 1]], dtype=bool)
+        which = np.flatnonzero(fits & (fixed.collision is None))
+        geometry, scratches = self._geometry, self._scratches()
+        for these in portions(len(which), progress):
+            some = cells[which[these]]
+            tools = np.ascontiguousarray(T_base_tool[tuple(some.T)])
+            inputs = self._inputs(tools, some[:, 1].copy(), batch, fixed)
+            inputs = inputs._replace(parts=min(len(some), PARTS * core_count()))
+            parts = batch.compiled.chain, batch.moving, geometry.pieces, geometry.tree, scratches, inputs
+            rows = search.search(*parts, self._balance, self.arm.dof).rows
+            first, reach = np.arange(len(some)), self._arm_reach
+            covered = CoverInput(first, pose_rows(tools), reach, locked, self._inside, COVER_PARTS)
+            own = windows(*parts, self._balance, rows, covered, self.arm.dof)
+            for k, cell in enumerate(which[these].tolist()):
+                n, m = int(own.found[k]), min(int(own.open_count[k]), MOST_OPEN)
+                columns = own.branch[k, :n], *own.ends[k, :n].T, own.whole[k, :n]
+                listed = [Window(*row) for row in zip(*(c.tolist() for c in columns), strict=True)]
+                left = zip(own.open_branch[k, :m].tolist(), own.open_phi[k, :m].tolist(), strict=True)
+                if settle or not listed:
+                    T, row = tools[k], int(some[k, 1])
+                    is_free = partial(self._is_free, batch.compiled, T, row)
+                    found[cell] = settled(listed, list(left), is_free, (locked.lower, locked.upper))
+                else:
+                    found[cell] = tuple(sorted(listed))
+        self.world.set_arms(())
+        return found
+
+    def _is_free(self, compiled: CompiledIK, T_base_tool: Array, row: int, branch: int, phi: float) -> bool:
+        """Whether a branch is free at a value of φ (rad), as PyBullet says."""
+        ik = compiled.at(np.array([phi]))
+        s = ik.solve(T_base_tool)
+        these = np.flatnonzero((s.branch == branch) & s.inside)
+        return any(self._open.is_free(T_base_tool, row, ik, s.q[j], int(s.sample[j])) for j in these)
+
+    @cached_property
+    def _inside(self) -> tuple[PackedPieces, ...]:
+        """The bodies inside the pieces, see `inner_pieces`."""
+        return self._inner or inner_pieces(self._geometry.pieces)
 
     def _cover(
         self,

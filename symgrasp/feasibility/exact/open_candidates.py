@@ -63,9 +63,7 @@ class OpenCandidates:
         Returns:
             Whether all candidates of the cell collide, listed or not.
         """
-        near = lambda q, T: self._near(q, T, cell[1])  # noqa: E731
-        approach = self._world.scene.settings.approach
-        checker = CandidateChecker(self._world, ik.arm, ik, approach, near, self.holders)
+        checker = self._checker(ik, cell[1])
         before: Collision | None = None
         for q, sample, branch in listed:
             reason, collision, *_ = checker.check(T_base_tool, q, sample, float(self._opening[cell[1]]))
@@ -81,6 +79,16 @@ class OpenCandidates:
                     return True  # like that, because the tool pose alone decides it
                 before = collision
         return False
+
+    def is_free(self, T_base_tool: Array, row: int, ik: Solver, q: Array, sample: int) -> bool:
+        """Whether a candidate is free: its tool pose (4, 4), row, solver, joint values (n,) and sample."""
+        result = self._checker(ik, row).check(T_base_tool, q, sample, float(self._opening[row]))
+        return result.reason == Reason.FEASIBLE
+
+    def _checker(self, ik: Solver, row: int) -> CandidateChecker:
+        near = lambda q, T: self._near(q, T, row)  # noqa: E731
+        approach = self._world.scene.settings.approach
+        return CandidateChecker(self._world, ik.arm, ik, approach, near, self.holders)
 
     def _near(self, q: Array, T_base_tool: Array, row: int) -> tuple[NearBodies, list[str]]:
         """Return what is near the arm at joint values (n,), and its links that are; the rest is free."""

@@ -13,7 +13,7 @@ from app.compute import map_service
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanRequest
 from app.state import changes
-from app.state.requests import ExplainRequest, MapRequest, ProbabilityRequest
+from app.state.requests import ExplainRequest, MapRequest, ProbabilityRequest, WindowsRequest
 from app.state.state import State
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.feasibility.cell import Cell
@@ -107,6 +107,17 @@ def test_probabilities_go_on_after_a_cell_was_explained(maps, monkeypatch):
     monkeypatch.undo()
     monkeypatch.setattr(map_service, "DRAWS", 6)
     assert np.array_equal(found.feasible, MapService().probability(other, quiet).feasible)
+
+
+def test_windows_of_a_shown_map(maps):
+    request = State.of(load_small("bottle_on_table"), "").request
+    shown = maps.map(request, quiet).map
+    found = maps.windows(WindowsRequest(request), shown, quiet)
+    assert np.array_equal(np.isnan(found.widest), ~shown.feasible)
+    assert np.nanmax(found.widest) > 0.1
+    rigid = State.of(load_small("ur5_bottle"), "").request  # whose arm has six joints
+    shown = maps.map(rigid, quiet).map
+    assert np.isnan(maps.windows(WindowsRequest(rigid), shown, quiet).widest).all()
 
 
 def test_progress_may_stop_it(maps):

@@ -33,6 +33,8 @@ from app.state.requests import (
     ExplainResult,
     Probability,
     ProbabilityRequest,
+    Windows,
+    WindowsRequest,
 )
 from app.state.state import State
 from symgrasp.errors import SymgraspError
@@ -404,3 +406,19 @@ def test_probabilities_are_those_of_the_library(service):
         own = success_map(MapMaker(world), state.arm, state.request.moved_task(), NOISE, DRAWS)
     assert np.array_equal(found.feasible / found.draws, own.probability)
     assert 0 < (found.feasible > 0).sum() != (found.feasible == DRAWS).sum() > 0
+
+
+def test_windows_are_computed_where_they_are_shown():
+    state = with_view(opened(), color_by=ColorBy.WINDOW)
+    request = WindowsRequest(state.request)
+    assert state.next_request == request
+    assert state.map is not None
+    assert state.map.widest is None
+    widest = np.where(state.map.feasible, 0.5, np.nan)
+    known = replace(state, map_view=state.map_view.with_result(Windows(request, widest)))
+    assert known.next_request is None
+    assert known.map is not None
+    assert np.array_equal(known.map.values(ColorBy.WINDOW), np.rad2deg(widest), equal_nan=True)
+    turned = changes.turn(known, 3 * known.map.manifold.dtheta)
+    assert turned.next_request is None  # turning the object only shifts the map
+    assert with_view(known, color_by=ColorBy.REASON).next_request is None
