@@ -26,7 +26,8 @@ class BruteForce:
     """Collision checks of an arm in Pinocchio and Coal: the robot moves, everything else is static.
 
     Uses the shapes and pairs that PyBullet has. In scenes with meshes it leaves out the rounding of the
-    links, a millimetre or less, because Coal cannot measure distances of rounded shapes from triangles.
+    links, a millimetre or less, because Coal cannot measure distances of rounded shapes from triangles;
+    `keep` makes up for that, at some cost.
 
     Args:
         world: a world of the scene.
@@ -44,6 +45,7 @@ class BruteForce:
         with temporary_folder() as folder:
             self._model = pinocchio.buildModelFromXML(collision_urdf(robot.model, folder).decode())
         self._data = self._model.createData()
+        self._left_out: dict[int, float] = {}  # of shapes, the rounding (m) that they lack
         self._geometry = pinocchio.GeometryModel()
         own = self._add_robot(world)
         static = self._add_static(world, T_world_object)
@@ -54,9 +56,11 @@ class BruteForce:
         self._joints = [j for j in robot.model.joints if j.source >= 0]
 
     def keep(self, distance: float) -> None:
-        """Count what is closer than a distance (m) as touching."""
-        for request in self._geometry_data.collisionRequests:
-            request.security_margin = distance
+        """Count what is closer than a distance (m) as touching, of links with their rounding."""
+        requests, pairs = self._geometry_data.collisionRequests, self._geometry.collisionPairs
+        for request, pair in zip(requests, pairs, strict=True):
+            rounding = self._left_out.get(pair.first, 0.0) + self._left_out.get(pair.second, 0.0)
+            request.security_margin = distance + rounding
 
     @property
     def pairs(self) -> int:
@@ -89,18 +93,21 @@ class BruteForce:
             pinocchio.GeometryObject(f"{name} {self._geometry.ngeoms}", joint, placement, shape)
         )
 
-    def _rounded(self, shape: Shape) -> Any:
+    def _add_rounded(self, name: str, joint: int, pose: Array, shape: Shape) -> int:
         hull = _hull(shape.vertices)
         if self._rounding:
             hull.setSweptSphereRadius(float(shape.rounding))
-        return hull
+        added = self._add(name, joint, pose, hull)
+        if not self._rounding:
+            self._left_out[added] = float(shape.rounding)
+        return added
 
     def _add_robot(self, world: BulletWorld) -> dict[str, list[int]]:
         own: dict[str, list[int]] = {}
         for link, shapes in world.shapes(self.arm.robot.name).items():
             frame = self._model.frames[self._model.getFrameId(link)]
             own[link] = [
-                self._add(link, frame.parentJoint, frame.placement.homogeneous, self._rounded(shape))
+                self._add_rounded(link, frame.parentJoint, frame.placement.homogeneous, shape)
                 for shape in shapes
             ]
         return own
@@ -110,6 +117,7 @@ class BruteForce:
         scene, robot = world.scene, self.arm.robot
         T_base_world = np.linalg.inv(robot.T_world_base)
         add = lambda name, pose, shape: self._add(name, 0, T_base_world @ pose, shape)  # noqa: E731
+        add_rounded = lambda name, pose, shape: self._add_rounded(name, 0, T_base_world @ pose, shape)  # noqa: E731
         axis = axis_frame(T_world_object)
         static = {"object": [add("object", axis, _hull(v)) for v in scene.profile.convex_pieces()]}
         static["rest"] = [
@@ -121,7 +129,7 @@ class BruteForce:
             if name != robot.name:
                 links = other.T_world_base @ other.model.forward(other.home)
                 static["rest"] += [
-                    add(name, links[other.model.link_index(link)], self._rounded(shape))
+                    add_rounded(name, links[other.model.link_index(link)], shape)
                     for link, shapes in world.shapes(name).items()
                     for shape in shapes
                 ]

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from symgrasp.bench.guarantee import REFUTED, _measured, _refuted, summary
+from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.create import create_map
+from symgrasp.ik import solver_for
+from symgrasp.poses import inverse, translation
 from symgrasp.reason import Reason
+from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
+from symgrasp.world import open_world
 
 
 def small() -> Scene:
@@ -40,3 +45,23 @@ def test_cells_that_are_falsely_infeasible_are_refuted():
     wrong = replace(m, reason=reason, proven=np.zeros_like(m.proven))
     assert _refuted(scene, task, "panda", wrong) == (REFUTED, REFUTED, 0, 0)
     assert _refuted(scene, task, "panda", replace(wrong, proven=m.feasible)) == (0, 0, REFUTED, REFUTED)
+
+
+def test_a_rounded_hand_that_just_touches_a_mesh_refutes_no_cell():
+    # Coal has the hand without its rounding of 1 mm: 0.97 mm from the bowl, which it touches by 0.03 mm.
+    brute = pytest.importorskip("symgrasp.bench.brute")
+    scene = Scene.load("pick_pour_place").with_settings(heights=8, angles=16)
+    place = translation([0.4212612292191334, -0.1925591721155413, -0.04327858471825968])
+    task, arm, cell = Task("place", ("panda",), place), scene.arm("panda"), (0, 3, 12)
+    grid = scene.manifold
+    T = (inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(grid, place))[cell]
+    opening, ik = arm.hand.opening(float(grid.profile.radius(grid.h[cell[1]]))), solver_for(arm, 64)
+    with open_world(scene) as world:
+        pinocchio = brute.BruteForce(world, arm, ik, place)
+        assert pinocchio.feasible(T, opening)  # as long as it is not told to keep the rounding
+        pinocchio.keep(0.0)
+        assert not pinocchio.feasible(T, opening)
+        world.set_object(place)
+        checker = CandidateChecker(world, arm, ik, 0.0, holders=task.arms)
+        depths = [c.collision.depth for c in checker.candidates(T, opening) if c.collision]
+        assert min(depths) == pytest.approx(3e-5, abs=1e-6)
