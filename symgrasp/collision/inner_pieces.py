@@ -9,10 +9,12 @@ corners are.
 
 from __future__ import annotations
 
+import hashlib
 from functools import lru_cache
 
 import numpy as np
 
+from symgrasp.caching import kept
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.poses import Array
 
@@ -24,15 +26,12 @@ SHARES = (0.5, 0.15, 0.03, 0.0)
 
 def inner_pieces(pieces: PackedPieces) -> tuple[PackedPieces, ...]:
     """Return the bodies inside each of P pieces, for every share λ."""
-    revolved = pieces.size[:, 2] > 0.0
-    balls = [
-        _ball(pieces.vertices[first:end].tobytes(), turned)
-        for (first, end, _), turned in zip(pieces.ranges.tolist(), revolved, strict=True)
-    ]
+    content = hashlib.sha256()
+    for part in (pieces.vertices, pieces.ranges, pieces.size[:, 2]):
+        content.update(np.ascontiguousarray(part).tobytes())
+    centre, radius, boxes = kept(("balls", content.hexdigest()), lambda: _balls(pieces))
     count = pieces.ranges[:, 1] - pieces.ranges[:, 0]
-    centre, radius = np.array([b[0] for b in balls]).reshape(-1, 3), np.array([b[1] for b in balls])
     half = pieces.size[:, 6:9]
-    boxes = np.array([b[2] for b in balls], dtype=bool)
     found = []
     for share in SHARES:
         less = np.full_like(half, share)
@@ -45,6 +44,17 @@ def inner_pieces(pieces: PackedPieces) -> tuple[PackedPieces, ...]:
         vertices = pieces.vertices + shrunk * (np.repeat(centre, count, axis=0) - pieces.vertices)
         found.append(pieces._replace(vertices=vertices, size=size))
     return tuple(found)
+
+
+def _balls(pieces: PackedPieces) -> tuple[Array, Array, np.ndarray]:
+    """Return what `_ball` does of P pieces: centres (P, 3), radii (P,) (m), and which are boxes."""
+    revolved = pieces.size[:, 2] > 0.0
+    balls = [
+        _ball(pieces.vertices[first:end].tobytes(), turned)
+        for (first, end, _), turned in zip(pieces.ranges.tolist(), revolved, strict=True)
+    ]
+    centre, radius = np.array([b[0] for b in balls]).reshape(-1, 3), np.array([b[1] for b in balls])
+    return centre, radius, np.array([b[2] for b in balls], dtype=bool)
 
 
 @lru_cache(maxsize=4096)

@@ -47,29 +47,31 @@ def check_row(moving, pieces, scratch, gap):
     """
     for g in range(moving.hand.shape[1]):
         if not moving.touch[g]:
-            gap = _against_object(moving, pieces, scratch, g, gap, -math.inf)
+            gap = _against_object(moving, pieces, scratch, g, gap, -math.inf, HIT_BAND)
             if gap == -math.inf:
                 return gap
-    return _pairs(pieces, scratch, moving.hand_pairs, 0, len(moving.hand_pairs), gap, -math.inf)
+    return _pairs(pieces, scratch, moving.hand_pairs, 0, len(moving.hand_pairs), gap, -math.inf, HIT_BAND)
 
 
 @njit(**FAST)
 def check_hand(moving, pieces, tree, scratch, margin, gap):
     """Check the pieces fixed to the tool against the static pieces and against the robot's base."""
     for g in range(moving.hand.shape[1]):
-        gap = _against_static(pieces, tree, scratch, g, margin, gap, -math.inf)
+        gap = _against_static(pieces, tree, scratch, g, margin, gap, -math.inf, HIT_BAND)
         if gap == -math.inf:
             return gap
-    return _pairs(pieces, scratch, moving.base_pairs, 0, len(moving.base_pairs), gap, -math.inf)
+    return _pairs(pieces, scratch, moving.base_pairs, 0, len(moving.base_pairs), gap, -math.inf, HIT_BAND)
 
 
 @njit(**FAST)
-def check_arm(moving, pieces, tree, scratch, margin, gap, best):
+def check_arm(moving, pieces, tree, scratch, margin, gap, best, band):
     """Check the pieces between base and tool against everything.
 
     Args:
         best: clearance (m) that is wanted, or -inf; a smaller clearance counts as a collision, because it
             does not improve enough on the best candidate so far.
+        band: by how much (m) a pair that collides has to be below its margin: `HIT_BAND`, or less where the
+            pieces themselves count, not what PyBullet says of them.
     """
     hit = scratch.hit
     if hit[2] >= 0:
@@ -77,21 +79,21 @@ def check_arm(moving, pieces, tree, scratch, margin, gap, best):
         # pieces have the same poses, as when only the other shoulder configuration differs.
         if _same_poses(scratch):
             return -math.inf
-        gap = _pair(pieces, scratch, hit[2], hit[3], scratch.depth[1], gap, best)
+        gap = _pair(pieces, scratch, hit[2], hit[3], scratch.depth[1], gap, best, band)
         if gap == -math.inf:
             _remember(scratch, scratch.depth[1])
             return gap
     for k in range(len(moving.frame) - 1, moving.hand.shape[1] - 1, -1):
-        after = _against_static(pieces, tree, scratch, k, margin, gap, best)
+        after = _against_static(pieces, tree, scratch, k, margin, gap, best, band)
         if after == -math.inf:
             _remember(scratch, margin)
             return after
         gap = after
         if not moving.touch[k]:
-            gap = _against_object(moving, pieces, scratch, k, after, best)
+            gap = _against_object(moving, pieces, scratch, k, after, best, band)
         if gap > -math.inf:
             start = moving.arm_pair_start
-            gap = _pairs(pieces, scratch, moving.arm_pairs, start[k], start[k + 1], gap, best)
+            gap = _pairs(pieces, scratch, moving.arm_pairs, start[k], start[k + 1], gap, best, band)
         if gap == -math.inf:
             _remember(scratch, 0.0)
             return gap
@@ -120,32 +122,32 @@ def _same_poses(scratch):
 
 
 @njit(**FAST)
-def _against_object(moving, pieces, scratch, k, gap, best):
+def _against_object(moving, pieces, scratch, k, gap, best, band):
     """Check piece k against the object."""
     box = scratch.box
     for i in moving.objects:
         if not boxes_apart(box, k, i, box, max(gap, FREE_BAND)):
-            gap = _pair(pieces, scratch, k, i, 0.0, gap, best)
+            gap = _pair(pieces, scratch, k, i, 0.0, gap, best, band)
             if gap == -math.inf:
                 return gap
     return gap
 
 
 @njit(**FAST)
-def _pairs(pieces, scratch, pairs, first, end, gap, best):
+def _pairs(pieces, scratch, pairs, first, end, gap, best, band):
     """Check the pairs from index first to before end."""
     box = scratch.box
     for i in range(first, end):
         a, b = pairs[i, 0], pairs[i, 1]
         if not boxes_apart(box, a, b, box, max(gap, FREE_BAND)):
-            gap = _pair(pieces, scratch, a, b, 0.0, gap, best)
+            gap = _pair(pieces, scratch, a, b, 0.0, gap, best, band)
             if gap == -math.inf:
                 return gap
     return gap
 
 
 @njit(**FAST)
-def _against_static(pieces, tree, scratch, k, margin, gap, best):
+def _against_static(pieces, tree, scratch, k, margin, gap, best, band):
     """Check piece k against the static pieces."""
     waiting, sure = min(1, len(tree.skip)), margin + FREE_BAND
     scratch.stack[0] = 0
@@ -153,19 +155,19 @@ def _against_static(pieces, tree, scratch, k, margin, gap, best):
         i, waiting, lower = next_near(pieces, tree, scratch, k, sure, max(gap, sure), waiting)
         if i < 0:
             return gap
-        gap = min(gap, lower) if lower >= sure else _pair(pieces, scratch, k, i, margin, gap, best)
+        gap = min(gap, lower) if lower >= sure else _pair(pieces, scratch, k, i, margin, gap, best, band)
         if gap == -math.inf:
             return gap
 
 
 @njit(**FAST)
-def _pair(pieces, scratch, a, b, margin, gap, best):
+def _pair(pieces, scratch, a, b, margin, gap, best, band):
     """Check a pair of pieces with a margin (m) to keep, after their axis-aligned boxes were found near."""
     size = pieces.size
     sure = margin + FREE_BAND
     reach = max(gap, sure)
     slack = size[a, 1] + size[b, 1]
-    bar = max(best, margin - HIT_BAND - slack)
+    bar = max(best, margin - band - slack)
     lower, upper = distance_bounds(pieces, scratch.pose, a, b, reach, sure, bar, scratch.simplex)
     if upper < bar:
         scratch.hit[0], scratch.hit[1], scratch.depth[0] = a, b, margin - upper - slack

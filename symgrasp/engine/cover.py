@@ -18,9 +18,9 @@ import numpy as np
 
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.tree import Tree
-from symgrasp.compiling import ENTRY, njit
+from symgrasp.compiling import ENTRY, is_compiled, njit
 from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm
+from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED, check_arm
 from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult, Nodes, new_nodes
 from symgrasp.engine.exclusion import (
     EXCLUDED,
@@ -56,7 +56,7 @@ from symgrasp.ik.chain import Chain
 from symgrasp.ik.spherical import reach_cosine
 from symgrasp.ik.vectors import STRICT
 
-__all__ = ["COARSE", "FINEST", "cover"]
+__all__ = ["COARSE", "FINEST", "cover", "is_cover_compiled"]
 
 FINEST = 1e-4
 """Width (rad) of a part of the range of φ that is not halved any more."""
@@ -66,6 +66,10 @@ MEDIUM = 1e-3
 
 COARSE = 3e-3
 """The same where pieces all but touch at both ends, so that PyBullet decides there."""
+
+OVERLAP = 2e-5
+"""By how much (m) pieces overlap, or are closer than their margin, that collide whatever PyBullet says, whose
+distances may be too large near contact: more than pieces and poses are rounded by."""
 
 CERTAIN = 1e-6
 """By how much (m) a pose is certain to be out of reach: more than numbers are rounded by."""
@@ -106,6 +110,7 @@ def cover(
         undecided_count=np.zeros(c, dtype=np.int32),
         undecided_phi=np.empty((c, OPEN_KEPT)),
         undecided_branch=np.empty((c, OPEN_KEPT), dtype=np.int16),
+        overlaps=np.empty((c, OPEN_KEPT), dtype=bool),
     )
     idle: SimpleQueue[tuple[Nodes, Scratch, BranchScratch]] = SimpleQueue()
     for scratch in scratches:
@@ -122,6 +127,11 @@ def cover(
     cover_part(0)  # here, where Ctrl-C can interrupt its compiling
     in_parallel(cover_part, range(1, inputs.parts))
     return result
+
+
+def is_cover_compiled() -> bool:
+    """Whether `cover` runs at once on this machine, with nothing to compile."""
+    return is_compiled(_cover_part)
 
 
 @njit(**ENTRY)
@@ -267,7 +277,7 @@ def _visit(
         if falls and not stands(balance, scratch.frames, inputs.T_world_base, T, row, True):
             nodes.state[at, b] = FALLS
             continue
-        gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, -math.inf)
+        gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, -math.inf, HIT_BAND)
         if gap == -math.inf:
             nodes.state[at, b] = HITS
             for side in range(2):
@@ -276,6 +286,7 @@ def _visit(
                 copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
             nodes.depth[at, b], nodes.level[at, b] = -1.0, 0
             continue
+        overlaps = gap == UNDECIDED and _overlaps(moving, pieces, tree, scratch, inputs, hand)
         if gap != UNDECIDED and len(inputs.retreat):
             furthest = arm_retreats(
                 nodes.chain, moving, pieces, tree, scratch, branches, inputs, balance, run, T, 0, b, tool
@@ -292,9 +303,19 @@ def _visit(
             result.undecided_count[i] += 1
             if kept < OPEN_KEPT:
                 result.undecided_phi[i, kept], result.undecided_branch[i, kept] = phi, b
+                result.overlaps[i, kept] = overlaps
             continue
         result.found[i], result.phi[i], result.branch[i] = True, phi, b
         result.clearance[i] = max(0.0, gap - FREE_BAND)
         copy_row(q[b], result.q[i])
         return True
     return False
+
+
+@njit(**STRICT)
+def _overlaps(moving, pieces, tree, scratch, inputs, hand):
+    """Whether a candidate that is placed collides, by less than PyBullet may be off."""
+    scratch.hit[2] = -1
+    gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, -math.inf, OVERLAP)
+    scratch.hit[2] = -1  # what is remembered has to collide for PyBullet, too
+    return gap == -math.inf

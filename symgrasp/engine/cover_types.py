@@ -56,6 +56,7 @@ class CoverResult(NamedTuple):
         undecided_count: (c,) number of undecided candidates.
         undecided_phi: (c, OPEN_KEPT) redundancy (rad) of the first of them.
         undecided_branch: (c, OPEN_KEPT) their branches.
+        overlaps: (c, OPEN_KEPT) whether pieces overlap there, although PyBullet may not say so.
     """
 
     found: np.ndarray
@@ -69,6 +70,7 @@ class CoverResult(NamedTuple):
     undecided_count: np.ndarray
     undecided_phi: Array
     undecided_branch: np.ndarray
+    overlaps: np.ndarray
 
 
 class Nodes(NamedTuple):

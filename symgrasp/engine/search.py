@@ -23,7 +23,7 @@ from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, is_compiled, njit
 from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm, check_row
+from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED, check_arm, check_row
 from symgrasp.engine.kinematics import MovingPieces, Scratch, place_arm, place_hand
 from symgrasp.engine.retreat_search import arm_retreats, copy_row, moved_along, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
@@ -201,7 +201,8 @@ def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance
                     return
                 scratch.hit[2] = -1
             place_arm(moving, pieces, scratch, q[b])
-            gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, best + CLEARANCE_TOLERANCE)
+            wanted = best + CLEARANCE_TOLERANCE
+            gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, wanted, HIT_BAND)
             if gap == -math.inf:
                 if result.pair[cell, 0] < 0 and result.status[cell] == HIT:
                     _name_pair(scratch, result, cell)

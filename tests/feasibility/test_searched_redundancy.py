@@ -158,3 +158,20 @@ def test_an_explanation_has_the_witness_of_the_map():
 def test_other_words_are_refused():
     with pytest.raises(SceneError, match="redundancy"):
         load_small("soda_can").with_settings(redundancy="all")
+
+
+def test_pybullet_is_asked_seldom_where_a_link_touches_a_body_all_along(monkeypatch):
+    check, asked = CandidateChecker.check, []
+
+    def counted(*args):
+        found = check(*args)
+        asked.append(found.reason)
+        return found
+
+    monkeypatch.setattr(CandidateChecker, "check", counted)
+    scene = Scene.load("pick_pour_place")
+    few = create_map(scene)
+    count = len(asked)
+    monkeypatch.setattr(engine, "MOST_OVERLAPPING", 10**6)
+    assert np.array_equal(few.feasible, create_map(scene).feasible)
+    assert 0 < 4 * count < len(asked) - count

@@ -61,6 +61,10 @@ WORTH_A_PART = 256
 COVER_PARTS = 8
 """Equal parts of the range of the redundancy with which covering it begins."""
 
+MOST_OVERLAPPING = 32
+"""Candidates of a cell at most that PyBullet is asked for between the samples although their pieces overlap,
+by so little that it may call them free. There are hundreds where a link all but touches a body all along."""
+
 FIRST_COVERED = 16
 """Cells of which all of the redundancy is searched before progress is told for the first time."""
 
@@ -476,8 +480,8 @@ class ExactEngine:
             cell = tuple(int(part[which[k]]) for part in cells)
             if draft.reason[cell] == Reason.FEASIBLE:
                 continue
-            count, T = min(int(covered.undecided_count[k]), OPEN_KEPT), inputs.T_base_tool[which[k]]
-            phi, branch = covered.undecided_phi[k, :count], covered.undecided_branch[k, :count]
+            T = inputs.T_base_tool[which[k]]
+            phi, branch = _asked(covered, int(k))
             ik = batch.compiled.at(phi)
             s = ik.solve(T)
             these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
@@ -496,6 +500,19 @@ class ExactEngine:
             return [(found.undecided_q[i, j], int(sample[j]), int(branch[j])) for j in range(count)]
         s = batch.ik.solve(T_base_tool)
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
+
+
+def _asked(covered: CoverResult, k: int) -> tuple[Array, np.ndarray]:
+    """Return the redundancy (rad) and the branch of the candidates of cell k that PyBullet decides."""
+    count = min(int(covered.undecided_count[k]), OPEN_KEPT)
+    phi, branch = covered.undecided_phi[k, :count], covered.undecided_branch[k, :count]
+    overlaps = covered.overlaps[k, :count]
+    asked, some = np.flatnonzero(~overlaps), np.flatnonzero(overlaps)
+    if len(some) > MOST_OVERLAPPING:  # evenly
+        some = some[np.lexsort((phi[some], branch[some]))]
+        some = some[np.linspace(0, len(some) - 1, MOST_OVERLAPPING).astype(int)]
+    these = np.sort(np.concatenate([asked, some]))
+    return phi[these], branch[these]
 
 
 def _tell_again(progress: Progress, share: float, _: float) -> None:
