@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from symgrasp.engine.search import is_search_compiled
 from symgrasp.errors import InputError
-from symgrasp.feasibility.coarse import coarse_map
+from symgrasp.feasibility.coarse import coarse_map, is_map_compiled
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import rotation_z
@@ -69,11 +68,12 @@ class MapService:
 
     def coarse(self, request: MapRequest, progress: Progress) -> MapResult | None:
         """Compute a preliminary map while the exact one needs code to be compiled first; else None."""
-        if is_search_compiled():
+        arm = request.scene.arm(request.arm)
+        if is_map_compiled(request.scene, arm):
             return None
         world = self._maker_for(request.scene).world
         contacts = _contacts(world, request)
-        found = coarse_map(world, request.scene.arm(request.arm), request.moved_task(), progress)
+        found = coarse_map(world, arm, request.moved_task(), progress)
         return found and MapResult(request, found, contacts).renamed(request)
 
     def maps(self, requests: Sequence[MapRequest], cached: Maps, progress: Progress) -> tuple[Maps, Progress]:

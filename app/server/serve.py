@@ -7,8 +7,8 @@ import socket
 import threading
 import warnings
 
-from symgrasp.engine.search import is_search_compiled
 from symgrasp.errors import InputError
+from symgrasp.feasibility.coarse import is_map_compiled
 
 from ..compute.cache import SharedCache
 from ..compute.warm_up import compute_first_map
@@ -60,7 +60,8 @@ def _warm_cache(scene: str | None) -> SharedCache:
     Where code has to be compiled for it, the page is there sooner, and begins with a coarse map.
     """
     cache = SharedCache(scene or STORY, holds_first=scene is None)
-    if is_search_compiled():
+    first = cache.scene(cache.first)
+    if is_map_compiled(first, first.arm(first.task().arms[0])):
         compute_first_map(cache)
     return cache
 

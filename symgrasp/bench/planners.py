@@ -191,7 +191,7 @@ def four_hands(windows: int) -> Iterator[Figure]:
 
     In a few of them the robots are in each other's way, which the search does not know before it tries.
     """
-    scene = Scene.load("log_four_robots")
+    scene = Scene.load("log_four_robots").with_settings(redundancy=8)
     with open_world(scene) as world:
         task = scene.task()
         arms = [scene.arm(name) for name in task.arms]

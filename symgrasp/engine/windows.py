@@ -22,7 +22,7 @@ from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import UNDECIDED, check_arm
+from symgrasp.engine.checks import HIT_BAND, UNDECIDED, check_arm
 from symgrasp.engine.cover import COARSE, FINEST, MEDIUM
 from symgrasp.engine.cover_types import CoverInput, Nodes, new_nodes
 from symgrasp.engine.exclusion import (
@@ -427,7 +427,7 @@ def _visit(
         if falls and not stands(balance, scratch.frames, inputs.T_world_base, T, row, True):
             nodes.state[at, b] = FALLS
             continue
-        gap = check_arm(moving, pieces, tree, scratch, inputs.margin, CLEAR, -math.inf)
+        gap = check_arm(moving, pieces, tree, scratch, inputs.margin, CLEAR, -math.inf, HIT_BAND)
         if gap == -math.inf:
             nodes.state[at, b] = HITS
             for side in range(2):

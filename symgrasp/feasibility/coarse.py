@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from symgrasp.engine.cover import is_cover_compiled
+from symgrasp.engine.search import is_search_compiled
 from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import InterpretedIK
@@ -13,12 +15,19 @@ from symgrasp.object.manifold import Manifold
 from symgrasp.progress import Progress
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.parts import Task
+from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 
-__all__ = ["coarse_map"]
+__all__ = ["coarse_map", "is_map_compiled"]
 
 HEIGHTS, ANGLES, SAMPLES = 8, 16, 4
 """Rows, columns and redundancy samples that are tried at most: a second or two of Algorithm 1."""
+
+
+def is_map_compiled(scene: Scene, arm: Arm) -> bool:
+    """Whether the exact map of an arm is computed at once on this machine, with nothing to compile."""
+    searches_all = scene.settings.redundancy == "auto" and len(arm.joint_names) >= 7  # others have no φ
+    return is_search_compiled() and (is_cover_compiled() or not searches_all)
 
 
 def coarse_map(

@@ -289,7 +289,9 @@ def create_map(
         method: ``exact`` is the fast engine, for arms whose closed form it knows; ``reference`` is
             Algorithm 1 of the paper, and what ``exact`` does for other arms. The feasible cells are
             the same, and so are the reasons up to JOINT_LIMITS; the engine's witnesses have the
-            largest clearance that it found, the reference's are the first.
+            largest clearance that it found, the reference's are the first. Where the scene's
+            redundancy is ``auto``, ``exact`` searches all of it, and ``reference`` tries
+            `AUTO_SAMPLES` samples.
         manifold: another grid than the scene's.
         progress: called with the finished share; may raise `Cancelled`.
         certify: whether to prove which cells hold as a whole, see `FeasibilityMap.certified`; if None, where

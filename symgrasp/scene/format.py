@@ -55,7 +55,7 @@ Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 AUTO_SAMPLES = 32
-"""Redundancy samples with which the search of all of it begins."""
+"""Redundancy samples with which the search of all of it begins, and all that Algorithm 1 tries then."""
 
 MOST_SAMPLES = 2048
 """Most redundancy samples of a map."""
@@ -333,8 +333,8 @@ class MapSettings(_Strict):
 
     heights: Annotated[int, Field(ge=1, le=1024)] = 48
     angles: Annotated[int, Field(ge=1, le=1024)] = 96
-    redundancy: Samples | Literal["auto"] = 32
-    """number of samples of the redundancy, or auto: all of it is searched, none is stepped over"""
+    redundancy: Samples | Literal["auto"] = "auto"
+    """auto: all of the redundancy is searched, nothing is stepped over; or a number of samples to try"""
     approach: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
     """length (m) of the straight radial retreat that must be free as well"""
     margin: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0

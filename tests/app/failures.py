@@ -59,13 +59,13 @@ def serve_compiling(pipe: Connection, folders: tuple[Path, ...]) -> None:
 
 def serve_uncompiled(pipe: Connection, folders: tuple[Path, ...]) -> None:
     """Compute maps as where the code of the exact ones has to be compiled first."""
-    setattr(map_service, "is_search_compiled", lambda: False)  # noqa: B010
+    setattr(map_service, "is_map_compiled", lambda *_: False)  # noqa: B010
     serve(pipe, folders)
 
 
 def serve_coarse(pipe: Connection, folders: tuple[Path, ...]) -> None:
     """Get no further than compiling, as where the code of exact maps has to be compiled first."""
-    setattr(map_service, "is_search_compiled", lambda: False)  # noqa: B010
+    setattr(map_service, "is_map_compiled", lambda *_: False)  # noqa: B010
     serve_compiling(pipe, folders)
 
 

@@ -17,14 +17,13 @@ from tests.conftest import load_small
 
 PROGRAM = """
 from symgrasp.compiling import notify_on_compile
-from symgrasp.engine.search import is_search_compiled
-from symgrasp.feasibility.coarse import coarse_map
+from symgrasp.feasibility.coarse import coarse_map, is_map_compiled
 from symgrasp.world import open_world
 from tests.conftest import load_small
 
-assert not is_search_compiled()
 with notify_on_compile(lambda: print("compiles")), open_world(load_small("log_iiwa_and_panda")) as world:
     for arm in world.scene.arms.values():
+        assert not is_map_compiled(world.scene, arm)
         print(coarse_map(world, arm, world.scene.task()).feasible.any())
 """
 

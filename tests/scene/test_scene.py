@@ -45,7 +45,7 @@ def test_defaults(content, tmp_path):
     del content["map"]
     scene = Scene.load(write_scene(tmp_path, content))
     assert scene.settings.model_dump() == {
-        "heights": 48, "angles": 96, "redundancy": 32, "approach": 0.0, "margin": 0.0,
+        "heights": 48, "angles": 96, "redundancy": "auto", "approach": 0.0, "margin": 0.0,
         "resolution": None,
     }  # fmt: skip
     assert scene.task().arms == ("panda",)
