@@ -58,6 +58,7 @@ def check_rows(
         )
     for name, (first, last) in segment.gripper.items():
         arm = scene.arms[name]
+        ok &= expect(name in paths, f"{where}: the hand of {name} moves, but the arm has no joint values")
         fits = arm.hand.min_opening - TOLERANCE <= last <= arm.hand.max_opening + TOLERANCE
         ok &= expect(fits, f"{where}: the hand of {name} does not open to {last} m")
         for joint, moved in _hand_moves(arm, first, last, start).items():

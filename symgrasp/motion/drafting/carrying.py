@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice, pairwise, product
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from symgrasp.motion.bodies.motion_scene import MotionScene, Rest
 from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.bodies.state import State
 from symgrasp.motion.drafting.course import Part, part_of
+from symgrasp.motion.drafting.taking import COMBINATIONS, combinations
 from symgrasp.motion.drafting.ways import Grip, lifted, straight
 from symgrasp.motion.paths.lines import Leg, LineTree, follow
 from symgrasp.motion.paths.search import NoMotionError, blockers, connect, prove
@@ -23,9 +24,6 @@ from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 
 __all__ = ["ROOM_TOGETHER", "Stretch", "TiltLimit", "carry_alone", "carry_together", "tilt_limit"]
-
-COMBINATIONS = 64
-"""Combinations of the paths of several arms that are tried."""
 
 SLIP = 2.5e-4
 """How far (m) an arm may have any point of an object off its path that it holds with others."""
@@ -191,7 +189,11 @@ def carry_together(
     situations = [bodies.situation(at, arms, held_by=arms, rest=s.rest, tilt=tilt) for s in stretches]
     ends = np.cumsum([0, *(len(s.poses) - 1 for s in stretches)])
     hits = np.zeros((0, 2), dtype=np.int64)
-    for chosen in islice(_combinations(trees), COMBINATIONS):
+    lines = {
+        name: [tree.path(int(end)) for end in np.argsort(-tree.value)[:COMBINATIONS]]
+        for name, tree in trees.items()
+    }
+    for chosen in combinations(lines):
         if progress:
             progress(0.0)
         rows = situations[0].stacked(chosen)
@@ -206,13 +208,6 @@ def carry_together(
             ]
         hits = np.concatenate([proof.hits[~proof.free] for proof in proofs])
     raise NoMotionError(blockers(situations[0], hits))
-
-
-def _combinations(trees: Mapping[str, LineTree]) -> Iterator[dict[str, Array]]:
-    """Yield combinations of the paths of several arms, the best of each first."""
-    ends = [np.argsort(-tree.value)[:COMBINATIONS].tolist() for tree in trees.values()]
-    for chosen in product(*ends):
-        yield {name: tree.path(end) for (name, tree), end in zip(trees.items(), chosen, strict=True)}
 
 
 def _furthest(scene: Scene, grip: Grip) -> float:

@@ -57,6 +57,13 @@ class Course:
         self.segments: list[Segment] = []
         self._opening: dict[str, float] = {}
 
+    def copied(self) -> Course:
+        """Return a course with the same segments, to which others can be added."""
+        course = Course(self.bodies, self.state)
+        course.held, course.undecided = dict(self.held), set(self.undecided)
+        course.segments, course._opening = list(self.segments), dict(self._opening)
+        return course
+
     def holders(self) -> list[Arm]:
         """Return the arms that hold the object where they are."""
         return [grip.arm for name, grip in self.held.items() if name not in self.undecided]
@@ -92,33 +99,43 @@ class Course:
             at = to if kind == "carry" else at
         self.state = self.state.with_object(end)
 
-    def move_hand(self, kind: Kind, grip: Grip, end: float, task: str, *, away: bool = False) -> None:
-        """Open or close a hand to an opening (m), from that at which it is.
+    def move_hands(self, kind: Kind, ends: Mapping[str, float], task: str, *, away: bool = False) -> None:
+        """Open or close hands at the same time, from where they are.
 
         Args:
             kind: ``open`` or ``close``.
-            grip: the grasp.
-            end: the opening (m).
+            ends: arm → opening (m) of its hand at the end.
             task: where the object is.
-            away: the hand is not at its grasp, so that no finger may touch the object.
+            away: the hands are not at their grasps, so that no finger may touch the object.
         """
-        arm = grip.arm
-        start = self._opening.get(arm.name)
-        if start == end:
-            return
-        q = self.state.joints(arm)
-        openings = [] if start is None else _openings(arm, start, end)
-        states = [self.state, *(self.state.with_arm(arm, q, opening) for opening in openings[1:])]
-        if start is None:
-            states.append(self.state.with_arm(arm, q, end))
-        touching = self.holders() if away else [arm, *self.holders()]
-        situation = self.bodies.situation(self.state, [], hands=[arm], touching=touching)
+        ends = {name: end for name, end in ends.items() if self._opening.get(name) != end}
+        known = {name: end for name, end in ends.items() if name in self._opening}
+        for group in ({name: end for name, end in ends.items() if name not in known}, known):
+            if group:
+                self._move_hands(kind, group, task, away)
+
+    def _move_hands(self, kind: Kind, ends: Mapping[str, float], task: str, away: bool) -> None:
+        """Move hands of which all openings so far are known, or none: these are as they are at home."""
+        arms = {name: self.bodies.scene.arm(name) for name in ends}
+        openings = {name: (self._opening.get(name), end) for name, end in ends.items()}
+        shares = sorted({0.0, 1.0}.union(*(_bends(arm, *openings[name]) for name, arm in arms.items())))
+        states = [self.state]
+        for share in shares[1:]:
+            state = self.state
+            for name, arm in arms.items():
+                start, end = openings[name]
+                opening = end if start is None or share == 1.0 else start + share * (end - start)
+                state = state.with_arm(arm, state.joints(arm), opening)
+            states.append(state)
+        touching = self.holders() if away else [*arms.values(), *self.holders()]
+        situation = self.bodies.situation(self.state, [], hands=list(arms.values()), touching=touching)
         rows = np.array([situation.row(state) for state in states])
         verb = "closing" if kind == "close" else "opening"
-        with part_of(f"{verb} the hand of {arm.name} in {task}"):
+        with part_of(f"{verb} the {'hand' if len(arms) == 1 else 'hands'} of {', '.join(arms)} in {task}"):
             proof = prove_path(situation, rows)
-        self._append(kind, {arm.name: np.array([q, q])}, (task, task), proof, {arm.name: (start, end)})
-        self.state, self._opening[arm.name] = states[-1], end
+        still = {name: np.array([self.state.joints(arm)] * 2) for name, arm in arms.items()}
+        self._append(kind, still, (task, task), proof, openings)
+        self.state, self._opening = states[-1], {**self._opening, **ends}
 
     def _append(
         self,
@@ -190,9 +207,10 @@ def part_of(what: str) -> Iterator[None]:
         raise NoMotionError(f"{what}: {error}") from None
 
 
-def _openings(arm: Arm, start: float, end: float) -> list[float]:
-    """Return openings (m) from one to another, with those between at which the joints of the hand bend."""
+def _bends(arm: Arm, start: float | None, end: float) -> set[float]:
+    """Return at which shares of the way from an opening (m) to another the joints of the hand bend."""
+    if start is None:
+        return set()
     knots = {x for table in arm.hand.joints.values() if not isinstance(table, (int, float)) for x, _ in table}
     low, high = min(start, end), max(start, end)
-    between = sorted(x for x in knots if low < x < high)
-    return [start, *(between if start < end else between[::-1]), end]
+    return {(x - start) / (end - start) for x in knots if low < x < high}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -18,9 +19,10 @@ from symgrasp.motion.drafting.carrying import (
     tilt_limit,
 )
 from symgrasp.motion.drafting.course import Course, part_of
+from symgrasp.motion.drafting.taking import leave, take
 from symgrasp.motion.drafting.ways import Grip, lifted, retreating, straight
 from symgrasp.motion.paths.lines import Leg, LineTree, follow
-from symgrasp.motion.paths.search import NoMotionError, blockers, connect, prove
+from symgrasp.motion.paths.search import NoMotionError, blockers, prove
 from symgrasp.motion.segments import Motion
 from symgrasp.plan.plan import Grasp, Plan, PlanTask
 from symgrasp.poses import Array, translation
@@ -82,20 +84,19 @@ class MotionDraft:
 
     def run(self) -> PlannedMotion:
         """Plan it."""
-        held = self._course.held
         for k, task in enumerate(self._tasks):
             if k:
                 self._pass_on(self._tasks[k - 1], task, k)
             self._k = k
-            for name, grip in held.items():
+            for name, grip in self._course.held.items():
                 self._visits[k][name] = self._course.state.joints(grip.arm)
             self._take(task)
             self._share = (k + 1) / (len(self._tasks) + 1)
         task = self._tasks[-1]
         if self._lifts:
-            self._carry_together(task, task, list(held))
+            self._carry_together(task, task, list(self._course.held))
         elif self._bodies.rests(self._course.state.T_world_object):
-            self._release(task, list(held))
+            self._release(task, list(self._course.held))
         self._decide_all(task)
         poses = [task.object_pose_turned.array() for task in self._tasks]
         self._share = 1.0
@@ -131,8 +132,7 @@ class MotionDraft:
             parts = carry_alone(
                 self._bodies, state, grip, goal, choices, arrivals, tilt.largest, self._seed, self._progress
             )
-        if name in self._trees:
-            self._decide(name, before, parts[0].situation.by_arm(parts[0].path[0])[name])
+        self._decide(before, parts[0].situation.by_arm(parts[0].path[0]))
         self._course.carry(parts, (before.name, task.name), goal, tilt.kept, np.inf)
 
     def _choices(self, name: str) -> Array:
@@ -207,9 +207,7 @@ class MotionDraft:
             parts = carry_together(
                 self._bodies, state, grips, stretches, choices, tilt.largest, self._progress
             )
-        for name, q in parts[0].situation.by_arm(parts[0].path[0]).items():
-            if name in self._trees:
-                self._decide(name, before, q)
+        self._decide(before, parts[0].situation.by_arm(parts[0].path[0]))
         self._course.carry(parts, (before.name, task.name), end, tilt.kept, ROOM_TOGETHER)
 
     # -- taking and letting go ---------------------------------------------------------------
@@ -250,68 +248,49 @@ class MotionDraft:
         return follow([Leg(situation, poses[::-1])], grip.fine, end=end, progress=self._progress)
 
     def _decide_all(self, task: PlanTask) -> None:
-        for name in list(self._trees):
-            self._decide(name, task)
+        self._decide(task, dict.fromkeys(self._trees))
 
-    def _decide(self, name: str, task: PlanTask, q: Array | None = None) -> None:
-        """Plan how an arm gets to its grasp.
+    def _decide(self, task: PlanTask, chosen: Mapping[str, Array | None]) -> None:
+        """Plan how arms get to their grasps: all at the same time where there is room, or else in turn.
 
         Args:
-            name: the arm.
-            task: the task in which it takes the object.
-            q: (n,) the configuration of the grasp; any if None.
+            task: the task in which they take the object.
+            chosen: arm → (dof,) configuration of its grasp, any if None. Arms that have it are passed over.
         """
-        course, tree = self._course, self._trees.pop(name)
-        grip = course.held.pop(name)  # until its hand is closed it does not hold anything
-        course.undecided.remove(name)
-        arm = grip.arm
-        ends = [k for k in np.argsort(-tree.value) if q is None or np.array_equal(tree.ends[k], q)]
-        paths = [tree.path(int(k)) for k in ends]
-        course.move_hand("open", grip, grip.open, task.name, away=True)
-        situation = self._bodies.situation(course.state, [arm], touching=course.holders())
-        with part_of(f"the reach of {name} to {task.name}"):
-            starts = np.array([path[0] for path in paths])
-            path = connect(situation, course.state.joints(arm)[None], starts, self._seed, self._progress)
-        course.add("reach", situation, path, task.name)
-        line = next(line for line in paths if np.array_equal(line[0], path[-1]))
-        situation = self._bodies.situation(course.state, [arm], touching=[arm, *course.holders()])
-        with part_of(f"the approach of {name} in {task.name}"):
-            course.add("approach", situation, line, task.name)
-        for visit in self._visits[self._since[name] : self._k + 1]:
-            visit[name] = line[-1]
-        course.move_hand("close", grip, grip.closed, task.name)
-        course.held[name] = grip
+        lines = {}
+        for name, q in chosen.items():
+            if name in self._trees:
+                tree = self._trees.pop(name)
+                ends = [k for k in np.argsort(-tree.value) if q is None or np.array_equal(tree.ends[k], q)]
+                lines[name] = [tree.path(int(k)) for k in ends]
+
+        def part(course: Course, names: Sequence[str]) -> None:
+            own = {name: lines[name] for name in names}
+            for name, q in take(course, own, task.name, self._seed, self._progress).items():
+                for visit in self._visits[self._since[name] : self._k + 1]:
+                    visit[name] = q
+
+        self._together(part, list(lines))
 
     def _release(self, task: PlanTask, names: Sequence[str]) -> None:
-        """Let go of the object with some arms and park them."""
-        for name in names:
-            if name in self._trees:
-                self._decide(name, task)
-        course = self._course
-        for name in names:
-            grip = course.held.pop(name)
-            arm = grip.arm
-            course.move_hand("open", grip, grip.open, task.name)
-            situation = self._bodies.situation(course.state, [arm], touching=[arm, *course.holders()])
-            profile, settings = self._scene.profile, self._scene.settings
-            poses = retreating(grip, course.state.T_world_object, settings.approach, profile)
-            with part_of(f"the retreat of {name} in {task.name}"):
-                at = course.state.joints(arm)[None]
-                tree = follow([Leg(situation, poses)], grip.fine, at, progress=self._progress)
-            course.add("retreat", situation, tree.path(int(tree.value.argmax())), task.name)
-            situation = self._bodies.situation(course.state, [arm], touching=course.holders())
-            with part_of(f"the way home of {name} from {task.name}"):
-                here, home = course.state.joints(arm), arm.robot.home[arm.indices]
-                kept = _shared(course.holders(), arm)
-                home = np.where(kept, here, home)
-                path = connect(situation, here[None], home[None], self._seed, self._progress)
-            course.add("home", situation, path, task.name)
+        """Let go of the object with some arms and park them, as `_decide` takes it."""
+        self._decide(task, {name: None for name in names})
 
+        def part(course: Course, names: Sequence[str]) -> None:
+            leave(course, names, task.name, self._scene.settings.approach, self._seed, self._progress)
 
-def _shared(holders: Sequence[Arm], arm: Arm) -> np.ndarray:
-    """Return which joints (dof,) of an arm also carry one of some others: those of a torso."""
-    others = {name for holder in holders if holder.robot is arm.robot for name in holder.joint_names}
-    return np.array([name in others for name in arm.joint_names])
+        self._together(part, names)
+
+    def _together(self, part: Callable[[Course, Sequence[str]], None], names: Sequence[str]) -> None:
+        """Add a part of the motion of some arms at the same time, or else of one after the other."""
+        if len(names) > 1:
+            course = self._course.copied()
+            with suppress(NoMotionError):
+                part(course, names)
+                self._course = course
+                return
+        for name in names:
+            part(self._course, [name])
 
 
 def _configurations(grip: Grip, task: PlanTask, T_world_object: Array) -> Array:
