@@ -59,7 +59,7 @@ class MapService:
 
     def map(self, request: MapRequest, progress: Progress) -> MapResult:
         """Compute a map."""
-        maker = self._maker_for(request.scene)
+        maker = self._maker_for(request.scene, progress)
         contacts = _contacts(maker.world, request)
         the_map = maker.map(request.arm, request.moved_task(), progress=progress)
         result = MapResult(request, the_map, contacts).renamed(request)
@@ -71,7 +71,7 @@ class MapService:
         arm = request.scene.arm(request.arm)
         if is_map_compiled(request.scene, arm):
             return None
-        world = self._maker_for(request.scene).world
+        world = self._maker_for(request.scene, progress).world
         contacts = _contacts(world, request)
         found = coarse_map(world, arm, request.moved_task(), progress)
         return found and MapResult(request, found, contacts).renamed(request)
@@ -110,19 +110,19 @@ class MapService:
         """
         shifted, task = shifted_from.shift(request.delta), request.map.moved_task()
         turned = replace(task, T_world_object=task.T_world_object @ rotation_z(request.delta))
-        maker = self._maker_for(request.map.scene)
+        maker = self._maker_for(request.map.scene, progress)
         fresh = maker.map(request.map.arm, turned, manifold=shifted.manifold, progress=progress)
         return Comparison(request, fresh, int(np.count_nonzero(fresh.reason != shifted.reason)))
 
     def explain(self, request: ExplainRequest, progress: Progress) -> ExplainResult:
         """Compute the result of every candidate of a cell."""
-        maker, the_map = self._maker_for(request.map.scene), request.map
+        maker, the_map = self._maker_for(request.map.scene, progress), request.map
         explanation = maker.explain(the_map.arm, the_map.moved_task(), request.cell, progress=progress)
         return ExplainResult(request, explanation)
 
     def probability(self, request: ProbabilityRequest, progress: Progress) -> Probability:
         """Compute how probable the grasps of a map are; goes on where an equal request was cancelled."""
-        maker, the_map = self._maker_for(request.map.scene), request.map
+        maker, the_map = self._maker_for(request.map.scene, progress), request.map
         if self._draws is None or self._draws[0] != request:
             self._draws = request, []
         found = success_map(
@@ -145,20 +145,20 @@ class MapService:
             shown: that map, for the object that is not turned.
             progress: called with the finished share; may raise `Cancelled`.
         """
-        maker = self._maker_for(request.map.scene)
+        maker = self._maker_for(request.map.scene, progress)
         try:
             widest = maker.with_windows(shown, progress).widest
         except InputError:
             widest = None
         return Windows(request, np.full(shown.reason.shape, np.nan) if widest is None else widest)
 
-    def _maker_for(self, scene: Scene) -> MapMaker:
+    def _maker_for(self, scene: Scene, progress: Progress) -> MapMaker:
         """Return the present map maker if it is for the same robots, obstacles and object, else a new one."""
         old = self._maker
         if old and old.world.scene.map_sha256 == scene.map_sha256:
             return old
         self.close()
-        self._maker = MapMaker(open_world(scene))
+        self._maker = MapMaker(open_world(scene, progress))
         return self._maker
 
 

@@ -133,7 +133,11 @@ class MapMaker:
         only: np.ndarray | None = None,
     ) -> FeasibilityMap:
         """Compute the map of an arm without a torso, or with its torso at a sample."""
+        if progress:
+            progress(0.0)  # before and after the pieces of the world are packed: that takes its time
         engine = self._engine(arm, torso, grid)
+        if progress:
+            progress(0.0)
         if engine is None:
             own = arm if pitch is None else arm.at_pitch(pitch)
             return create_map_reference(self.world, own, task, grid, progress)
@@ -302,7 +306,7 @@ def create_map(
         SceneError: there is no such arm or task.
         UrdfError: the arm has no closed-form inverse kinematics.
     """
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         maker = MapMaker(world)
         found = maker.map(arm, task, method=method, manifold=manifold, progress=progress, certify=certify)
     return replace(found, shown_in=scene, find_windows=_windows_of)
@@ -350,7 +354,7 @@ def explain(
         raise InputError("explain", "theta (rad)", theta, "a number")
     row, column = scene.manifold.cell(h, theta)
     cell = Cell(_roll_index(roll), row, column)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         return MapMaker(world).explain(arm, task, cell, progress=progress)
 
 

@@ -79,7 +79,7 @@ def moving_plans(
         seed: of the random numbers.
         progress: called with the finished share of each plan; may raise `Cancelled`.
     """
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         planner = MotionPlanner(scene, world)
         for number, plan in enumerate(islice(plans, MOST_TRIED), start=1):
             try:

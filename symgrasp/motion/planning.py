@@ -41,7 +41,7 @@ def plan_motion(
     Raises:
         NoMotionError: none was found; says which part is missing, and what is in its way.
     """
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         return MotionPlanner(scene, world).plan(plan, seed, progress)
 
 

@@ -57,7 +57,7 @@ def verify(
     check_order(plan, own, report)
     places = [f"tasks[{k}] ({task.name})" for k, task in enumerate(plan.tasks)]
     posed = [check_poses(task, where, own, report) for task, where in zip(plan.tasks, places, strict=True)]
-    with open_world(own) as world:
+    with open_world(own, progress) as world:
         if all(posed):
             check_grasps_stay(plan, world, report)
             check_support(plan, world, report)

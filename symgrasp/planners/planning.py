@@ -85,7 +85,7 @@ def plan_sequential(
         plans = sequential_plans if method == "best" else regrasp_plans
         return _best(plans(scene, arm, maps, progress), progress)
     name, tasks = _tasks_alone(scene, arm)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         visits = _visits(world, tasks, maps, progress)
         entries = first_grasp(world, visits, name)
         scene = _with_supports(world, tasks)
@@ -105,7 +105,7 @@ def sequential_plans(
     errors are those of `plan_sequential`.
     """
     _, tasks = _tasks_alone(scene, arm)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         visits = _visits(world, tasks, maps, part_of(progress, 0, 2))
         scene = _with_supports(world, tasks)
         for entries, _ in holdings(world, visits, part_of(progress, 1, 2)):
@@ -123,7 +123,7 @@ def regrasp_plans(
     Arguments and errors are those of `plan_sequential`.
     """
     name, tasks = _tasks_alone(scene, arm)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         visits = _visits(world, tasks, maps, progress)
         scene = _with_supports(world, tasks)
         for entries in with_regrasps(world, visits, name):
@@ -138,7 +138,7 @@ def sequential_maps(
     Arguments and errors are those of `plan_sequential`.
     """
     _, tasks = _tasks_alone(scene, arm)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         maker = MapMaker(world)
         return {
             (task.name, name): maker.map(name, task, progress=part_of(progress, k, len(tasks)))
@@ -182,7 +182,7 @@ def plan_bimanual(
     if pitched:
         expected = "arms of 6 or 7 joints for hill climbing, which knows no pitch"
         raise SceneError(scene.source, f"task {the_task.name}: arms", pitched, expected)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         (visit,) = _visits(world, [the_task], maps, part_of(progress, 0, 2))
         entry, planner = climb(world, visit, seed, limits or Climb(), part_of(progress, 1, 2), trace)
         scene = _with_supports(world, [the_task])
@@ -200,7 +200,7 @@ def bimanual_plans(
     Arguments and errors are those of `plan_bimanual`.
     """
     the_task = _task_together(scene, task)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         visits = _visits(world, [the_task], maps, part_of(progress, 0, 2))
         scene = _with_supports(world, [the_task])
         for entries, planner in holdings(world, visits, part_of(progress, 1, 2)):
@@ -239,7 +239,7 @@ def handover_plans(
     Arguments and errors are those of `plan_handover`.
     """
     tasks = _tasks_handed_over(scene)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         for before, after in pairwise(tasks):
             if not set(before.arms) & set(after.arms) and not world.object_rests(before.T_world_object):
                 expected = f"an arm of task {before.name!r}: the object does not stand on anything there"

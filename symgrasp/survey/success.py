@@ -180,7 +180,7 @@ def plan_for_success(
     """
     name = scene.arm(arm or scene.task().arms[0]).name
     tasks = tasks_of_plan(scene, "sequential", name)
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         maker = MapMaker(world)
         maps = [
             success_map(maker, name, task, noise, count, seed + (0 if noise.shared else k),

@@ -10,6 +10,7 @@ import numpy as np
 from symgrasp.errors import MeshError, SymgraspError
 from symgrasp.meshes.flat_faces import few_triangles
 from symgrasp.poses import Array
+from symgrasp.progress import Progress
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
@@ -50,6 +51,7 @@ class SceneBodies:
     Args:
         client: PyBullet's id of the physics client to load them into.
         scene: the scene.
+        progress: called with 0 after every robot and shape; may raise `Cancelled`.
 
     Raises:
         UrdfError: PyBullet could not use all shapes of a URDF.
@@ -67,8 +69,8 @@ class SceneBodies:
         closed_meshes: (name, mesh in world coordinates) of every closed mesh of an obstacle.
     """
 
-    def __init__(self, client: int, scene: Scene) -> None:
-        self.client = client
+    def __init__(self, client: int, scene: Scene, progress: Progress | None = None) -> None:
+        self.client, self._progress = client, progress
         self.links: dict[int, tuple[str, ...]] = {}
         self.names: dict[int, str] = {}
         self.robots = {
@@ -97,6 +99,8 @@ class SceneBodies:
     def _register(self, body: int, name: str, links: Sequence[str]) -> int:
         self.names[body] = name
         self.links[body] = tuple(links)
+        if self._progress:
+            self._progress(0.0)
         return body
 
     def _load_urdf(self, model: RobotModel, name: str, pose: Array) -> int:

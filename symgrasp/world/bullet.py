@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from symgrasp.errors import SceneError, SymgraspError
 from symgrasp.meshes import depth_inside
 from symgrasp.poses import Array, axis_frame, translation
+from symgrasp.progress import Progress
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
@@ -45,6 +46,7 @@ class BulletWorld:
 
     Args:
         scene: the scene.
+        progress: called with 0 after every body, and every arm; may raise `Cancelled`.
 
     Raises:
         UrdfError: PyBullet could not use all shapes of a URDF.
@@ -58,16 +60,20 @@ class BulletWorld:
         bodies: the bodies in PyBullet.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, progress: Progress | None = None) -> None:
         self.scene = scene
         self.margin = scene.settings.margin
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise SymgraspError("PyBullet has no free physics client; close worlds you no longer need")
         try:
-            self.bodies = SceneBodies(self._client, scene)
+            self.bodies = SceneBodies(self._client, scene, progress)
             self._values: dict[str, Array] = {}  # joint values of each robot, as set last
-            self._queries = {arm.name: arm_queries(self.bodies, scene, arm) for arm in scene.arms.values()}
+            self._queries: dict[str, list[Query]] = {}
+            for arm in scene.arms.values():
+                self._queries[arm.name] = arm_queries(self.bodies, scene, arm)
+                if progress:
+                    progress(0.0)  # which links may touch is sampled, once for every robot
             self._parked_queries = {name: parked_queries(self.bodies, name) for name in scene.robots}
             self._outer_queries = outer_queries(self.bodies, scene)
             self.set_object(scene.task().T_world_object)

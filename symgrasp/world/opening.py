@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 from symgrasp.world.bullet import BulletWorld
 
 __all__ = ["open_world"]
 
 
-def open_world(scene: Scene) -> BulletWorld:
+def open_world(scene: Scene, progress: Progress | None = None) -> BulletWorld:
     """Open a physics world with all bodies of a scene; use it in a ``with`` block, or `close` it.
 
     Args:
         scene: the scene.
+        progress: called with 0 after every body, and every arm; may raise `Cancelled`.
 
     Returns:
         The world: robots at home, the object at the first task, the scene's margin to be kept.
@@ -20,4 +22,4 @@ def open_world(scene: Scene) -> BulletWorld:
     Raises:
         UrdfError, MeshError, SceneError: PyBullet cannot make a shape of the scene.
     """
-    return BulletWorld(scene)
+    return BulletWorld(scene, progress)

@@ -19,6 +19,7 @@ from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.survey.success import PoseNoise
@@ -50,9 +51,9 @@ def test_the_map_is_that_of_the_library(maps):
 def test_the_world_is_used_again_for_the_same_robots_and_obstacles_only(maps, monkeypatch):
     worlds: list[Scene] = []
 
-    def counted(scene: Scene) -> BulletWorld:
+    def counted(scene: Scene, progress: Progress) -> BulletWorld:
         worlds.append(scene)
-        return open_world(scene)
+        return open_world(scene, progress)
 
     monkeypatch.setattr(map_service, "open_world", counted)
     bottle, can = load_small("bottle_on_table"), load_small("soda_can")
