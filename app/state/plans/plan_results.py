@@ -35,7 +35,7 @@ PlanKind = Literal["sequential", "bimanual", "handover"]
 Playing = Literal["", "arms", "climb"]
 """What is being played."""
 
-FIRST_SEED = 39
+FIRST_SEED = 18
 """Default seed of hill climbing: with it, the hands of two robots on the shipped log overlap at first.
 
 With most seeds they start apart, so that there is nothing to replay.
