@@ -187,6 +187,7 @@ def _look(state: State) -> dict[str, Any]:
         patterns = dict(enumerate(cell_patterns(state.map_view.color_by)))
         look["patterns"] = [patterns.get(indices[swatch.color], PLAIN) for swatch in colored.swatches]
         look["counted"] = _counted(state.base_map, state.map_view.roll)
+        look["places"] = state.base_map.reason[0].size
         if colored.scale:
             scale = colored.scale
             look["scale"] = [scale.label, scale.high, [_hex(c) for c in scale.colors[::36]]]

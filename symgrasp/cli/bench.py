@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,29 +95,30 @@ def _surveys(args: argparse.Namespace) -> dict[str, Any]:
 def _guarantee(args: argparse.Namespace) -> dict[str, Any]:
     """Measure what maps miss."""
     from symgrasp.bench import guarantee
-    from symgrasp.bench.figures import with_machine
 
-    rows = []
-    for row in guarantee.run(args.random):
-        say(row.line())
-        rows.append(row)
-    for line in guarantee.summary(rows):
-        say(line)
-    return with_machine("maps", rows)
+    return _summed_up("maps", guarantee.run(args.random), guarantee.summary)
 
 
 def _singular(args: argparse.Namespace) -> dict[str, Any]:
     """Measure which poses are reached inside the limits, singular ones and others."""
     from symgrasp.bench import singular
+
+    return _summed_up("arms", singular.run(args.poses), singular.summary)
+
+
+def _summed_up(
+    what: str, rows: Iterable[Any], summary: Callable[[list[Any]], Iterable[str]]
+) -> dict[str, Any]:
+    """Say the lines of rows as they come, then what they come to; return them with the machine."""
     from symgrasp.bench.figures import with_machine
 
-    rows = []
-    for row in singular.run(args.poses):
+    kept = []
+    for row in rows:
         say(row.line())
-        rows.append(row)
-    for line in singular.summary(rows):
+        kept.append(row)
+    for line in summary(kept):
         say(line)
-    return with_machine("arms", rows)
+    return with_machine(what, kept)
 
 
 def _motion(args: argparse.Namespace) -> dict[str, Any]:

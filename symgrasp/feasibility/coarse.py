@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from symgrasp.engine.cover import is_cover_compiled
+from symgrasp.engine.redundancy.cover import is_cover_compiled
 from symgrasp.engine.search import is_search_compiled
 from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.map import FeasibilityMap

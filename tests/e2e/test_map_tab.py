@@ -90,6 +90,10 @@ def test_views_of_the_map_and_their_pictures(open_page, bottle_map, tmp_path):
         page.choose("Colours show", view)
         page.wait_for_picture(lambda p, v=view: np.array_equal(p, drawn(bottle_map, v)))
         expect(page.around(f"{view} ({view.unit})" if view.unit else "not feasible").first).to_be_visible()
+        places = bottle_map.reason[0].size
+        rest = places - int(bottle_map.feasible.any(axis=0).sum())
+        share = f"{rest} · {100 * rest / places:.0f} %"
+        expect(page.legend.locator("li").filter(has_text="not feasible")).to_contain_text(share)
     page.wait_for_change(before, share=0.001)  # the bottle and the board have the same colours
     shoot(page, "clearance")
     for kind, check in (("PNG", _is_png), ("SVG", _is_svg)):

@@ -11,7 +11,7 @@ from symgrasp.errors import Cancelled, SceneError
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker, create_map
-from symgrasp.feasibility.exact import engine
+from symgrasp.feasibility.exact import redundancy_search
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.poses import inverse
@@ -113,7 +113,7 @@ def test_more_is_found_than_at_samples_and_it_says_what_it_rests_on():
 
 def test_it_can_be_cancelled_while_the_redundancy_is_searched(monkeypatch):
     scene = load_small("log_iiwa_and_panda").with_settings(heights=4, angles=120, redundancy="auto")
-    search, numbers = engine.cover, []
+    search, numbers = redundancy_search.cover, []
 
     def counted(*args):
         numbers.append(len(args[8].cells))
@@ -123,7 +123,7 @@ def test_it_can_be_cancelled_while_the_redundancy_is_searched(monkeypatch):
         if numbers:
             raise Cancelled
 
-    monkeypatch.setattr(engine, "cover", counted)
+    monkeypatch.setattr(redundancy_search, "cover", counted)
     with open_world(scene) as world:
         maker = MapMaker(world)
         with pytest.raises(Cancelled):
@@ -172,6 +172,6 @@ def test_pybullet_is_asked_seldom_where_a_link_touches_a_body_all_along(monkeypa
     scene = Scene.load("pick_pour_place")
     few = create_map(scene)
     count = len(asked)
-    monkeypatch.setattr(engine, "MOST_OVERLAPPING", 10**6)
+    monkeypatch.setattr(redundancy_search, "MOST_OVERLAPPING", 10**6)
     assert np.array_equal(few.feasible, create_map(scene).feasible)
     assert 0 < 4 * count < len(asked) - count

@@ -6,10 +6,9 @@ export function describe(element, pane) {
   const title = element("title");
   title.textContent = look.title + (look.age ? ` — ${look.age}` : "");
   title.setAttribute("aria-busy", String(look.busy));
-  const all = look.legend.reduce((sum, [, , cells]) => sum + cells, 0);
   const rows = look.legend.map(([color, label, cells], k) => {
     const name = patterned(look) ? look.patterns[k] : "";
-    return row(color, label, `${cells} · ${share(cells, all)} %`, name);
+    return row(color, label, `${cells} · ${share(cells, look.places)} %`, name);
   });
   for (const [color, label] of prints?.legend ?? []) rows.push(row(color, label, ""));
   element("legend").replaceChildren(...rows);

@@ -8,38 +8,33 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from time import perf_counter
 
 import numpy as np
 
 from symgrasp.collision.boxes import boxes_of
-from symgrasp.collision.inner_pieces import inner_pieces
-from symgrasp.collision.pieces import PackedPieces, pose_rows
+from symgrasp.collision.pieces import pose_rows
 from symgrasp.engine import search
 from symgrasp.engine.balance import loaded
 from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
-from symgrasp.engine.cover import FINEST, cover
-from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
-from symgrasp.engine.reach import Reach, reach_of
 from symgrasp.engine.threads import core_count
-from symgrasp.engine.windows import MOST_OPEN, windows
 from symgrasp.errors import InputError
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Window
 from symgrasp.feasibility.exact.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.exact.certified import LEVELS, CellProver
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
-from symgrasp.feasibility.exact.recording import FixedBodies, PieceBodies, record_search
-from symgrasp.feasibility.exact.settling import settled
+from symgrasp.feasibility.exact.recording import FixedBodies, PieceBodies, record_cover, record_search
+from symgrasp.feasibility.exact.redundancy_search import RedundancySearch
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.torso_maps import merged
-from symgrasp.ik import CompiledIK, GridSolvers, solver_for
-from symgrasp.ik.at_phi import Locked, locked_joint
+from symgrasp.ik import GridSolvers, solver_for
+from symgrasp.ik.at_phi import locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
@@ -57,13 +52,6 @@ PARTS = 4
 
 WORTH_A_PART = 256
 """Candidates, at one branch, that take longer than a thread takes to start."""
-
-COVER_PARTS = 8
-"""Equal parts of the range of the redundancy with which covering it begins."""
-
-MOST_OVERLAPPING = 32
-"""Candidates of a cell at most that PyBullet is asked for between the samples although their pieces overlap,
-by so little that it may call them free. There are hundreds where a link all but touches a body all along."""
 
 FIRST_COVERED = 16
 """Cells of which all of the redundancy is searched before progress is told for the first time."""
@@ -107,14 +95,10 @@ class ExactEngine:
         self._most = CLEARANCE_LIMIT
         if not arm.pitched:  # whose hand has other poses in every row
             self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, self._most)
-        self._inner = inner_pieces(geometry.pieces) if self._settings.redundancy == "auto" else ()
         self._balance = self._geometry.balance
         self._open = OpenCandidates(world, arm, geometry, self._scratch, self._opening)
+        self._redundancy = RedundancySearch(arm, geometry, self._open)
         self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
-
-    @cached_property
-    def _arm_reach(self) -> Reach:
-        return reach_of(self.arm)
 
     @staticmethod
     def knows(arm: Arm) -> bool:
@@ -331,8 +315,12 @@ class ExactEngine:
         draft.proven[tuple(part[found.proven] for part in cells)] = True
         which = np.flatnonzero(left & ~found.proven)
         for these in portions(len(which), progress, FIRST_COVERED):
-            covered = self._cover(draft, found, which[these], locked, inputs, batch, cells)
-            yield from self._decide_covered(draft, which[these], covered, inputs, batch, cells)
+            some = which[these]
+            covered = self._redundancy.cover(found, some, locked, inputs, batch, self._scratches())
+            found.status[some[covered.found]] = search.FEASIBLE
+            where = tuple(part[some] for part in cells)
+            record_cover(draft, covered, where)
+            yield from self._redundancy.decide(draft, covered, inputs.T_base_tool[some], batch, where)
 
     def _inputs(
         self, T_base_tool: Array, runs: np.ndarray, batch: Batch, fixed: FixedBodies
@@ -361,7 +349,7 @@ class ExactEngine:
         *,
         settle: bool = True,
     ) -> list[tuple[Window, ...]]:
-        """Find the windows of cells, see `symgrasp.engine.windows`.
+        """Find the windows of cells, see `symgrasp.engine.redundancy.windows`.
 
         Args:
             task: the task; it need not be one of the scene's.
@@ -387,107 +375,16 @@ class ExactEngine:
         found: list[tuple[Window, ...]] = [()] * len(cells)
         fits = np.array([self._misfit[row] is None for row in cells[:, 1]], dtype=bool)
         which = np.flatnonzero(fits & (fixed.collision is None))
-        geometry, scratches = self._geometry, self._scratches()
         for these in portions(len(which), progress):
             some = cells[which[these]]
             tools = np.ascontiguousarray(T_base_tool[tuple(some.T)])
             inputs = self._inputs(tools, some[:, 1].copy(), batch, fixed)
             inputs = inputs._replace(parts=min(len(some), PARTS * core_count()))
-            parts = batch.compiled.chain, batch.moving, geometry.pieces, geometry.tree, scratches, inputs
-            rows = search.search(*parts, self._balance, self.arm.dof).rows
-            first, reach = np.arange(len(some)), self._arm_reach
-            covered = CoverInput(first, pose_rows(tools), reach, locked, self._inside, COVER_PARTS)
-            own = windows(*parts, self._balance, rows, covered, self.arm.dof)
-            for k, cell in enumerate(which[these].tolist()):
-                n, m = int(own.found[k]), min(int(own.open_count[k]), MOST_OPEN)
-                columns = own.branch[k, :n], *own.ends[k, :n].T, own.whole[k, :n]
-                listed = [Window(*row) for row in zip(*(c.tolist() for c in columns), strict=True)]
-                left = zip(own.open_branch[k, :m].tolist(), own.open_phi[k, :m].tolist(), strict=True)
-                if settle or not listed:
-                    T, row = tools[k], int(some[k, 1])
-                    is_free = partial(self._is_free, batch.compiled, T, row)
-                    found[cell] = settled(listed, list(left), is_free, (locked.lower, locked.upper))
-                else:
-                    found[cell] = tuple(sorted(listed))
+            own = self._redundancy.windows(inputs, batch, locked, self._scratches(), settle=settle)
+            for cell, listed in zip(which[these].tolist(), own, strict=True):
+                found[cell] = listed
         self.world.set_arms(())
         return found
-
-    def _is_free(self, compiled: CompiledIK, T_base_tool: Array, row: int, branch: int, phi: float) -> bool:
-        """Whether a branch is free at a value of φ (rad), as PyBullet says."""
-        ik = compiled.at(np.array([phi]))
-        s = ik.solve(T_base_tool)
-        these = np.flatnonzero((s.branch == branch) & s.inside)
-        return any(self._open.is_free(T_base_tool, row, ik, s.q[j], int(s.sample[j])) for j in these)
-
-    @cached_property
-    def _inside(self) -> tuple[PackedPieces, ...]:
-        """The bodies inside the pieces, see `inner_pieces`."""
-        return self._inner or inner_pieces(self._geometry.pieces)
-
-    def _cover(
-        self,
-        draft: MapDraft,
-        found: search.SearchResult,
-        which: np.ndarray,
-        locked: Locked,
-        inputs: search.SearchInput,
-        batch: Batch,
-        cells: tuple[np.ndarray, ...],
-    ) -> CoverResult:
-        """Search all of the redundancy for cells at whose samples nothing is free, and record what is found.
-
-        Args:
-            which: the cells.
-        """
-        tools = pose_rows(inputs.T_base_tool[which])
-        covered = cover(
-            batch.compiled.chain,
-            batch.moving,
-            self._geometry.pieces,
-            self._geometry.tree,
-            self._scratches(),
-            inputs,
-            self._balance,
-            found.rows,
-            CoverInput(which, tools, self._arm_reach, locked, self._inner, COVER_PARTS),
-            self.arm.dof,
-        )
-        free = which[covered.found]
-        found.status[free] = search.FEASIBLE
-        draft.record_feasible(
-            tuple(part[free] for part in cells),
-            covered.q[covered.found],
-            draft.add_phi(covered.phi[covered.found]),
-            covered.branch[covered.found],
-            covered.clearance[covered.found],
-        )
-        proven = which[covered.proven]
-        draft.proven[tuple(part[proven] for part in cells)] = True
-        draft.resolution = max(draft.resolution, FINEST, float(covered.left.max(initial=0.0)))
-        return covered
-
-    def _decide_covered(
-        self,
-        draft: MapDraft,
-        which: np.ndarray,
-        covered: CoverResult,
-        inputs: search.SearchInput,
-        batch: Batch,
-        cells: tuple[np.ndarray, ...],
-    ) -> Iterator[None]:
-        """Let PyBullet check what the search of all of the redundancy left open; pause after every cell."""
-        for k in np.flatnonzero(~covered.found & (covered.undecided_count > 0)):
-            cell = tuple(int(part[which[k]]) for part in cells)
-            if draft.reason[cell] == Reason.FEASIBLE:
-                continue
-            T = inputs.T_base_tool[which[k]]
-            phi, branch = _asked(covered, int(k))
-            ik = batch.compiled.at(phi)
-            s = ik.solve(T)
-            these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
-            listed = [(s.q[j], int(s.sample[j]), int(s.branch[j])) for j in these]
-            self._open.decide(draft, cell, T, ik, listed, phi)
-            yield
 
     def _undecided(
         self, found: search.SearchResult, i: int, T_base_tool: Array, batch: Batch
@@ -500,19 +397,6 @@ class ExactEngine:
             return [(found.undecided_q[i, j], int(sample[j]), int(branch[j])) for j in range(count)]
         s = batch.ik.solve(T_base_tool)
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
-
-
-def _asked(covered: CoverResult, k: int) -> tuple[Array, np.ndarray]:
-    """Return the redundancy (rad) and the branch of the candidates of cell k that PyBullet decides."""
-    count = min(int(covered.undecided_count[k]), OPEN_KEPT)
-    phi, branch = covered.undecided_phi[k, :count], covered.undecided_branch[k, :count]
-    overlaps = covered.overlaps[k, :count]
-    asked, some = np.flatnonzero(~overlaps), np.flatnonzero(overlaps)
-    if len(some) > MOST_OVERLAPPING:  # evenly
-        some = some[np.lexsort((phi[some], branch[some]))]
-        some = some[np.linspace(0, len(some) - 1, MOST_OVERLAPPING).astype(int)]
-    these = np.sort(np.concatenate([asked, some]))
-    return phi[these], branch[these]
 
 
 def _tell_again(progress: Progress, share: float, _: float) -> None:

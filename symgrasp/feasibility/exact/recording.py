@@ -7,11 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.engine import search
+from symgrasp.engine.redundancy.cover import FINEST
+from symgrasp.engine.redundancy.cover_types import CoverResult
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.reason import Reason
 from symgrasp.world import Collision
 
-__all__ = ["FixedBodies", "PieceBodies", "record_search"]
+__all__ = ["FixedBodies", "PieceBodies", "record_cover", "record_search"]
 
 
 class FixedBodies(NamedTuple):
@@ -73,3 +75,17 @@ def record_search(
     if fixed.collision is not None:
         for cell in zip(*those(hit), strict=True):
             draft.record_failure(cell, fixed.collision.reason, fixed.collision)
+
+
+def record_cover(draft: MapDraft, covered: CoverResult, cells: tuple[np.ndarray, ...]) -> None:
+    """Write what the search of all of the redundancy found for cells: rolls, rows and columns, (c,) each."""
+    free = covered.found
+    draft.record_feasible(
+        tuple(part[free] for part in cells),
+        covered.q[free],
+        draft.add_phi(covered.phi[free]),
+        covered.branch[free],
+        covered.clearance[free],
+    )
+    draft.proven[tuple(part[covered.proven] for part in cells)] = True
+    draft.resolution = max(draft.resolution, FINEST, float(covered.left.max(initial=0.0)))

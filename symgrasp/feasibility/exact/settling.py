@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from symgrasp.engine.windows import FINEST, STEP
+from symgrasp.engine.redundancy.windows import FINEST, STEP
 from symgrasp.feasibility.cell import Window
 
 __all__ = ["settled"]

@@ -1,7 +1,7 @@
 """The search that covers the redundancy φ of infeasible cells: it steps over nothing that is free. Compiled.
 
 The range of φ is divided into parts, and a part is halved until every branch is excluded on it (see
-`symgrasp.engine.exclusion`), or it is narrower than `FINEST`.
+`symgrasp.engine.redundancy.exclusion`), or it is narrower than `FINEST`.
 
 By how much curves bend is bounded by what is usual for arms, not by a proof: so an infeasible cell is
 infeasible to the resolution of the parts that were left. What does not depend on φ is proven: a hand that
@@ -19,30 +19,22 @@ import numpy as np
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, is_compiled, njit
-from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED, check_arm
-from symgrasp.engine.cover_types import OPEN_KEPT, CoverInput, CoverResult, Nodes, new_nodes
-from symgrasp.engine.exclusion import (
+from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm
+from symgrasp.engine.kinematics import MovingPieces, Scratch, place_hand
+from symgrasp.engine.reach import beyond_reach
+from symgrasp.engine.redundancy.candidates import arm_gap, find_branches, is_to_check, retreat_gap
+from symgrasp.engine.redundancy.cover_types import OPEN_KEPT, CoverInput, CoverResult, Nodes, new_nodes
+from symgrasp.engine.redundancy.exclusion import (
     EXCLUDED,
-    FALLS,
     FIRM,
-    GONE,
-    HITS,
-    OUTSIDE,
-    SKIPPED,
     SOFT,
-    STUCK,
     UNSURE,
-    copy_pose,
     what_is_known,
 )
-from symgrasp.engine.kinematics import MovingPieces, Scratch, place_arm, place_hand
-from symgrasp.engine.reach import beyond_reach
-from symgrasp.engine.retreat_search import arm_retreats, copy_row, tool_clearance, tool_retreats
+from symgrasp.engine.retreat_search import copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
     FEASIBLE,
-    RETREAT_UNDECIDED,
     Balance,
     BranchScratch,
     RowChecks,
@@ -51,7 +43,7 @@ from symgrasp.engine.search_types import (
 )
 from symgrasp.engine.threads import in_parallel
 from symgrasp.ik.at_phi import geometry_at
-from symgrasp.ik.branches import branch_count, branches_at
+from symgrasp.ik.branches import branch_count
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.spherical import reach_cosine
 from symgrasp.ik.vectors import STRICT
@@ -254,49 +246,20 @@ def _visit(
         Whether one is free; it is then in the result.
     """
     i, T, row, hand, tool = those
-    q, exists, inside = branches.q[0], branches.exists[0], branches.inside[0]
     result.visited[i] += 1
-    nodes.phi[at] = phi
-    geometry_at(covered.locked, phi, nodes.chain.geometry[0])
-    branches_at(nodes.chain, 0, T, False, q, exists, inside, branches.memory)
-    falls = len(balance.edges) > 0
-    for b in range(len(exists)):
-        nodes.missing[at, b] = branches.memory.missing[b]
-    for b in range(len(exists)):
-        nodes.state[at, b] = GONE
-        if not exists[b]:
+    find_branches(nodes, branches, covered.locked, T, at, phi)
+    for b in range(len(branches.exists[0])):
+        if not is_to_check(nodes, branches, at, b):
             continue
-        copy_row(q[b], nodes.q[at, b])  # of excluded ones, too: they may be where another's curve ends
-        if nodes.excluded[at, b]:
-            nodes.state[at, b] = SKIPPED
-            continue
-        nodes.state[at, b] = OUTSIDE
-        if not inside[b]:
-            continue
-        place_arm(moving, pieces, scratch, q[b])
-        if falls and not stands(balance, scratch.frames, inputs.T_world_base, T, row, True):
-            nodes.state[at, b] = FALLS
-            continue
-        gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, -math.inf, HIT_BAND)
+        gap = arm_gap(nodes, scratch, branches, moving, pieces, tree, inputs, balance, T, row, hand, at, b)
         if gap == -math.inf:
-            nodes.state[at, b] = HITS
-            for side in range(2):
-                piece = scratch.hit[side]
-                nodes.pair[at, b, side] = piece
-                copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
-            nodes.depth[at, b], nodes.level[at, b] = -1.0, 0
             continue
         overlaps = gap == UNDECIDED and _overlaps(moving, pieces, tree, scratch, inputs, hand)
-        if gap != UNDECIDED and len(inputs.retreat):
-            furthest = arm_retreats(
-                nodes.chain, moving, pieces, tree, scratch, branches, inputs, balance, run, T, 0, b, tool
-            )
-            place_hand(moving, pieces, scratch, inputs.T_world_base, T, row)
-            if furthest == BLOCKED:
-                nodes.state[at, b] = STUCK
-                continue
-            if furthest == RETREAT_UNDECIDED:
-                gap = UNDECIDED
+        gap = retreat_gap(
+            nodes, scratch, branches, moving, pieces, tree, inputs, balance, run, T, row, tool, gap, at, b
+        )
+        if gap == -math.inf:
+            continue
         if gap == UNDECIDED:
             nodes.state[at, b] = UNSURE
             kept = result.undecided_count[i]
@@ -307,7 +270,7 @@ def _visit(
             continue
         result.found[i], result.phi[i], result.branch[i] = True, phi, b
         result.clearance[i] = max(0.0, gap - FREE_BAND)
-        copy_row(q[b], result.q[i])
+        copy_row(branches.q[0][b], result.q[i])
         return True
     return False
 

@@ -1,7 +1,8 @@
 """The windows of cells: all intervals of the redundancy φ on which a branch is free. Compiled.
 
-The range of φ is halved as by `symgrasp.engine.cover`, which stops at the first free configuration. Here
-every part is halved until each branch is excluded on it, is free all along it, or the part is narrow enough.
+The range of φ is halved as by `symgrasp.engine.redundancy.cover`, which stops at the first free
+configuration. Here every part is halved until each branch is excluded on it, is free all along it, or it is
+narrow enough.
 
 A branch that is free at both ends of a part is so all along it where no piece moves further in between than
 the clearances at both ends allow, no joint can pass a limit, and no other branch is near with which it could
@@ -21,34 +22,29 @@ import numpy as np
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import HIT_BAND, UNDECIDED, check_arm
-from symgrasp.engine.cover import COARSE, FINEST, MEDIUM
-from symgrasp.engine.cover_types import CoverInput, Nodes, new_nodes
-from symgrasp.engine.exclusion import (
+from symgrasp.engine.checks import UNDECIDED
+from symgrasp.engine.kinematics import MovingPieces, Scratch, place_hand
+from symgrasp.engine.redundancy.candidates import arm_gap, find_branches, is_to_check, retreat_gap
+from symgrasp.engine.redundancy.cover import COARSE, FINEST, MEDIUM
+from symgrasp.engine.redundancy.cover_types import CoverInput, Nodes, new_nodes
+from symgrasp.engine.redundancy.exclusion import (
     BEND,
     EXCLUDED,
-    FALLS,
     FIRM,
     GONE,
-    HITS,
     LEAST_BEND,
-    OUTSIDE,
     SAGITTA,
     SAME_CURVE,
     SKIPPED,
     SOFT,
-    STUCK,
     UNSURE,
     copy_pose,
     what_is_known,
 )
-from symgrasp.engine.kinematics import MovingPieces, Scratch, place_arm, place_hand
-from symgrasp.engine.retreat_search import arm_retreats, copy_row, tool_clearance, tool_retreats
+from symgrasp.engine.retreat_search import copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
     FEASIBLE,
-    RETREAT_UNDECIDED,
     Balance,
     BranchScratch,
     RowChecks,
@@ -56,8 +52,7 @@ from symgrasp.engine.search_types import (
     new_branches,
 )
 from symgrasp.engine.threads import in_parallel
-from symgrasp.ik.at_phi import geometry_at
-from symgrasp.ik.branches import branch_count, branches_at
+from symgrasp.ik.branches import branch_count
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
@@ -143,7 +138,7 @@ def windows(
     covered: CoverInput,
     joints: int,
 ) -> WindowResult:
-    """Find the windows of some cells, on all cores; see `symgrasp.engine.cover.cover` for the arguments."""
+    """Find the windows of some cells, on all cores; see `cover` for the arguments."""
     c = len(covered.cells)
     result = WindowResult(
         found=np.zeros(c, dtype=np.int64),
@@ -402,52 +397,23 @@ def _visit(
             of the retreat of its hand.
     """
     i, T, row, tool = those
-    q, exists, inside = branches.q[0], branches.exists[0], branches.inside[0]
-    nodes.phi[at] = phi
-    geometry_at(locked, phi, nodes.chain.geometry[0])
-    branches_at(nodes.chain, 0, T, False, q, exists, inside, branches.memory)
-    falls = len(balance.edges) > 0
-    for b in range(len(exists)):
-        nodes.missing[at, b] = branches.memory.missing[b]
-    for b in range(len(exists)):
-        nodes.state[at, b] = GONE
-        if not exists[b]:
-            continue
-        copy_row(q[b], nodes.q[at, b])  # of excluded ones, too: they may be where another's curve ends
-        if nodes.excluded[at, b]:
-            nodes.state[at, b] = SKIPPED
+    find_branches(nodes, branches, locked, T, at, phi)
+    for b in range(len(branches.exists[0])):
+        if not is_to_check(nodes, branches, at, b):
             continue
         if free.whole[at, b]:
             nodes.state[at, b] = FREE
             continue
-        nodes.state[at, b] = OUTSIDE
-        if not inside[b]:
-            continue
-        place_arm(moving, pieces, scratch, q[b])
-        if falls and not stands(balance, scratch.frames, inputs.T_world_base, T, row, True):
-            nodes.state[at, b] = FALLS
-            continue
-        gap = check_arm(moving, pieces, tree, scratch, inputs.margin, CLEAR, -math.inf, HIT_BAND)
+        gap = arm_gap(nodes, scratch, branches, moving, pieces, tree, inputs, balance, T, row, CLEAR, at, b)
         if gap == -math.inf:
-            nodes.state[at, b] = HITS
-            for side in range(2):
-                piece = scratch.hit[side]
-                nodes.pair[at, b, side] = piece
-                copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
-            nodes.depth[at, b], nodes.level[at, b] = -1.0, 0
             continue
         for k in range(free.place.shape[2]):
             copy_pose(scratch.pose[k], free.place[at, b, k])
-        if gap != UNDECIDED and len(inputs.retreat):
-            furthest = arm_retreats(
-                nodes.chain, moving, pieces, tree, scratch, branches, inputs, balance, run, T, 0, b, tool
-            )
-            place_hand(moving, pieces, scratch, inputs.T_world_base, T, row)
-            if furthest == BLOCKED:
-                nodes.state[at, b] = STUCK
-                continue
-            if furthest == RETREAT_UNDECIDED:
-                gap = UNDECIDED
+        gap = retreat_gap(
+            nodes, scratch, branches, moving, pieces, tree, inputs, balance, run, T, row, tool, gap, at, b
+        )
+        if gap == -math.inf:
+            continue
         if gap == UNDECIDED:
             nodes.state[at, b] = UNSURE
             kept = result.open_count[i]

@@ -80,7 +80,7 @@ class Nodes(NamedTuple):
         chain: the arm, with a geometry (1, m) that is overwritten.
         phi: (SLOTS,) the values (rad).
         q: (SLOTS, B, n) joint values.
-        state: (SLOTS, B) what is the matter with a branch, see `symgrasp.engine.cover`.
+        state: (SLOTS, B) what is the matter with a branch, see `symgrasp.engine.redundancy.cover`.
         missing: (SLOTS, B) see `symgrasp.ik.branches.Memory`.
         pair: (SLOTS, B, 2) the pieces of which the first hits the second.
         pose: (SLOTS, B, 2, 12) their poses.

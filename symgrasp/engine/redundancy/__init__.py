@@ -1,0 +1,1 @@
+"""The redundancy of an arm, searched everywhere between its samples."""

@@ -1,0 +1,91 @@
+"""The candidates of a cell at one value of the redundancy φ, checked and written into a slot. Compiled."""
+
+from __future__ import annotations
+
+import math
+
+from symgrasp.compiling import njit
+from symgrasp.engine.balance import stands
+from symgrasp.engine.checks import HIT_BAND, UNDECIDED, check_arm
+from symgrasp.engine.kinematics import place_arm, place_hand
+from symgrasp.engine.redundancy.exclusion import FALLS, GONE, HITS, OUTSIDE, SKIPPED, STUCK, copy_pose
+from symgrasp.engine.retreat_search import arm_retreats, copy_row
+from symgrasp.engine.search_types import BLOCKED, RETREAT_UNDECIDED
+from symgrasp.ik.at_phi import geometry_at
+from symgrasp.ik.branches import branches_at
+from symgrasp.ik.vectors import STRICT
+
+__all__ = ["arm_gap", "find_branches", "is_to_check", "retreat_gap"]
+
+
+@njit(**STRICT)
+def find_branches(nodes, branches, locked, T, at, phi):
+    """Find the branches that reach a pose (4, 4) at a value of φ (rad), and begin slot ``at`` with them."""
+    nodes.phi[at] = phi
+    geometry_at(locked, phi, nodes.chain.geometry[0])
+    branches_at(
+        nodes.chain, 0, T, False, branches.q[0], branches.exists[0], branches.inside[0], branches.memory
+    )
+    for b in range(len(branches.exists[0])):
+        nodes.missing[at, b] = branches.memory.missing[b]
+
+
+@njit(**STRICT)
+def is_to_check(nodes, branches, at, b):
+    """Whether a branch is neither gone nor excluded; its joint values are written down if it is there."""
+    nodes.state[at, b] = GONE
+    if not branches.exists[0][b]:
+        return False
+    # Of excluded ones, too: they may be where another's curve ends.
+    copy_row(branches.q[0][b], nodes.q[at, b])
+    nodes.state[at, b] = SKIPPED
+    return not nodes.excluded[at, b]
+
+
+@njit(**STRICT)
+def arm_gap(nodes, scratch, branches, moving, pieces, tree, inputs, balance, T, row, most, at, b):
+    """Place an arm and return its clearance (m), at most ``most``.
+
+    `UNDECIDED` where only PyBullet can tell; -inf where it is not free, and the slot says why.
+    """
+    nodes.state[at, b] = OUTSIDE
+    if not branches.inside[0][b]:
+        return -math.inf
+    place_arm(moving, pieces, scratch, branches.q[0][b])
+    if len(balance.edges) > 0 and not stands(balance, scratch.frames, inputs.T_world_base, T, row, True):
+        nodes.state[at, b] = FALLS
+        return -math.inf
+    gap = check_arm(moving, pieces, tree, scratch, inputs.margin, most, -math.inf, HIT_BAND)
+    if gap == -math.inf:
+        nodes.state[at, b] = HITS
+        for side in range(2):
+            piece = scratch.hit[side]
+            nodes.pair[at, b, side] = piece
+            copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
+        nodes.depth[at, b], nodes.level[at, b] = -1.0, 0
+    return gap
+
+
+@njit(**STRICT)
+def retreat_gap(
+    nodes, scratch, branches, moving, pieces, tree, inputs, balance, run, T, row, tool, gap, at, b
+):
+    """Return the clearance (m) of an arm that may have to retreat; -inf where that is blocked.
+
+    Args:
+        run: index of the cell's run.
+        T, row: its tool pose (4, 4) and row.
+        tool: what `tool_retreats` says of the retreat of its hand.
+        gap: the clearance before, or `UNDECIDED`, which it stays.
+        at, b: the slot and the branch.
+    """
+    if gap == UNDECIDED or len(inputs.retreat) == 0:
+        return gap
+    furthest = arm_retreats(
+        nodes.chain, moving, pieces, tree, scratch, branches, inputs, balance, run, T, 0, b, tool
+    )
+    place_hand(moving, pieces, scratch, inputs.T_world_base, T, row)
+    if furthest == BLOCKED:
+        nodes.state[at, b] = STUCK
+        return -math.inf
+    return UNDECIDED if furthest == RETREAT_UNDECIDED else gap

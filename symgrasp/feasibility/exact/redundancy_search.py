@@ -1,0 +1,176 @@
+"""The search of all of an arm's redundancy: for cells at whose samples nothing is free, and for windows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property, partial
+
+import numpy as np
+
+from symgrasp.collision.inner_pieces import inner_pieces
+from symgrasp.collision.pieces import PackedPieces, pose_rows
+from symgrasp.engine import search
+from symgrasp.engine.geometry import ArmGeometry
+from symgrasp.engine.kinematics import Scratch
+from symgrasp.engine.reach import Reach, reach_of
+from symgrasp.engine.redundancy.cover import cover
+from symgrasp.engine.redundancy.cover_types import OPEN_KEPT, CoverInput, CoverResult
+from symgrasp.engine.redundancy.windows import MOST_OPEN, windows
+from symgrasp.feasibility.cell import Window
+from symgrasp.feasibility.exact.batches import Batch
+from symgrasp.feasibility.exact.open_candidates import OpenCandidates
+from symgrasp.feasibility.exact.settling import settled
+from symgrasp.feasibility.map_draft import MapDraft
+from symgrasp.ik.at_phi import Locked
+from symgrasp.poses import Array
+from symgrasp.reason import Reason
+from symgrasp.robot.robot import Arm
+
+__all__ = ["RedundancySearch"]
+
+PARTS = 8
+"""Equal parts of the range of the redundancy with which the search begins."""
+
+MOST_OVERLAPPING = 32
+"""Candidates of a cell at most that PyBullet is asked for between the samples although their pieces overlap,
+by so little that it may call them free. There are hundreds where a link all but touches a body all along."""
+
+
+class RedundancySearch:
+    """Searches all of the redundancy of one arm.
+
+    Args:
+        arm: the arm.
+        geometry: its pieces.
+        open_candidates: what PyBullet decides.
+    """
+
+    def __init__(self, arm: Arm, geometry: ArmGeometry, open_candidates: OpenCandidates) -> None:
+        self._arm, self._geometry, self._open = arm, geometry, open_candidates
+
+    @cached_property
+    def _reach(self) -> Reach:
+        return reach_of(self._arm)
+
+    @cached_property
+    def _inner(self) -> tuple[PackedPieces, ...]:
+        return inner_pieces(self._geometry.pieces)
+
+    def cover(
+        self,
+        found: search.SearchResult,
+        which: np.ndarray,
+        locked: Locked,
+        inputs: search.SearchInput,
+        batch: Batch,
+        scratches: Sequence[Scratch],
+    ) -> CoverResult:
+        """Search for free configurations of cells, see `symgrasp.engine.redundancy.cover`.
+
+        Args:
+            found: what the search of samples found.
+            which: (c,) the cells, as indices into those of that search.
+            locked: the joint that is the redundancy.
+            inputs, batch, scratches: of that search.
+        """
+        geometry = self._geometry
+        return cover(
+            batch.compiled.chain,
+            batch.moving,
+            geometry.pieces,
+            geometry.tree,
+            scratches,
+            inputs,
+            geometry.balance,
+            found.rows,
+            self._covered(which, inputs, locked),
+            self._arm.dof,
+        )
+
+    def decide(
+        self,
+        draft: MapDraft,
+        covered: CoverResult,
+        T_base_tool: Array,
+        batch: Batch,
+        cells: tuple[np.ndarray, ...],
+    ) -> Iterator[None]:
+        """Let PyBullet check what `cover` left open; pause after every cell.
+
+        Args:
+            draft: the map, in which it is written.
+            covered: what was found for c cells.
+            T_base_tool: (c, 4, 4) their tool poses.
+            batch: of the search.
+            cells: their rolls, rows and columns, (c,) each.
+        """
+        for k in np.flatnonzero(~covered.found & (covered.undecided_count > 0)):
+            cell = tuple(int(part[k]) for part in cells)
+            if draft.reason[cell] == Reason.FEASIBLE:
+                continue
+            phi, branch = _asked(covered, int(k))
+            ik = batch.compiled.at(phi)
+            s = ik.solve(T_base_tool[k])
+            these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
+            listed = [(s.q[j], int(s.sample[j]), int(s.branch[j])) for j in these]
+            self._open.decide(draft, cell, T_base_tool[k], ik, listed, phi)
+            yield
+
+    def windows(
+        self,
+        inputs: search.SearchInput,
+        batch: Batch,
+        locked: Locked,
+        scratches: Sequence[Scratch],
+        *,
+        settle: bool,
+    ) -> Iterator[tuple[Window, ...]]:
+        """Yield the windows of cells, see `symgrasp.engine.redundancy.windows`.
+
+        Args:
+            inputs: the cells, each a run of its own.
+            batch: their inverse kinematics and pieces.
+            locked: the joint that is the redundancy.
+            scratches: of the threads.
+            settle: whether PyBullet decides what pieces that all but touch leave open, at the ends of
+                windows; else only where nothing else is free.
+        """
+        geometry, tools = self._geometry, inputs.T_base_tool
+        parts = batch.compiled.chain, batch.moving, geometry.pieces, geometry.tree, scratches, inputs
+        rows = search.search(*parts, geometry.balance, self._arm.dof).rows
+        covered = self._covered(np.arange(len(tools)), inputs, locked)
+        own = windows(*parts, geometry.balance, rows, covered, self._arm.dof)
+        for k in range(len(tools)):
+            n, m = int(own.found[k]), min(int(own.open_count[k]), MOST_OPEN)
+            columns = own.branch[k, :n], *own.ends[k, :n].T, own.whole[k, :n]
+            listed = [Window(*row) for row in zip(*(c.tolist() for c in columns), strict=True)]
+            if settle or not listed:
+                left = zip(own.open_branch[k, :m].tolist(), own.open_phi[k, :m].tolist(), strict=True)
+                is_free = partial(self._is_free, batch, tools[k], int(inputs.row[k]))
+                yield settled(listed, list(left), is_free, (locked.lower, locked.upper))
+            else:
+                yield tuple(sorted(listed))
+
+    def _covered(self, which: np.ndarray, inputs: search.SearchInput, locked: Locked) -> CoverInput:
+        tools = pose_rows(inputs.T_base_tool[which])
+        return CoverInput(which, tools, self._reach, locked, self._inner, PARTS)
+
+    def _is_free(self, batch: Batch, T_base_tool: Array, row: int, branch: int, phi: float) -> bool:
+        """Whether a branch is free at a value of φ (rad), as PyBullet says."""
+        ik = batch.compiled.at(np.array([phi]))
+        s = ik.solve(T_base_tool)
+        these = np.flatnonzero((s.branch == branch) & s.inside)
+        return any(self._open.is_free(T_base_tool, row, ik, s.q[j], int(s.sample[j])) for j in these)
+
+
+def _asked(covered: CoverResult, k: int) -> tuple[Array, np.ndarray]:
+    """Return the redundancy (rad) and the branch of the candidates of cell k that PyBullet decides."""
+    count = min(int(covered.undecided_count[k]), OPEN_KEPT)
+    phi, branch = covered.undecided_phi[k, :count], covered.undecided_branch[k, :count]
+    overlaps = covered.overlaps[k, :count]
+    asked, some = np.flatnonzero(~overlaps), np.flatnonzero(overlaps)
+    if len(some) > MOST_OVERLAPPING:  # evenly
+        some = some[np.lexsort((phi[some], branch[some]))]
+        some = some[np.linspace(0, len(some) - 1, MOST_OVERLAPPING).astype(int)]
+    these = np.sort(np.concatenate([asked, some]))
+    return phi[these], branch[these]
