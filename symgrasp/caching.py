@@ -19,14 +19,14 @@ from symgrasp.files import write_atomically
 __all__ = ["cache_folder", "kept", "make_folder"]
 
 SOURCES = (
-    "collision/*.py",
-    "descriptions/*.py",
+    "collision/**/*.py",
+    "descriptions/**/*.py",
     "engine/clearance_bound.py",
     "engine/kinematics.py",
-    "meshes/*.py",
+    "meshes/**/*.py",
     "poses.py",
-    "robot/*.py",
-    "world/*.py",
+    "robot/**/*.py",
+    "world/**/*.py",
 )
 """Files of this package with what is computed, and with what it is computed from."""
 

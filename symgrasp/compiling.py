@@ -31,17 +31,16 @@ from symgrasp.caching import cache_folder, make_folder
 __all__ = ["COMPILING_MESSAGE", "ENTRY", "SOURCES", "interpreted", "is_compiled", "njit", "notify_on_compile"]
 
 SOURCES = (
-    "collision/*.py",
+    "collision/**/*.py",
     "compiling.py",
-    "engine/*.py",
+    "engine/**/*.py",
     "feasibility/margins.py",
-    "ik/*.py",
-    "ik/pair/*.py",
+    "ik/**/*.py",
     "motion/bodies/linkage.py",
     "motion/paths/proof.py",
     "motion/paths/trees.py",
     "object/manifold.py",
-    "planners/*.py",
+    "planners/**/*.py",
     "robot/limits.py",
 )
 """Files of this package that hold compiled functions, or constants that are compiled into them."""
