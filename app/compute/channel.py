@@ -67,6 +67,7 @@ class ComputedMap:
 
     map: FeasibilityMap
     contacts: tuple[str, ...]
+    preliminary: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,7 +77,7 @@ class ComputeProcess:
         keep: called with every computed map.
         compiling: called when the process begins to compile code.
         waiting: called while others have to compute first.
-        preliminary: called with a coarse map that is to be shown until the exact one is computed.
+        preliminary: called with a map that is to be shown until the exact one is computed.
         part: called with what a survey has found so far.
         background: whether it computes only while nobody else does.
     """
@@ -343,10 +343,8 @@ class ComputeProcess:
 
     def _receive_map(self, computed: ComputedMap) -> None:
         request = self._requests.get((computed.map.task, computed.map.arm))
-        if computed.map.preliminary:
-            if request:
-                self._preliminary(MapResult(request, computed.map, computed.contacts))
-            return
-        self._computed.append(computed)
         if request:
-            self._keep(MapResult(request, computed.map, computed.contacts))
+            show = self._preliminary if computed.preliminary else self._keep
+            show(MapResult(request, computed.map, computed.contacts, computed.preliminary))
+        if not computed.preliminary:
+            self._computed.append(computed)

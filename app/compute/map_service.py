@@ -57,24 +57,35 @@ class MapService:
             self._maker.world.close()
             self._maker = None
 
-    def map(self, request: MapRequest, progress: Progress) -> MapResult:
-        """Compute a map."""
+    def map(
+        self,
+        request: MapRequest,
+        progress: Progress,
+        preliminary: Callable[[MapResult], None] | None = None,
+    ) -> MapResult:
+        """Compute a map.
+
+        Args:
+            request: which map.
+            progress: called with the finished share; may raise `Cancelled`.
+            preliminary: called with maps to look at meanwhile: a coarse one if code has to be compiled first,
+                and what samples of the redundancy show where all of it is searched.
+        """
         maker = self._maker_for(request.scene, progress)
         contacts = _contacts(maker.world, request)
-        the_map = maker.map(request.arm, request.moved_task(), progress=progress)
+        task, arm = request.moved_task(), request.scene.arm(request.arm)
+
+        def show(found: FeasibilityMap | None) -> None:
+            if preliminary and found:
+                preliminary(MapResult(request, found, contacts, preliminary=True).renamed(request))
+
+        if preliminary and not is_map_compiled(request.scene, arm):
+            show(coarse_map(maker.world, arm, task, progress))
+        sampled = show if preliminary else None
+        the_map = maker.map(request.arm, task, progress=progress, sampled=sampled)
         result = MapResult(request, the_map, contacts).renamed(request)
         self._on_map(result)
         return result
-
-    def coarse(self, request: MapRequest, progress: Progress) -> MapResult | None:
-        """Compute a preliminary map while the exact one needs code to be compiled first; else None."""
-        arm = request.scene.arm(request.arm)
-        if is_map_compiled(request.scene, arm):
-            return None
-        world = self._maker_for(request.scene, progress).world
-        contacts = _contacts(world, request)
-        found = coarse_map(world, arm, request.moved_task(), progress)
-        return found and MapResult(request, found, contacts).renamed(request)
 
     def maps(self, requests: Sequence[MapRequest], cached: Maps, progress: Progress) -> tuple[Maps, Progress]:
         """Compute the maps that are not cached.

@@ -20,7 +20,7 @@ from symgrasp.engine.threads import use_cores
 from symgrasp.errors import Cancelled, SymgraspError
 from symgrasp.progress import Progress
 
-from ..state.requests import MapRequest
+from ..state.requests import MapRequest, MapResult
 from .channel import Call, Cancel, Channel, Compiling, ComputedMap, Failure, Part, ProgressReport, Result
 from .limits import limit_memory, ran_out_of_memory
 from .map_service import MapService
@@ -70,7 +70,7 @@ class _Server:
     def __init__(self, channel: Channel, folders: tuple[Path, ...]) -> None:
         self._channel = channel
         self._job_id, self._reported = 0, 0.0
-        self._maps = MapService(lambda result: channel.send(ComputedMap(result.map, result.contacts)))
+        self._maps = MapService(self._send_map)
         plans, uploads = PlanService(self._maps, folders), UploadService(folders)
         self._methods: dict[str, Callable[..., Any]] = {
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
@@ -109,10 +109,10 @@ class _Server:
             return Failure(_portable(error))
 
     def _map(self, request: MapRequest, progress: Progress) -> None:
-        coarse = self._maps.coarse(request, progress)
-        if coarse:
-            self._channel.send(ComputedMap(coarse.map, coarse.contacts))
-        self._maps.map(request, progress)  # it is sent as a ComputedMap
+        self._maps.map(request, progress, self._send_map)  # it is sent as a ComputedMap, as the others are
+
+    def _send_map(self, result: MapResult) -> None:
+        self._channel.send(ComputedMap(result.map, result.contacts, result.preliminary))
 
     def _progress(self, share: float) -> None:
         while self._channel.poll():

@@ -99,7 +99,8 @@ def status_html(state: State) -> str:
         if state.busy.compiling:
             doing = "Compiling, once on this machine: half a minute …"
             if state.is_preliminary:
-                doing = "Compiling once; this map is coarse …"
+                coarse = state.result is not None and state.result.map.preliminary
+                doing = f"Compiling once; this map is {'coarse' if coarse else 'preliminary'} …"
         elif state.busy.waiting:
             doing = f"{state.busy.label} … when other browsers have had their turn"
     elif state.is_stopped:

@@ -46,7 +46,7 @@ def map_picture(state: State, kind: str) -> bytes:
         InputError: there is no map for the object's pose yet.
     """
     m = state.map
-    if m is None or not state.is_fresh:
+    if m is None or not state.is_current:
         raise InputError("page", "map", "none for this pose yet", "a computed map")
     colored = _with_prints(colored_map(m, state.map_view.roll, state.map_view.color_by), state)
     roll = "either roll" if state.map_view.roll is RollChoice.EITHER else f"roll {state.map_view.roll.value}"

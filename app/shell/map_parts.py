@@ -219,8 +219,9 @@ def _plan(state: State) -> dict[str, Any]:
 
 def _age(state: State) -> str:
     """Say what keeps the map that is shown from being that of the pose; nothing where it is."""
-    if state.is_preliminary:
-        return "coarse and preliminary"
+    if state.result and state.is_preliminary:
+        known = state.result.map
+        return "coarse and preliminary" if known.preliminary else f"preliminary, {len(known.phi)} samples"
     return "of an earlier pose" if state.result and not state.is_fresh else ""
 
 

@@ -78,17 +78,25 @@ def waiting(state: State, job_id: int) -> State:
 
 def map_arrived(state: State, job_id: int, result: MapResult) -> State:
     """Show a computed map if it is for the object's pose, or for an earlier pose of the same drag."""
-    awaited = is_awaited(state, job_id)
-    after = replace(state, busy=None) if awaited else state
-    follows = awaited and not state.is_current and result.request.differs_only_in_pose(state.request)
-    if result.request != state.request and not follows:
+    after = replace(state, busy=None) if is_awaited(state, job_id) else state
+    if result.request != state.request and not _follows(state, result, is_awaited(state, job_id)):
         return after
     return replace(after, result=result, refused=None)
 
 
 def preliminary_arrived(state: State, result: MapResult) -> State:
-    """Show a coarse map for the object's pose until the exact one arrives."""
-    return state if state.is_current or result.request != state.request else replace(state, result=result)
+    """Show a preliminary map until the exact one arrives: for the object's pose, or one before in a drag."""
+    busy = state.busy
+    awaited = False
+    if busy is not None and busy.request == result.request:
+        awaited, state = True, replace(state, busy=replace(busy, seen=True))
+    shown = result.request == state.request or _follows(state, result, awaited)
+    return replace(state, result=result) if shown and not state.is_current else state
+
+
+def _follows(state: State, result: MapResult, awaited: bool) -> bool:
+    """Return whether a map is of an earlier pose of a drag that goes on."""
+    return awaited and not state.is_current and result.request.differs_only_in_pose(state.request)
 
 
 def result_arrived(

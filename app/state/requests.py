@@ -101,18 +101,21 @@ class MapResult:
         request: what it answers.
         map: the map.
         contacts: a phrase for each obstacle that the object is inside of at that pose.
+        preliminary: whether the map is to be looked at only until the exact one is computed: it is a coarse
+            one, or samples of the redundancy were searched where all of it is to be.
     """
 
     request: MapRequest
     map: FeasibilityMap
     contacts: tuple[str, ...] = ()
+    preliminary: bool = False
 
     def renamed(self, request: MapRequest) -> MapResult:
         """Return it as the answer to a request with the same key, with that scene's and task's names."""
         names = (request.scene.name, request.task)
         same = names == (self.map.scene, self.map.task)
         named = self.map if same else replace(self.map, scene=names[0], task=names[1])
-        return MapResult(request, named, self.contacts)
+        return MapResult(request, named, self.contacts, self.preliminary)
 
 
 Maps = dict[tuple[str, str], MapResult]
@@ -239,6 +242,7 @@ class Busy:
         late: whether it takes so long that the page shows it and newer requests interrupt it.
         compiling: whether code has to be compiled for it.
         waiting: whether computations of others go first.
+        seen: whether a preliminary result of it was shown.
     """
 
     job_id: int
@@ -248,16 +252,17 @@ class Busy:
     late: bool = False
     compiling: bool = False
     waiting: bool = False
+    seen: bool = False
 
     def goes_before(self, request: Request) -> bool:
         """Return whether a request waits for this computation instead of taking its place.
 
-        A map that computes quickly is finished even if the object has been moved since; if every
-        movement interrupted it, no map would be shown until a drag ends.
+        A map that computes quickly is finished, or a preliminary one of it shown, even if the object has been
+        moved since; if every movement interrupted it, no map would be shown until a drag ends.
         """
         if self.request is None or self.request == request:
             return True
-        return not self.late and self.request.differs_only_in_pose(request)
+        return not (self.late or self.seen) and self.request.differs_only_in_pose(request)
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,8 +194,8 @@ class State:
 
     @property
     def is_preliminary(self) -> bool:
-        """Whether the newest map is a coarse one, shown until the exact one is computed."""
-        return self.result is not None and self.result.map.preliminary
+        """Whether the newest map is shown only until the exact one is computed."""
+        return self.result is not None and self.result.preliminary
 
     @property
     def missing_request(self) -> Request | None:
@@ -233,9 +233,9 @@ class State:
     @property
     def is_fresh(self) -> bool:
         """Whether the newest map is for the object's pose, or a quick computation will replace it."""
-        if self.is_current or self.is_preliminary:
+        if self.is_current or self.result is None or self.result.map.preliminary:
             return self.is_current
-        follows = self.result is not None and self.result.request.differs_only_in_pose(self.request)
+        follows = self.result.request.differs_only_in_pose(self.request)
         return follows and self.busy is not None and not self.is_waiting
 
     # -- surveys ----------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
@@ -62,11 +62,13 @@ class MapMaker:
         progress: Progress | None = None,
         certify: bool | None = None,
         only: np.ndarray | None = None,
+        sampled: Callable[[FeasibilityMap], None] | None = None,
     ) -> FeasibilityMap:
         """Compute a map; see `create_map`. The task need not be one of the scene's.
 
         Of some cells alone if ``only`` (R, H, A) is given: the others are then neither feasible nor proven,
-        unless Algorithm 1 computes the map, which does all.
+        unless Algorithm 1 computes the map, which does all. Where all of an arm's redundancy is searched, and
+        it is on no torso, ``sampled`` is called with the map that samples show: what is feasible on it is so.
         """
         the_arm, the_task = self._chosen(arm, task)
         grid = manifold or self.scene.manifold
@@ -77,7 +79,7 @@ class MapMaker:
                 the_arm.name, the_task, manifold=grid, progress=progress, certify=certify, only=only
             )
             return merged(maps)
-        return self._map(the_arm, None, the_task, grid, progress, certify=certify, only=only)
+        return self._map(the_arm, None, the_task, grid, progress, certify=certify, only=only, sampled=sampled)
 
     def maps_by_torso(
         self,
@@ -131,6 +133,7 @@ class MapMaker:
         pitch: float | None = None,
         certify: bool | None = None,
         only: np.ndarray | None = None,
+        sampled: Callable[[FeasibilityMap], None] | None = None,
     ) -> FeasibilityMap:
         """Compute the map of an arm without a torso, or with its torso at a sample."""
         if progress:
@@ -148,7 +151,7 @@ class MapMaker:
         splits = certify and not arm.pitched and not settings.approach
         finer = settings.finer(grid) if splits else []
         tell = part_of(progress, 0, 1 + len(finer))
-        found = engine.map(task, grid, tell, pitch, certify, only)
+        found = engine.map(task, grid, tell, pitch, certify, only, sampled)
         if not splits:
             return found
 

@@ -108,23 +108,23 @@ class MapDraft:
             self._depth[cell] = collision.depth
 
     def finish(self, scene: str, task: Task) -> FeasibilityMap:
-        """Return the map of a task in a scene of that name."""
+        """Return the map of a task in a scene of that name; what is recorded later does not change it."""
         return FeasibilityMap(
             scene=scene,
             arm=self._arm.name,
             task=task.name,
             T_world_object=task.T_world_object,
             manifold=self.manifold,
-            reason=self.reason,
-            q=self._q,
-            sample=self._sample,
-            branch=self._branch,
-            clearance=self._clearance,
+            reason=self.reason.copy(),
+            q=self._q.copy(),
+            sample=self._sample.copy(),
+            branch=self._branch.copy(),
+            clearance=self._clearance.copy(),
             phi=self._phi,
             opening=self.opening,
             bodies=tuple(self._bodies),
-            pair=self._pair,
-            depth=self._depth,
+            pair=self._pair.copy(),
+            depth=self._depth.copy(),
             proven=self.proven & (self.reason != Reason.FEASIBLE),
             resolution=self.resolution,
         )

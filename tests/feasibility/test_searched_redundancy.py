@@ -16,7 +16,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
-from symgrasp.scene.format import MOST_SAMPLES
+from symgrasp.scene.format import AUTO_SAMPLES, MOST_SAMPLES
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 from tests.conftest import load_small
@@ -31,6 +31,22 @@ def covered(scene: Scene, samples: int = DENSE) -> tuple[FeasibilityMap, Feasibi
         auto = MapMaker(world).map()
     with open_world(scene.with_settings(redundancy=samples)) as world:
         return auto, MapMaker(world).map()
+
+
+@settings(max_examples=8)
+@given(st.integers(0, 10_000))
+def test_what_samples_show_is_told_before(seed):
+    scene = Scene.from_content(random_scene(seed)).with_settings(redundancy="auto")
+    told: list[FeasibilityMap] = []
+    with open_world(scene) as world:
+        auto = MapMaker(world).map(sampled=told.append)
+    with open_world(scene.with_settings(redundancy=AUTO_SAMPLES)) as world:
+        samples = MapMaker(world).map()
+    before = told[0] if told else auto  # where nothing is left to search
+    assert len(told) <= 1
+    assert np.array_equal(before.feasible, samples.feasible)
+    assert np.array_equal(before.q, samples.q, equal_nan=True)
+    assert not (before.feasible & ~auto.feasible).any()
 
 
 def assert_witnesses(scene: Scene, m: FeasibilityMap) -> None:

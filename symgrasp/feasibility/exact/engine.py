@@ -6,10 +6,10 @@ through the very functions of the reference. So a cell is feasible here exactly 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
+from symgrasp.engine.search_types import RowChecks
 from symgrasp.engine.threads import core_count
 from symgrasp.errors import InputError
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Window
@@ -34,7 +35,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.feasibility.torso_maps import merged
 from symgrasp.ik import GridSolvers, solver_for
-from symgrasp.ik.at_phi import locked_joint
+from symgrasp.ik.at_phi import Locked, locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
@@ -55,6 +56,24 @@ WORTH_A_PART = 256
 
 FIRST_COVERED = 16
 """Cells of which all of the redundancy is searched before progress is told for the first time."""
+
+
+class SampledCells(NamedTuple):
+    """Cells of which samples of the redundancy were searched.
+
+    Attributes:
+        where: rolls, rows and columns of all of them, (m,) each.
+        left: (k,) indices of those of which nothing was found free or proven.
+        batch, inputs, rows: the search of samples, and what it found out about its rows.
+        locked: the joint that is the redundancy.
+    """
+
+    where: tuple[np.ndarray, ...]
+    left: np.ndarray
+    batch: Batch
+    inputs: search.SearchInput
+    rows: RowChecks
+    locked: Locked
 
 
 class ExactEngine:
@@ -109,6 +128,13 @@ class ExactEngine:
         """
         return compiled_parts(solver_for(arm, 1)) is not None and supports(arm)
 
+    @property
+    def _searches_all(self) -> bool:
+        """Whether all of the redundancy is searched after its samples."""
+        if self._settings.redundancy != "auto" or self.arm.pitched:
+            return False
+        return any(locked_joint(own) is not None for own, _ in compiled_parts(self._solvers.at(0, 0)) or ())
+
     def _new_solvers(self, grid: Manifold, pitch: float | None = None) -> GridSolvers:
         arm = self.arm if pitch is None else self.arm.at_pitch(pitch)
         return GridSolvers(arm, grid, lambda own: solver_for(own, self._settings.samples))
@@ -121,6 +147,7 @@ class ExactEngine:
         pitch: float | None = None,
         certify: bool = False,
         only: np.ndarray | None = None,
+        sampled: Callable[[FeasibilityMap], None] | None = None,
     ) -> FeasibilityMap:
         """Compute the map of a task.
 
@@ -131,6 +158,7 @@ class ExactEngine:
             pitch: pitch (rad) at which a pitched arm holds its hand; free if None.
             certify: whether to prove which cells hold as a whole.
             only: (R, H, A) which cells to search; of the others nothing is known then.
+            sampled: called with the map that samples of the redundancy show, if all of it is to be searched.
 
         Raises:
             ValueError: the grid has other heights.
@@ -145,7 +173,12 @@ class ExactEngine:
             for row, misfit in enumerate(self._misfit):
                 if misfit is not None:
                     draft.reason[:, row], draft.proven[:, row] = misfit, True
-            self._search_rows(draft, part, T_base_tool, part_of(progress, part, steps), only)
+            tell = part_of(progress, part, steps)
+            halves = 2 if self._searches_all else 1
+            left = self._search_samples(draft, part, T_base_tool, part_of(tell, 0, halves), only)
+            if left and sampled:
+                sampled(draft.finish(self.world.scene.name, task))
+            self._search_all(draft, left, part_of(tell, 1, 2))
             drafts.append(draft.finish(self.world.scene.name, task))
         found = merged(drafts) if len(drafts) > 1 else drafts[0]
         if certify:
@@ -203,14 +236,14 @@ class ExactEngine:
             copy.pose[objects], copy.box[objects] = self._scratch.pose[objects], self._scratch.box[objects]
         return self._copies[: core_count()]
 
-    def _search_rows(
+    def _search_samples(
         self,
         draft: MapDraft,
         part: int,
         T_base_tool: Array,
         progress: Progress | None,
         only: np.ndarray | None,
-    ) -> None:
+    ) -> list[SampledCells]:
         """Fill the rows at which the hand fits, some at a time so that progress is told often enough.
 
         Args:
@@ -219,17 +252,35 @@ class ExactEngine:
             T_base_tool: (R, H, A, 4, 4) tool poses of all cells.
             progress: called with the finished share; may raise `Cancelled`.
             only: (R, H, A) which cells to search, or all.
+
+        Returns:
+            The cells of which all of the redundancy is to be searched.
         """
         fixed, bodies = self._fixed_bodies(), self._bodies(draft)
         wanted = np.array([misfit is None for misfit in self._misfit])
         rows = np.flatnonzero(wanted if only is None else wanted & only.any(axis=(0, 2)))
+        searched: list[SampledCells] = []
         for these in portions(len(rows), progress):
-            start, done, some = perf_counter(), these.start / len(rows), rows[these]
-            for batch in batches(self._solvers, self._geometry, some, part):
-                tell = None if progress is None else partial(_tell_again, progress, done)
-                for _ in self._search(draft, bodies, batch, T_base_tool, fixed, only, tell):
-                    if progress and perf_counter() - start > TELL:
-                        progress(done)  # PyBullet takes its time: here one may cancel, too
+            for batch in batches(self._solvers, self._geometry, rows[these], part):
+                steps = self._search(draft, bodies, batch, T_base_tool, fixed, only, searched)
+                _tell_again(steps, progress, these.start / len(rows))
+        return [cells for cells in searched if len(cells.left)]
+
+    def _search_all(
+        self, draft: MapDraft, sampled: Sequence[SampledCells], progress: Progress | None
+    ) -> None:
+        """Search all of the redundancy for the cells that are left, some at a time."""
+        for k, cells in enumerate(sampled):
+            tell = part_of(progress, k, len(sampled))
+            for these in portions(len(cells.left), tell, FIRST_COVERED):
+                some = cells.left[these]
+                inputs, batch, where = cells.inputs, cells.batch, tuple(part[some] for part in cells.where)
+                covered = self._redundancy.cover(
+                    cells.rows, some, cells.locked, inputs, batch, self._scratches()
+                )
+                record_cover(draft, covered, where)
+                steps = self._redundancy.decide(draft, covered, inputs.T_base_tool[some], batch, where)
+                _tell_again(steps, tell, these.start / len(cells.left))
 
     def _fixed_bodies(self) -> FixedBodies:
         """Measure the bodies that the arm does not move, with the object where it is now."""
@@ -274,11 +325,11 @@ class ExactEngine:
         T_base_tool: Array,
         fixed: FixedBodies,
         only: np.ndarray | None,
-        progress: Progress | None,
+        searched: list[SampledCells],
     ) -> Iterator[None]:
-        """Search some cells of the map; pause after every one that PyBullet decided.
+        """Search some cells of the map at samples; pause after every one that PyBullet decided.
 
-        Progress is called in between, where all of the redundancy is searched.
+        In the end, those of which all of the redundancy is to be searched are added to a list.
         """
         rows, rolls = batch.rows, batch.rolls
         roll, row, column = np.indices((len(rolls), len(rows), draft.manifold.angles)).reshape(3, -1)
@@ -309,18 +360,12 @@ class ExactEngine:
             by_tool = self._open.decide(draft, cell, T, batch.ik, listed)
             left[i] = not by_tool and draft.reason[cell] != Reason.FEASIBLE
             yield
-        locked = locked_joint(batch.compiled) if self._settings.redundancy == "auto" else None
+        locked = locked_joint(batch.compiled) if self._searches_all else None
         if locked is None or inputs.always_collides:
             return
         draft.proven[tuple(part[found.proven] for part in cells)] = True
         which = np.flatnonzero(left & ~found.proven)
-        for these in portions(len(which), progress, FIRST_COVERED):
-            some = which[these]
-            covered = self._redundancy.cover(found, some, locked, inputs, batch, self._scratches())
-            found.status[some[covered.found]] = search.FEASIBLE
-            where = tuple(part[some] for part in cells)
-            record_cover(draft, covered, where)
-            yield from self._redundancy.decide(draft, covered, inputs.T_base_tool[some], batch, where)
+        searched.append(SampledCells(cells, which, batch, inputs, found.rows, locked))
 
     def _inputs(
         self, T_base_tool: Array, runs: np.ndarray, batch: Batch, fixed: FixedBodies
@@ -399,6 +444,10 @@ class ExactEngine:
         return [(s.q[k], int(s.sample[k]), int(s.branch[k])) for k in np.flatnonzero(s.inside)]
 
 
-def _tell_again(progress: Progress, share: float, _: float) -> None:
-    """Tell a share that is finished once more: for a part of which no share is known; it may be cancelled."""
-    progress(share)
+def _tell_again(steps: Iterator[None], progress: Progress | None, share: float) -> None:
+    """Take steps of which no share is known, and tell the finished one again: there one may cancel, too."""
+    told = perf_counter()
+    for _ in steps:
+        if progress and perf_counter() - told > TELL:
+            progress(share)
+            told = perf_counter()

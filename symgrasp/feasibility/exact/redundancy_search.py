@@ -16,6 +16,7 @@ from symgrasp.engine.reach import Reach, reach_of
 from symgrasp.engine.redundancy.cover import cover
 from symgrasp.engine.redundancy.cover_types import OPEN_KEPT, CoverInput, CoverResult
 from symgrasp.engine.redundancy.windows import MOST_OPEN, windows
+from symgrasp.engine.search_types import RowChecks
 from symgrasp.feasibility.cell import Window
 from symgrasp.feasibility.exact.batches import Batch
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
@@ -58,7 +59,7 @@ class RedundancySearch:
 
     def cover(
         self,
-        found: search.SearchResult,
+        rows: RowChecks,
         which: np.ndarray,
         locked: Locked,
         inputs: search.SearchInput,
@@ -68,7 +69,7 @@ class RedundancySearch:
         """Search for free configurations of cells, see `symgrasp.engine.redundancy.cover`.
 
         Args:
-            found: what the search of samples found.
+            rows: what the search of samples found out about its rows.
             which: (c,) the cells, as indices into those of that search.
             locked: the joint that is the redundancy.
             inputs, batch, scratches: of that search.
@@ -82,7 +83,7 @@ class RedundancySearch:
             scratches,
             inputs,
             geometry.balance,
-            found.rows,
+            rows,
             self._covered(which, inputs, locked),
             self._arm.dof,
         )

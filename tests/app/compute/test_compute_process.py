@@ -83,6 +83,23 @@ def test_a_coarse_map_comes_first_where_code_has_to_be_compiled(cache, monkeypat
     assert np.isfinite(result.map.q[result.map.feasible]).all()
 
 
+def test_what_samples_show_comes_first_where_all_of_the_redundancy_is_searched(cache):
+    pool, shown, kept = ProcessPool(cache.folders), [], []
+    process = ComputeProcess(pool, kept.append, preliminary=shown.append)
+    auto = load_small("bottle_on_table").with_settings(redundancy="auto")
+    try:
+        for scene in (auto, auto.with_settings(redundancy=32)):
+            result = process.map(State.of(scene, "").request, quiet)
+    finally:
+        process.close()
+        pool.close()
+    (sampled,) = shown
+    assert sampled.preliminary
+    assert not sampled.map.preliminary  # every feasible cell has its witness
+    assert np.array_equal(sampled.map.reason, result.map.reason)
+    assert [computed.preliminary for computed in kept] == [False, False]
+
+
 def test_what_comes_back_is_what_the_service_computes_of_the_same_scene(process, cache):
     scene = load_small("bottle_on_table")
     request = changes.moved(State.of(scene, ""), x=0.5).request

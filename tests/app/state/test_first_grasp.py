@@ -43,7 +43,7 @@ def test_it_waits_for_the_exact_map():
     begun = replace(State.of(load_small("bottle_on_table"), "bottle_on_table"), holds_first=True)
     assert with_first_grasp(begun) is begun
     result = small_map("bottle_on_table", begun.task, begun.arm)
-    coarse = replace(result, map=replace(result.map, preliminary=True))
+    coarse = replace(result, map=replace(result.map, preliminary=True), preliminary=True)
     early = job_changes.preliminary_arrived(begun, coarse)
     assert with_first_grasp(early) is early
     assert with_first_grasp(job_changes.map_arrived(early, 0, result)).pick

@@ -18,6 +18,7 @@ from app.state.map_view_state import RollChoice
 from app.state.requests import MapRequest, MapResult
 from app.state.state import State
 from symgrasp.errors import SymgraspError
+from symgrasp.feasibility.create import create_map
 from symgrasp.reason import Reason
 from tests.app.shown_map import shown as as_shown
 from tests.app.state.states import opened, small_map
@@ -27,7 +28,7 @@ from tests.conftest import load_small
 def test_a_coarse_map_is_shown_and_the_exact_one_still_awaited():
     state, exact = State.of(load_small("bottle_on_table"), ""), opened()
     request = state.request
-    coarse = MapResult(request, replace(exact.result.map, preliminary=True))
+    coarse = MapResult(request, replace(exact.result.map, preliminary=True), preliminary=True)
     started = job_changes.started(state, 1, "the map", request)
     shown = job_changes.preliminary_arrived(started, coarse)
     assert shown.map.preliminary
@@ -50,7 +51,7 @@ def test_a_coarse_map_is_shown_and_the_exact_one_still_awaited():
     assert replaced.is_current
     assert "preliminary" not in as_shown(replaced).title
     assert job_changes.preliminary_arrived(replaced, coarse) is replaced
-    moved = changes.moved(started, x=0.52)
+    moved = replace(changes.moved(started, x=0.52), busy=None)
     assert job_changes.preliminary_arrived(moved, coarse) is moved
 
 
@@ -87,6 +88,43 @@ def test_a_map_follows_a_drag_one_pose_behind():
     assert not state.is_current
     assert state.next_request == state.request
     assert job_changes.started(state, 2, "map", state.request).is_fresh
+
+
+def sampled_map(request: MapRequest) -> MapResult:
+    """What samples of the redundancy show at a pose."""
+    scene = request.moved_scene().with_settings(redundancy=8)
+    return MapResult(request, create_map(scene, task=request.task, arm=request.arm), preliminary=True)
+
+
+def test_what_samples_show_follows_a_drag_and_the_whole_search_of_a_pose_left_behind_is_given_up():
+    first = changes.moved(opened(), x=0.5)
+    begun = job_changes.started(first, 1, "map", first.request)
+    at_once = job_changes.preliminary_arrived(begun, sampled_map(first.request))
+    assert at_once.is_preliminary
+    assert at_once.is_fresh
+    assert not at_once.is_current
+    assert at_once.next_request is None  # it is still being searched
+    page = as_shown(at_once)
+    assert page.title.endswith("preliminary, 8 samples")
+    assert page.look["busy"]
+    assert not page.look["stale"]
+    with pytest.raises(SymgraspError, match="computed map"):
+        map_picture(at_once, "PNG")
+    on = changes.moved(at_once, x=0.45)
+    assert on.next_request == on.request  # what is left of the search is not waited for
+    moved = changes.moved(begun, x=0.45)
+    assert moved.next_request is None
+    behind = job_changes.preliminary_arrived(moved, sampled_map(first.request))
+    assert behind.result.request == first.request
+    assert behind.next_request == moved.request
+    assert job_changes.started(behind, 2, "map", moved.request).is_fresh
+    stopped = job_changes.stopped(at_once, 1)
+    assert not stopped.is_fresh
+    assert as_shown(stopped).look["stale"]
+    exact = small_map("bottle_on_table", "pick", "panda", first.request.pose)
+    found = job_changes.map_arrived(at_once, 1, exact)
+    assert found.is_current
+    assert "preliminary" not in as_shown(found).title
 
 
 def test_a_map_that_takes_long_is_spoken_of_and_interrupted():

@@ -57,7 +57,8 @@ def picture(html: str) -> str:
 
 def ready(html: str) -> bool:
     """Whether the newest map is shown and nothing is being done."""
-    return bool(picture(html)) and "Ready." in html and "earlier pose" not in html
+    outdated = "earlier pose" in html or "preliminary" in html
+    return bool(picture(html)) and "Ready." in html and not outdated
 
 
 def entered(visitor: Wire, label: str) -> list[object]:
