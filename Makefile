@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: app test figures schemas bench surveys motions robots opening previews background grids cells
+.PHONY: app test figures schemas bench surveys motions robots opening previews cancelling background grids cells
 
 app: $(VENV)/app.stamp  ## install, then start the page
 	$(BIN)/symgrasp app $(ARGS)
@@ -55,6 +55,9 @@ opening: $(VENV)/dev.stamp  ## print how long the page takes to open, and to sho
 
 previews: $(VENV)/dev.stamp  ## print how long the page takes to preview the grasp that is pointed at, in Chromium
 	$(BIN)/python -m docs.previews
+
+cancelling: $(VENV)/dev.stamp  ## print how long what the page computes goes on after a cancel (minutes)
+	$(BIN)/python -m docs.cancelling $(ARGS)
 
 background: $(VENV)/dev.stamp  ## print how long the page waits for maps while a survey runs, and while none does
 	$(BIN)/python -m docs.background

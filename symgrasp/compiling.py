@@ -63,29 +63,31 @@ log = logging.getLogger(__name__)
 _config: Any = config  # numba sets its attributes at import time, where type checkers do not see them
 
 
-class _FirstCompilation(event.Listener):
-    """Listens to numba and calls a function at the first compilation."""
+class _Compilations(event.Listener):
+    """Listens to numba and calls a function at every compilation that is not a part of another."""
 
     def __init__(self, notify: Callable[[], None]) -> None:
-        self._notify, self._notified = notify, False
+        self._notify, self._depth = notify, 0
 
     def on_start(self, event: event.Event) -> None:
-        """Call the function, unless it has been called."""
-        if not self._notified:
-            self._notified = True
+        """Call the function, unless something else is being compiled that needs this."""
+        self._depth += 1
+        if self._depth == 1:
             self._notify()
 
     def on_end(self, event: event.Event) -> None:
-        """Do nothing: only the start of a compilation matters."""
+        """Note that it ended."""
+        self._depth -= 1
 
 
 @contextmanager
 def notify_on_compile(notify: Callable[[], None]) -> Iterator[None]:
-    """Call a function once if something has to be compiled inside the ``with`` block.
+    """Call a function whenever something has to be compiled inside the ``with`` block.
 
-    Reading the result of an earlier compilation from the disk does not count.
+    It is called once for a function and all that is compiled as a part of it. Reading the result of an
+    earlier compilation from the disk does not count.
     """
-    with event.install_listener("numba:compile", _FirstCompilation(notify)):
+    with event.install_listener("numba:compile", _Compilations(notify)):
         yield
 
 

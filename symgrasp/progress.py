@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
+from functools import wraps
 from time import perf_counter
+from typing import TypeVar
 
-__all__ = ["TELL", "Progress", "part_of", "portions", "rising"]
+__all__ = ["TELL", "Progress", "at_start", "cached", "part_of", "portions", "rising"]
 
 TELL = 0.05
 """Time (s) after which progress is told, and may cancel: long computations are done in portions of about
@@ -15,11 +17,52 @@ Progress = Callable[[float], None]
 """Called with the finished share (0 to 1) of a computation; may raise `Cancelled` to stop it."""
 
 
+Key = TypeVar("Key", bound=Hashable)
+Value = TypeVar("Value")
+
+
+def cached(
+    most: int,
+) -> Callable[[Callable[[Key, Progress | None], Value]], Callable[..., Value]]:
+    """Keep the last results, none of them None, of a function of one thing and of a progress.
+
+    The progress matters the first time only. Of a call that is cancelled nothing is kept.
+
+    Args:
+        most: number of results that are kept.
+
+    Returns:
+        A decorator; the progress may then be left out.
+    """
+
+    def decorate(compute: Callable[[Key, Progress | None], Value]) -> Callable[..., Value]:
+        known: dict[Key, Value] = {}
+
+        @wraps(compute)
+        def found(key: Key, progress: Progress | None = None) -> Value:
+            kept = known.get(key)  # another thread may remove it meanwhile
+            if kept is not None:
+                return kept
+            known[key] = value = compute(key, progress)
+            if len(known) > most:
+                known.pop(next(iter(known)), None)
+            return value
+
+        return found
+
+    return decorate
+
+
 def part_of(progress: Progress | None, index: int, count: int) -> Progress | None:
     """Return the progress of one of ``count`` equal parts of a computation, that with this index."""
     if progress is None:
         return None
     return lambda share: progress((index + share) / count)
+
+
+def at_start(progress: Progress | None) -> Progress | None:
+    """Return a progress that tells 0 whatever it is told, for what is done before a computation."""
+    return None if progress is None else lambda _: progress(0.0)
 
 
 def rising(progress: Progress) -> Progress:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from symgrasp.errors import SceneError, one_of
 from symgrasp.files import SCENES_DIR
+from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes
 from symgrasp.world import prepared
@@ -55,8 +56,12 @@ class SharedCache:
         self.folders = (*own, SCENES_DIR)
         self.scene(first)
 
-    def scene(self, name: str) -> Scene:
+    def scene(self, name: str, progress: Progress | None = None) -> Scene:
         """Return a scene by one of `names`; it is loaded and checked once.
+
+        Args:
+            name: of the scene.
+            progress: called with the finished share while it is loaded; may raise `Cancelled`.
 
         Raises:
             InputError: it is unusable.
@@ -67,8 +72,8 @@ class SharedCache:
             return scene
         if name not in self.names:  # else a browser could open any file of the server
             raise SceneError("page", "scene", name, one_of(self.names, name))
-        scene = prepared(Scene.load(name))
-        read_visuals(scene)
+        scene = prepared(Scene.load(name), progress)
+        read_visuals(scene, progress)
         with self._lock:
             return self._scenes.setdefault(name, scene)
 

@@ -55,6 +55,8 @@ CANCEL_TIMEOUT = 10.0
 """Time (s) after a cancel until the process is killed: compiled code cannot be interrupted. Compiling
 cannot be either, but is left to end, as the next call would begin it anew."""
 
+READING_CANCEL_TIMEOUT = 0.1
+"""The same (s) of one that reads a file: parsers of libraries cannot be told to stop."""
 
 READING_TIMEOUT = 60.0
 """Time (s) without a word after which a process that reads a file is killed: the file hangs its parser."""
@@ -246,6 +248,7 @@ class ComputeProcess:
             self._requests = {(request.task, request.arm): request for request in maps}
             self._computed = []
             process.job_id += 1
+            process.reads = bool(reads)
             try:
                 process.channel.send(Call(process.job_id, method, args, self._place.cores))
                 return self._follow(process, progress, reads)
@@ -279,7 +282,7 @@ class ComputeProcess:
         return self._process
 
     def _await_end(self, process: WorkerProcess, since: float, progress: Progress) -> None:
-        """Wait until the cancelled call has ended; after `CANCEL_TIMEOUT` end the process instead."""
+        """Wait until the cancelled call has ended; end the process instead where that takes too long."""
         while process.cancelled_at is not None:
             if process.channel.poll(POLL_INTERVAL):
                 message = process.channel.receive()
@@ -293,7 +296,9 @@ class ComputeProcess:
                     process.cancelled_at, process.compiling = None, False
             if process.compiling:
                 self._compiling()
-            elif process.cancelled_at is not None and time.monotonic() - since > CANCEL_TIMEOUT:
+            elif process.cancelled_at is not None and time.monotonic() - since > (
+                READING_CANCEL_TIMEOUT if process.reads else CANCEL_TIMEOUT
+            ):
                 self.close()
                 return
             progress(0.0)

@@ -16,6 +16,7 @@ from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.motion.choosing import Failure, failures_in_words, moving_plans
 from symgrasp.motion.record import from_plan, with_motion
+from symgrasp.motion.times import timing
 from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.plan.checked_plan import check_plan
 from symgrasp.plan.plan import Hold, Plan, PlanTask
@@ -255,6 +256,7 @@ class PlanService:
             NoPlanError: none has one; says why.
         """
         self._progress, self._share = progress, 0.0
+        timing.load(progress)
         failures: list[Failure] = []
         scene = with_poses(request.scene, request.poses)
         plans = chain(request.plans, self._not_listed() if request.more else ())
@@ -291,12 +293,12 @@ class PlanService:
             content = plan.to_json().encode()
         else:
             refuse_foreign_files(f"{name}: scene.content", plan.scene.content, self._folders)
-        checked = check_plan(content, name, progress)
+        checked = check_plan(content, name, part_of(progress, 0, 2))
         report = PlanFileReport(name, checked.report.checks, tuple(map(shown_paths, checked.report.failures)))
         scene, plan = checked.scene, checked.plan
         if scene is None:
             return OpenedPlan(report)
-        read_visuals(scene)
+        read_visuals(scene, part_of(progress, 1, 2))
         return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene))
 
     def _start_planner(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:

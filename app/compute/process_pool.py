@@ -33,6 +33,7 @@ class WorkerProcess:
     Attributes:
         channel: to the process.
         job_id: number of the last call.
+        reads: whether that call reads a file.
         cancelled_at: when (s, monotonic) that call was cancelled, if it has not ended since.
         compiling: whether the last that was heard of it is that it compiles.
     """
@@ -41,6 +42,7 @@ class WorkerProcess:
         here, there = PROCESSES.Pipe()
         self.channel = Channel(here)
         self.job_id = 0
+        self.reads = False
         self.cancelled_at: float | None = None
         self.compiling = False
         self._process = PROCESSES.Process(

@@ -87,7 +87,7 @@ class SurveyService:
             with Evaluator(survey) as evaluator:
                 for point in _in_order(survey):
                     values = [float(axis.values[k]) for axis, k in zip(survey.axes, point, strict=True)]
-                    result = evaluator.point(point)
+                    result = evaluator.point(point, report.tell)
                     margins[point] = result.plan_margin if result.plan else np.nan
                     report.add((values[0], values[1]), result, Base(*values))
             return margins
@@ -124,7 +124,7 @@ def _move_object(scene: Scene, request: SurveyRequest, report: _Report) -> None:
     report.z, report.spacing = support_height(scene, task), request.spacing
     with Evaluator(survey) as evaluator:
         for point in _in_order(survey):
-            report.add((float(x[point[0]]), float(y[point[1]])), evaluator.point(point))
+            report.add((float(x[point[0]]), float(y[point[1]])), evaluator.point(point, report.tell))
     report.send()
 
 
@@ -186,6 +186,10 @@ class _Report:
         if time.monotonic() - self.sent > INTERVAL:
             self.send()
         self.progress(self.points / self.of)
+
+    def tell(self, _: float) -> None:
+        """Tell the progress, also while a point is computed. May raise `Cancelled`."""
+        self.progress(self.points / self.of if self.of else 0.0)
 
     def send(self) -> None:
         """Tell what has been found."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.robot.catalogue import CatalogueRobot
 from symgrasp.scene.format import RobotFile
 from symgrasp.scene.replacing import renamed, with_robot
@@ -167,9 +167,9 @@ class UploadService:
 
 def _checked(scene: Scene, progress: Progress) -> BuiltScene:
     """Return a scene of which maps can be computed, with all that is read from its files to show it."""
-    scene = prepared(scene)
-    progress(0.6)
+    scene = prepared(scene, lambda _: progress(0.3))
     for robot in scene.robots.values():
         for link in robot.model.colliding_links():
+            progress(0.5)
             robot.model.hulls(link)  # kept in the model: the server draws them, but reads no uploaded file
-    return BuiltScene(scene, read_visuals(scene))
+    return BuiltScene(scene, read_visuals(scene, part_of(progress, 1, 2)))

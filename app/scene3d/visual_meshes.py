@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from symgrasp.meshes import read_parts
+from symgrasp.progress import Progress, cached, part_of
 from symgrasp.scene.scene import Scene
 
 from ..choices.scene_assets import Visuals
@@ -40,13 +40,14 @@ CREASE = np.deg2rad(30)
 """Edges of simplified meshes with a larger angle (rad) between their faces are not smoothed."""
 
 
-@lru_cache(maxsize=16)
-def link_visuals(urdf: bytes) -> dict[str, bytes]:
+@cached(16)
+def link_visuals(urdf: bytes, progress: Progress | None) -> dict[str, bytes]:
     """Return link name → GLB in the link frame, of every link with a visual shape.
 
     Args:
         urdf: the robot with everything that is mounted on it, as `symgrasp.robot.model.RobotModel.urdf`
             has it.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Raises:
         MeshError: a mesh cannot be read.
@@ -55,17 +56,23 @@ def link_visuals(urdf: bytes) -> dict[str, bytes]:
     materials = [*robot.materials, *(v.material for link in robot.links for v in link.visuals)]
     named = {m.name: m.color.rgba for m in reversed(materials) if m is not None and m.color is not None}
     glbs = {}
-    for link in robot.links:
+    for k, link in enumerate(robot.links):
         scene = trimesh.Scene()
         for visual in link.visuals:
+            if progress:
+                progress(k / len(robot.links))
             _add_visual(scene, visual, link.name, named)
         if scene.geometry:
             glbs[link.name] = export_glb(scene, include_normals=True)
     return glbs
 
 
-def read_visuals(scene: Scene) -> Visuals:
+def read_visuals(scene: Scene, progress: Progress | None = None) -> Visuals:
     """Read every mesh of a scene that the 3D view shows, and return those of its URDFs.
+
+    Args:
+        scene: the scene.
+        progress: called with the finished share; may raise `Cancelled`.
 
     Raises:
         MeshError: a mesh cannot be read.
@@ -76,7 +83,10 @@ def read_visuals(scene: Scene) -> Visuals:
         for _, shape in o.shapes():
             if shape.kind == "mesh":
                 shape.mesh(f"obstacle {o.name}")
-    return {model.urdf: link_visuals(model.urdf) for model in models}
+    return {
+        model.urdf: link_visuals(model.urdf, part_of(progress, k, len(models)))
+        for k, model in enumerate(models)
+    }
 
 
 def _add_visual(

@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -250,5 +251,5 @@ def progress_of(what: str) -> Iterator[Callable[[float], None] | None]:
         end = "\n" if share >= 1 else ""
         print(f"\r{label}: {100 * share:3.0f} %", end=end, file=sys.stderr, flush=True)
 
-    with notify_on_compile(lambda: warn(f"{COMPILING_MESSAGE} …")):
+    with notify_on_compile(cache(lambda: warn(f"{COMPILING_MESSAGE} …"))):  # once
         yield show if sys.stderr.isatty() else None

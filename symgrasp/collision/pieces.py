@@ -16,6 +16,7 @@ import numpy as np
 
 from symgrasp.caching import kept
 from symgrasp.poses import Array
+from symgrasp.progress import Progress
 
 __all__ = ["SEEDS", "PackedPieces", "Piece", "joined", "pack", "pose_rows"]
 
@@ -68,8 +69,13 @@ class PackedPieces(NamedTuple):
     size: Array
 
 
-def pack(pieces: Sequence[Piece]) -> PackedPieces:
-    """Pack pieces into arrays; their vertices are reduced to those of their hulls where it pays."""
+def pack(pieces: Sequence[Piece], progress: Progress | None = None) -> PackedPieces:
+    """Pack pieces into arrays; their vertices are reduced to those of their hulls where it pays.
+
+    Args:
+        pieces: the pieces.
+        progress: called with the finished share; may raise `Cancelled`.
+    """
     vertices: list[Array] = []
     starts: list[np.ndarray] = []
     edges: list[np.ndarray] = []
@@ -77,6 +83,8 @@ def pack(pieces: Sequence[Piece]) -> PackedPieces:
     index, size = np.zeros((len(pieces), 3), dtype=np.int32), np.zeros((len(pieces), 9))
     first = edge = 0
     for k, piece in enumerate(pieces):
+        if progress:
+            progress(k / len(pieces))
         corners, triangles, count, neighbours = _shape(piece.vertices.tobytes(), piece.revolved)
         row = -1
         if triangles is not None:

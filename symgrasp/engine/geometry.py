@@ -17,6 +17,7 @@ from symgrasp.engine.search_types import Balance
 from symgrasp.meshes.flat_faces import convex_faces, fills_hull
 from symgrasp.object.profile import COLLISION_FACETS
 from symgrasp.poses import Array, inverse
+from symgrasp.progress import Progress
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
@@ -104,13 +105,16 @@ def supports(arm: Arm) -> bool:
     return True
 
 
-def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
+def arm_geometry(
+    world: BulletWorld, arm: Arm, openings: Array, progress: Progress | None = None
+) -> ArmGeometry:
     """Collect the collision geometry of a world for an arm.
 
     Args:
         world: the world; its other robots are at home.
         arm: the arm.
         openings: (rows,) opening (m) of the hand at each row of the grid.
+        progress: called with the finished share of the pieces; may raise `Cancelled`.
     """
     scene, model = world.scene, arm.robot.model
     shapes = world.shapes(arm.robot.name)
@@ -145,7 +149,7 @@ def arm_geometry(world: BulletWorld, arm: Arm, openings: Array) -> ArmGeometry:
     origins, axes = [frames[0], *(inverse(a) @ b for a, b in pairwise(frames))], [j.axis for j in joints]
     if arm.pitched:
         origins, axes = [*origins, np.eye(4)], [*axes, np.array([0.0, 0.0, 1.0])]
-    pieces = pack([p.piece for p in placed])
+    pieces = pack([p.piece for p in placed], progress)
     pose = pose_rows(np.array([p.pose for p in placed]))
     tree, hulls = _tree(placed, pieces, pose, len(own) + len(objects))
     pieces = joined(pieces, pack(hulls))

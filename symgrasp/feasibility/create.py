@@ -138,7 +138,7 @@ class MapMaker:
         """Compute the map of an arm without a torso, or with its torso at a sample."""
         if progress:
             progress(0.0)  # before and after the pieces of the world are packed: that takes its time
-        engine = self._engine(arm, torso, grid)
+        engine = self._engine(arm, torso, grid, progress=progress)
         if progress:
             progress(0.0)
         if engine is None:
@@ -157,9 +157,10 @@ class MapMaker:
 
         def map_on(parts: Manifold, wanted: np.ndarray) -> FeasibilityMap:
             level = 1 + finer.index(parts)
-            own = self._engine(arm, torso, parts, max(1, LEVELS - level))
+            tell = part_of(progress, level, 1 + len(finer))
+            own = self._engine(arm, torso, parts, max(1, LEVELS - level), tell)
             assert own is not None  # as there is one for the map
-            return own.map(task, parts, part_of(progress, level, 1 + len(finer)), None, True, wanted)
+            return own.map(task, parts, tell, None, True, wanted)
 
         return replace(found, refined=refined(found, finer, map_on, only))
 
@@ -187,11 +188,14 @@ class MapMaker:
         if ik is None or the_arm.pitched:
             own = the_arm.grasping(grid, where.row, where.roll)
             self._solvers[the_arm.name] = ik = solver_for(own, self.scene.settings.samples)
+        tell = progress
         if self.scene.settings.redundancy == "auto":
-            witness = self.map(the_arm.name, the_task, manifold=grid, certify=False).witness(where)
+            first, tell = part_of(progress, 0, 2), part_of(progress, 1, 2)
+            found = self.map(the_arm.name, the_task, manifold=grid, progress=first, certify=False)
+            witness = found.witness(where)
             if witness is not None and not the_arm.pitched:
                 ik = solver_for(the_arm, self.scene.settings.samples, more=[witness.phi])
-        return explain_cell(self.world, ik, the_task, grid, where, progress)
+        return explain_cell(self.world, ik, the_task, grid, where, tell)
 
     def windows(
         self, m: FeasibilityMap, cells: np.ndarray, progress: Progress | None = None, *, settle: bool = True
@@ -221,7 +225,8 @@ class MapMaker:
         values = [t for t in np.unique(at).tolist() if t >= 0]
         for k, t in enumerate(values):
             own = arm if torso is None else arm.at(t)
-            engine = None if arm.pitched else self._engine(own, None if torso is None else t, m.manifold)
+            where = None if torso is None else t
+            engine = None if arm.pitched else self._engine(own, where, m.manifold, progress=progress)
             if engine is None:
                 raise InputError(
                     "windows", "arm", arm.name, "one of seven joints that the exact engine knows"
@@ -258,7 +263,12 @@ class MapMaker:
         return self.scene.arm(arm or chosen.arms[0]), chosen
 
     def _engine(
-        self, arm: Arm, torso: int | None, grid: Manifold, levels: int = LEVELS
+        self,
+        arm: Arm,
+        torso: int | None,
+        grid: Manifold,
+        levels: int = LEVELS,
+        progress: Progress | None = None,
     ) -> ExactEngine | None:
         """Return an arm's engine for a grid's heights, or None where the engine does not know the arm.
 
@@ -270,7 +280,7 @@ class MapMaker:
             known = None
         if known is None:
             with suppress(NotImplementedError):
-                known = ExactEngine(self.world, arm, grid, levels)
+                known = ExactEngine(self.world, arm, grid, levels, progress)
         self._engines[key] = known
         return known
 

@@ -80,7 +80,7 @@ def moving_plans(
         progress: called with the finished share of each plan; may raise `Cancelled`.
     """
     with open_world(scene, progress) as world:
-        planner = MotionPlanner(scene, world)
+        planner = MotionPlanner(scene, world, progress)
         for number, plan in enumerate(islice(plans, MOST_TRIED), start=1):
             try:
                 moving, motion = planner.plan(plan, seed, part_of(progress, 0, 2))

@@ -12,7 +12,7 @@ from symgrasp.motion.paths.search import NoMotionError
 from symgrasp.motion.segments import Motion
 from symgrasp.plan.plan import Hold, Plan
 from symgrasp.plan.writing import with_configurations
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, at_start
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld, open_world
 
@@ -42,7 +42,7 @@ def plan_motion(
         NoMotionError: none was found; says which part is missing, and what is in its way.
     """
     with open_world(scene, progress) as world:
-        return MotionPlanner(scene, world).plan(plan, seed, progress)
+        return MotionPlanner(scene, world, progress).plan(plan, seed, progress)
 
 
 class MotionPlanner:
@@ -51,6 +51,7 @@ class MotionPlanner:
     Args:
         scene: the scene.
         world: a world of it.
+        progress: called with 0 while it is made; may raise `Cancelled`.
 
     Raises:
         NoMotionError: an arm of five joints has a task: its hand cannot be led along given poses.
@@ -60,12 +61,12 @@ class MotionPlanner:
         bodies: the pieces of the scene.
     """
 
-    def __init__(self, scene: Scene, world: BulletWorld) -> None:
+    def __init__(self, scene: Scene, world: BulletWorld, progress: Progress | None = None) -> None:
         names = dict.fromkeys(name for task in scene.tasks.values() for name in task.arms)
         pitched = [name for name in names if scene.arm(name).pitched]
         if pitched:
             raise NoMotionError(f"no motion of {', '.join(pitched)}: expected arms of 6 or 7 joints")
-        self.scene, self.bodies = scene, MotionScene(scene, world)
+        self.scene, self.bodies = scene, MotionScene(scene, world, at_start(progress))
         self._world = world
         self._solvers: dict[tuple[str, tuple[float, ...]], tuple[Solver, Solver]] = {}
 

@@ -23,6 +23,7 @@ from symgrasp.planners.planning import (
 )
 from symgrasp.planners.sequential import clearance_steps, surface_margin
 from symgrasp.poses import from_position_rpy
+from symgrasp.progress import Progress, at_start
 from symgrasp.reason import Reason
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -111,21 +112,26 @@ class Evaluator:
             self._stage.world.close()
         self._stage = None
 
-    def point(self, point: tuple[int, ...]) -> PointResult:
-        """Compute a point, given as indices along each axis."""
+    def point(self, point: tuple[int, ...], progress: Progress | None = None) -> PointResult:
+        """Compute a point.
+
+        Args:
+            point: indices along each axis.
+            progress: called now and then with 0; may raise `Cancelled`.
+        """
         if self._kept_out(point):
             return PointResult(State.KEPT_OUT)
         try:
-            return self._computed(point)
+            return self._computed(point, at_start(progress))
         except Cancelled:
             raise
         except SymgraspError as error:  # values that are fine on their own, and are not together
             text = error.without_source if isinstance(error, InputError) else str(error)
             return PointResult(State.UNUSABLE, problem=text)
 
-    def _computed(self, point: tuple[int, ...]) -> PointResult:
+    def _computed(self, point: tuple[int, ...], tell: Progress | None) -> PointResult:
         """Compute a point whose base stands where it may."""
-        stage = self._stage_of(point)
+        stage = self._stage_of(point, tell)
         if stage.world is None or stage.maker is None:
             return PointResult(State.ROBOT_BLOCKED)
         file, task = self.survey.file, self.task_at(point, stage.scene)
@@ -136,7 +142,7 @@ class Evaluator:
             tasks += [t for t in tasks_of_plan(scene, file.plan, arm, task.name) if t.name != task.name]
         if any(object_contact(stage.world, own) for own in tasks):
             return PointResult(State.OBJECT_BLOCKED)
-        m = stage.maker.map(arm, task)
+        m = stage.maker.map(arm, task, progress=tell)
         best, margin = best_cell(m)
         found = PointResult(
             State.COMPUTED,
@@ -150,7 +156,7 @@ class Evaluator:
             return found
         maps = {key: other for key, other in stage.others.items() if key[0] != task.name}
         maps[task.name, arm] = m
-        plan = planned(stage.maker, scene, file.plan, arm, task.name, maps)
+        plan = planned(stage.maker, scene, file.plan, arm, task.name, maps, tell)
         stage.others.update((key, other) for key, other in maps.items() if key[0] != task.name)
         return replace(
             found, plan=plan is not None, plan_margin=plan_margin(plan, scene.profile) if plan else 0.0
@@ -178,17 +184,19 @@ class Evaluator:
             T = from_position_rpy(T[:3, 3], (0.0, lean["tilt_deg"], lean.get("direction_deg", 0.0)))
         return replace(task, T_world_object=T)
 
-    def _stage_of(self, point: tuple[int, ...]) -> _Stage:
+    def _stage_of(self, point: tuple[int, ...], tell: Progress | None) -> _Stage:
         key = self.survey.scene_key(point)
         if self._stage is None or self._stage.key != key:
             self.close()
             scene = with_free_homes(self.survey.scene_at(point))
+            if tell:
+                tell(0.0)
             try:
                 check_homes(scene)
             except SceneError:
                 self._stage = _Stage(key, scene, None, None, {})
             else:
-                world = open_world(scene)
+                world = open_world(scene, tell)
                 if all(stands_free(world, robot) for robot in self._moved_bases):
                     self._stage = _Stage(key, scene, world, MapMaker(world), {})
                 else:
@@ -238,6 +246,7 @@ def planned(
     arm: str,
     task: str,
     known: dict[tuple[str, str], FeasibilityMap] | None = None,
+    progress: Progress | None = None,
 ) -> Plan | None:
     """Return the best plan of a scene, None if none exists.
 
@@ -248,20 +257,21 @@ def planned(
         arm: of the sequential planner, the arm.
         task: of the bimanual planner, the task.
         known: maps that are known; those that are computed are added.
+        progress: called with the finished share of each map, and of the search; may raise `Cancelled`.
     """
     maps = {} if known is None else known
     for own in tasks_of_plan(scene, kind, arm, task):
         for name in own.arms:
             if (own.name, name) not in maps:
-                maps[own.name, name] = maker.map(name, own)
+                maps[own.name, name] = maker.map(name, own, progress=progress)
             if not maps[own.name, name].feasible.any():
                 return None
     with suppress(NoPlanError):
         if kind == "sequential":
-            return plan_sequential(scene, arm, maps)
+            return plan_sequential(scene, arm, maps, progress=progress)
         if kind == "bimanual":
-            return plan_bimanual(scene, task, maps)
-        return plan_handover(scene, maps)
+            return plan_bimanual(scene, task, maps, progress=progress)
+        return plan_handover(scene, maps, progress=progress)
     return None
 
 

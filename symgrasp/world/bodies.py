@@ -51,7 +51,7 @@ class SceneBodies:
     Args:
         client: PyBullet's id of the physics client to load them into.
         scene: the scene.
-        progress: called with 0 after every robot and shape; may raise `Cancelled`.
+        progress: called with 0 after every link, robot and shape; may raise `Cancelled`.
 
     Raises:
         UrdfError: PyBullet could not use all shapes of a URDF.
@@ -104,6 +104,10 @@ class SceneBodies:
         return body
 
     def _load_urdf(self, model: RobotModel, name: str, pose: Array) -> int:
+        for link in model.colliding_links():
+            model.hulls(link)  # which are made now, once for every mesh on a machine
+            if self._progress:
+                self._progress(0.0)
         body = load_urdf(self.client, model, pose)
         return self._register(body, name, link_names(self.client, body))
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from symgrasp.errors import SceneError, SymgraspError
 from symgrasp.meshes import depth_inside
 from symgrasp.poses import Array, axis_frame, translation
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, at_start
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
@@ -22,6 +22,7 @@ from symgrasp.world.client import pybullet, xyzw
 from symgrasp.world.collision import BodyName, Collision, NearBodies
 from symgrasp.world.hand_pairs import own_pairs
 from symgrasp.world.queries import Query, arm_queries, body_query, outer_queries, parked_queries
+from symgrasp.world.self_pairs import checked_self_pairs
 from symgrasp.world.shapes import Shape, link_shapes
 
 __all__ = ["BulletWorld"]
@@ -46,7 +47,8 @@ class BulletWorld:
 
     Args:
         scene: the scene.
-        progress: called with 0 after every body, and every arm; may raise `Cancelled`.
+        progress: called with 0 after every body and arm, and while pairs of links are sampled; may raise
+            `Cancelled`.
 
     Raises:
         UrdfError: PyBullet could not use all shapes of a URDF.
@@ -70,10 +72,12 @@ class BulletWorld:
             self.bodies = SceneBodies(self._client, scene, progress)
             self._values: dict[str, Array] = {}  # joint values of each robot, as set last
             self._queries: dict[str, list[Query]] = {}
+            for robot in scene.robots.values():  # once for every robot on a machine, which takes a second
+                checked_self_pairs(robot.model, at_start(progress))
             for arm in scene.arms.values():
                 self._queries[arm.name] = arm_queries(self.bodies, scene, arm)
                 if progress:
-                    progress(0.0)  # which links may touch is sampled, once for every robot
+                    progress(0.0)
             self._parked_queries = {name: parked_queries(self.bodies, name) for name in scene.robots}
             self._outer_queries = outer_queries(self.bodies, scene)
             self.set_object(scene.task().T_world_object)

@@ -14,7 +14,8 @@ def open_world(scene: Scene, progress: Progress | None = None) -> BulletWorld:
 
     Args:
         scene: the scene.
-        progress: called with 0 after every body, and every arm; may raise `Cancelled`.
+        progress: called with 0 after every body and arm, and while pairs of links are sampled; may raise
+            `Cancelled`.
 
     Returns:
         The world: robots at home, the object at the first task, the scene's margin to be kept.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
 
 from symgrasp.caching import kept
 from symgrasp.poses import Array
+from symgrasp.progress import Progress, cached
 from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import link_names, load_urdf, pybullet
 
@@ -27,19 +27,23 @@ BOX_SLACK = 2e-3
 """By how much (m) PyBullet's shapes may stand out of the boxes around the hulls of a link."""
 
 
-@lru_cache(maxsize=32)
-def checked_self_pairs(model: RobotModel) -> tuple[tuple[str, str], ...]:
+@cached(32)
+def checked_self_pairs(model: RobotModel, progress: Progress | None) -> tuple[tuple[str, str], ...]:
     """Return the pairs of links that collide in some configurations, but not in all.
 
     Left out are adjacent links, pairs that the SRDF lets touch, pairs that overlap in all of
     `SELF_SAMPLES` random configurations (a flange and the hand on it), and pairs that stay further apart
     than `NEVER_GAP` in all of them. They are kept on the disk: for a hand of many links it takes seconds.
+
+    Args:
+        model: the robot.
+        progress: called with the finished share while they are sampled; may raise `Cancelled`.
     """
-    (found,) = kept(("self pairs", model.sha256), lambda: (_sampled_pairs(model),))
+    (found,) = kept(("self pairs", model.sha256), lambda: (_sampled_pairs(model, progress),))
     return tuple((model.link_names[a], model.link_names[b]) for a, b in found.tolist())
 
 
-def _sampled_pairs(model: RobotModel) -> np.ndarray:
+def _sampled_pairs(model: RobotModel, progress: Progress | None = None) -> np.ndarray:
     """Return the pairs (., 2) of `checked_self_pairs`, by the indices of the links."""
     links = [link for link in model.colliding_links() if model.hulls(link)]
     left_out = model.neighbours() | model.allowed_pairs()
@@ -58,11 +62,14 @@ def _sampled_pairs(model: RobotModel) -> np.ndarray:
             for j in model.joints
             if j.source >= 0 and (link := model.link_names[j.child]) in index
         ]
-        for part in np.split(samples, [FIRST, *range(FIRST + PART, SELF_SAMPLES, PART)]):
+        begins = [0, FIRST, *range(FIRST + PART, SELF_SAMPLES, PART)]
+        for done, part in zip(begins, np.split(samples, begins[1:]), strict=True):
             undecided = np.flatnonzero(~near | always)
             close = _boxes_close(model, pairs[undecided], part)
             always[undecided] &= close.all(axis=0)
-            for q, row in zip(part, close, strict=True):
+            for k, (q, row) in enumerate(zip(part, close, strict=True)):
+                if progress:
+                    progress((done + k) / SELF_SAMPLES)
                 asked = undecided[row]
                 asked = asked[~near[asked] | always[asked]]
                 if not len(asked):

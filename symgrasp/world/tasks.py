@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from symgrasp.errors import SceneError
+from symgrasp.progress import Progress
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world.bullet import BulletWorld
@@ -18,18 +19,22 @@ RESTING_DEPTH = 1e-3
 """How deep (m) the object may be inside another body and still count as resting on it."""
 
 
-def prepared(scene: Scene) -> Scene:
+def prepared(scene: Scene, progress: Progress | None = None) -> Scene:
     """Return a scene of which maps can be computed: homes are found where none are given, and all is checked.
+
+    Args:
+        scene: the scene.
+        progress: called with 0 while its world is opened; may raise `Cancelled`.
 
     Raises:
         SceneError: see `check_tasks` and `symgrasp.world.home.check_homes`.
         UrdfError, MeshError: PyBullet cannot make a shape of the scene.
     """
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         found = free_homes(world)
         if found is scene:
             return _checked(world)
-    with open_world(found) as world:
+    with open_world(found, progress) as world:
         return _checked(world)
 
 

@@ -75,7 +75,7 @@ class Actions:
             return
         self._session.submit(
             f"Loading {name}",
-            lambda _: self._cache.scene(name),
+            lambda progress: self._cache.scene(name, progress),
             lambda state, scene: changes.open_scene(state, scene, name),
         )
 

@@ -39,7 +39,7 @@ from symgrasp.ik.at_phi import Locked, locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
-from symgrasp.progress import TELL, Progress, part_of, portions
+from symgrasp.progress import TELL, Progress, at_start, part_of, portions
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import load_of_hand
@@ -86,13 +86,21 @@ class ExactEngine:
         arm: the arm.
         manifold: the grid; maps may be asked for others with the same heights.
         levels: see `CellProver`.
+        progress: called with 0 while it is built; may raise `Cancelled`.
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm.
         NotImplementedError: the arm is not of the kinds the engine knows; see `knows`.
     """
 
-    def __init__(self, world: BulletWorld, arm: Arm, manifold: Manifold, levels: int = LEVELS) -> None:
+    def __init__(
+        self,
+        world: BulletWorld,
+        arm: Arm,
+        manifold: Manifold,
+        levels: int = LEVELS,
+        progress: Progress | None = None,
+    ) -> None:
         self.world, self.arm, self.manifold, self._levels = world, arm, manifold, levels
         self._settings = world.scene.settings
         self._solvers = self._new_solvers(manifold)
@@ -103,7 +111,7 @@ class ExactEngine:
         self._misfit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
-        self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening)
+        self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening, at_start(progress))
         self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces.size, arm.dof)
         self._copies: list[Scratch] = []
         self._prover: CellProver | None = None
@@ -426,8 +434,10 @@ class ExactEngine:
             inputs = self._inputs(tools, some[:, 1].copy(), batch, fixed)
             inputs = inputs._replace(parts=min(len(some), PARTS * core_count()))
             own = self._redundancy.windows(inputs, batch, locked, self._scratches(), settle=settle)
-            for cell, listed in zip(which[these].tolist(), own, strict=True):
-                found[cell] = listed
+            for k, listed in zip(range(these.start, these.stop), own, strict=True):
+                found[which[k]] = listed
+                if progress:  # PyBullet may take much longer for one cell than for those before it
+                    progress((k + 1) / len(which))
         self.world.set_arms(())
         return found
 

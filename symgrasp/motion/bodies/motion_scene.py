@@ -16,6 +16,7 @@ from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.bodies.state import State
 from symgrasp.motion.bodies.weights import balance_of
 from symgrasp.poses import Array
+from symgrasp.progress import Progress
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, own_pairs
@@ -50,6 +51,7 @@ class MotionScene:
     Args:
         scene: the scene.
         world: a world of it, which is asked for its shapes.
+        progress: called with the finished share of the pieces; may raise `Cancelled`.
 
     Attributes:
         scene: the scene.
@@ -57,7 +59,7 @@ class MotionScene:
         pieces: all pieces.
     """
 
-    def __init__(self, scene: Scene, world: BulletWorld) -> None:
+    def __init__(self, scene: Scene, world: BulletWorld, progress: Progress | None = None) -> None:
         self.scene, self._world = scene, world
         placed: list[PlacedPiece] = []
         self._links: dict[tuple[str, str], list[int]] = {}
@@ -73,7 +75,7 @@ class MotionScene:
         self._obstacles = np.arange(len(placed), len(placed) + sum(1 for _ in obstacle_pieces(scene)))
         placed += obstacle_pieces(scene)
         self.names = [p.name for p in placed]
-        self.pieces = pack([p.piece for p in placed])
+        self.pieces = pack([p.piece for p in placed], progress)
         self._pose = pose_rows(np.array([p.pose for p in placed]))
         self._pairs = {name: own_pairs(scene, name) for name in scene.robots}
 

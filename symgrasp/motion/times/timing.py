@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from symgrasp.progress import Progress
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
 
-__all__ = ["GRIP_TIME", "STEP", "timed"]
+__all__ = ["GRIP_TIME", "STEP", "load", "timed"]
 
 STEP = 0.02
 """Longest time (s) between two rows of a segment in which arms move."""
@@ -223,6 +225,19 @@ def _intervals(path: RoundedPath) -> list[tuple[float, float]]:
     cut = np.unique(np.concatenate([path.knots, np.linspace(0.0, path.length, 51)]))
     cut = cut[np.concatenate([np.diff(cut) > 1e-9 * path.length, [True]])]
     return list(zip(cut[:-1].tolist(), cut[1:].tolist(), strict=True))
+
+
+def load(progress: Progress | None = None) -> None:
+    """Import what times are computed with, part by part, as far as it is installed: that takes half a second.
+
+    Args:
+        progress: called with 0 after every part; may raise `Cancelled`.
+    """
+    for name in ("matplotlib", "matplotlib.pyplot", "toppra"):  # which imports the others before itself
+        with suppress(ImportError):
+            import_module(name)
+        if progress:
+            progress(0.0)
 
 
 def _topp(path: RoundedPath, grid: Array, speed: Array, acceleration: Array) -> Array:

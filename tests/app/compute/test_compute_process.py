@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import signal
@@ -232,6 +233,20 @@ def test_a_parser_that_misbehaves_is_reported_and_the_next_file_is_read(
     assert misbehaving.pid is None
     monkeypatch.setattr(compute_process, "READING_TIMEOUT", 60.0)
     assert misbehaving.measure("a.stl", stl(), 1.0, None, quiet).name == "a"
+
+
+def test_a_read_that_does_not_hear_a_cancel_ends_with_its_process(misbehaving, monkeypatch):
+    monkeypatch.setattr(compute_process, "CANCEL_TIMEOUT", math.inf)  # of all else
+
+    def impatient(share: float) -> None:
+        if share == 0.5:  # it has begun
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        misbehaving.measure("hangs.stl", b"", 1.0, None, impatient)
+    hanging = pid_of(misbehaving)
+    assert misbehaving.measure("a.stl", stl(), 1.0, None, quiet).name == "a"
+    assert pid_of(misbehaving) != hanging
 
 
 def test_a_mounted_hand_is_that_of_the_scene_here(process):
