@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -18,6 +19,7 @@ from .backdrop import add_floor, add_lights, add_obstacle
 from .flat_map import FlatMap, close_up
 from .following import followed, points_to_follow, unhidden
 from .ghost_view import GhostView
+from .glide import Glide
 from .nodes import set_pose
 from .object_view import ObjectView
 from .robot_view import RobotView
@@ -92,8 +94,10 @@ class SceneView:
             add_floor(self.client, f"{self._root}/floor", state.scene, dark=state.display.dark)
         with self.client.atomic():
             if state.is_current or not state.busy:  # else the arms keep still until the map arrives
-                for name, values in drawn_joint_values(state).items():
-                    self.robots[name].show(values)
+                self._picked, before = state.pick, self._picked
+                goal = drawn_joint_values(state)
+                self._glide.aim(goal, time.monotonic(), visibly=state.pick != before)
+                self._show_arms()
             if state.missing_request is None or not state.busy:
                 self.ghost.show(state)
             self.object.show(state, move_gizmo=move_gizmo)
@@ -107,6 +111,20 @@ class SceneView:
             self._follow(state)
         if state.result is not None:  # cells may be pointed at: after all else, as nobody sees it yet
             self.ghost.prepare(state.robot.name)
+
+    def wait(self) -> float | None:
+        """Return the time (s) until `step` is due, which moves arms on their way to a grasp; else None."""
+        return None if self._scene is None else self._glide.wait(time.monotonic())
+
+    def step(self) -> None:
+        """Move arms that are on their way by a frame."""
+        self._glide.step(time.monotonic())
+        with self.client.atomic():
+            self._show_arms()
+
+    def _show_arms(self) -> None:
+        for name, values in self._glide.values.items():
+            self.robots[name].show(values)
 
     def camera_moved(self, camera: Camera) -> None:
         """Turn the flat map to the camera where it can no longer be read from there; on any thread."""
@@ -142,6 +160,7 @@ class SceneView:
             name: RobotView(client, f"{root}/robot{k}", robot, values[name], visuals)
             for k, (name, robot) in enumerate(scene.robots.items())
         }
+        self._glide, self._picked = Glide(values), state.pick
         self.tool_path = ToolPath(client, root)
         self.survey = SurveyView(client, f"{root}/survey", self.on_place, self.on_stand)
         self.base_gizmo = client.scene.add_transform_controls(

@@ -8,6 +8,7 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from playwright.sync_api import Browser, Locator, expect
 
 from symgrasp.feasibility.create import create_map
@@ -166,6 +167,27 @@ def test_both_rolls_are_shown_side_by_side_on_demand(open_page):
     page.expect_title("bottle_on_table")
     page.tab("Grasp")
     expect(page.text(re.compile("roll 180°"))).not_to_have_count(0)
+    assert page.complaints == []
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=str)
+def test_four_maps_have_room_or_scroll(open_page, size):
+    page = open_page("log_four_robots", size=size)
+    page.tab("Hands")
+    page.button("All arms together").click()
+    layers = page.page.get_by_test_id("layer")
+    expect(layers).to_have_count(4)
+    expect(page.page.get_by_test_id("together")).to_have_text(re.compile("^smallest gap|^gap"))
+    pane = page.page.locator("#pane").bounding_box()
+    assert pane
+    for layer in layers.all():
+        layer.scroll_into_view_if_needed()
+        box = layer.bounding_box()
+        assert box
+        assert box["height"] >= 80
+        assert box["width"] > 0.7 * pane["width"]
+        assert box["y"] >= pane["y"] - 1
+        assert box["y"] + box["height"] <= pane["y"] + pane["height"] + 1
     assert page.complaints == []
 
 

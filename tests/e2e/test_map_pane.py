@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, expect
 
+from app.render.palette import PICK, rgb
 from app.state.map_view_state import RollChoice
 from symgrasp.feasibility.create import create_map
 from symgrasp.feasibility.map import FeasibilityMap
@@ -105,6 +106,27 @@ def test_a_click_picks_the_cell_and_the_arm_takes_it(open_page, bottle_map):
     page.wait_for_change(parked)
     page.button("Undo").click()
     expect(page.text("No grasp picked")).to_be_visible()
+
+
+def test_the_picked_cell_is_seen_inside_its_mark(open_page, bottle_map):
+    page = open_page()
+    row, column = cell_with(bottle_map, Reason.FEASIBLE)
+    x, y = at(page, bottle_map, row, column)
+    page.page.mouse.click(x, y)
+    expect(page.text("panda holds it: feasible")).to_be_visible()
+    page.page.mouse.move(5, 5)
+    mark, cell = rgb(PICK), rgb(Reason.FEASIBLE.color)
+
+    def shown() -> np.ndarray:
+        page.next_frame()
+        area = {"x": round(x) - 12, "y": round(y) - 12, "width": 24, "height": 24}
+        return np.asarray(Image.open(io.BytesIO(page.page.screenshot(clip=area))).convert("RGB"), dtype=int)
+
+    expect(page.page.get_by_test_id("readout")).not_to_contain_text("feasible")  # nothing is pointed at
+    picture = shown()
+    while not (np.abs(picture - mark).max(axis=-1) < 40).any():
+        picture = shown()
+    assert (np.abs(picture[11:13, 11:13] - cell).max(axis=-1) < 8).all()
 
 
 @pytest.mark.parametrize("degrees", [60.0, -135.0])

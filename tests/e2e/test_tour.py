@@ -21,6 +21,22 @@ def done(page: Page, step: int) -> str:
 
 INVITED = re.compile("New here")
 
+NOTED = """(() => {
+    window.letters = new Set();
+    window.counts = [];
+    const write = CanvasRenderingContext2D.prototype.fillText;
+    CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
+        if (this.canvas.id === "unroll") window.letters.add(text);
+        return write.call(this, text, ...rest);
+    };
+    addEventListener("DOMContentLoaded", () => new MutationObserver(() => {
+        const said = document.getElementById("tour-said")?.textContent ?? "";
+        const visited = said.match(/^(\\d+) of \\d+ cells visited/);
+        if (visited) window.counts.push(Number(visited[1]));
+    }).observe(document.body, { childList: true, characterData: true, subtree: true }));
+})();"""
+"""Notes what is written on the object while it unrolls, and how many cells have been visited."""
+
 
 def test_the_first_visit_is_invited_to_the_tour_and_later_ones_are_not(open_page):
     it: GraspPage = open_page("")
@@ -108,6 +124,36 @@ def test_the_tour_does_what_the_paper_says(open_page, motion):
     page.get_by_role("button", name="Finish").click()
     expect(page.locator("#tour")).to_be_hidden()
     assert it.complaints == []
+
+
+def test_the_object_unrolls_with_its_letters_and_cells_fill_one_after_the_other(open_page):
+    it: GraspPage = open_page("")
+    page = it.page
+    page.add_init_script(NOTED)
+    page.reload()
+    it.expect_title(STORY)
+    page.get_by_role("button", name="Tour", exact=True).click()
+    done(page, 1)
+    assert set(page.evaluate("[...window.letters]")) == {"z", "a", "r", "h", "θ"}
+    page.get_by_role("button", name="Next", exact=True).click()
+    done(page, 2)
+    counts = page.evaluate("window.counts")
+    assert counts == sorted(counts)
+    assert len(set(counts)) > 3
+
+
+def test_every_step_is_one_sentence_that_names_its_equation_or_algorithm(open_page):
+    it: GraspPage = open_page("")
+    page = it.page
+    page.get_by_role("button", name="Tour", exact=True).click()
+    for step in range(1, 7):
+        expect(page.locator("#tour-title")).to_contain_text(f"{step} of 6")
+        words = page.locator("#tour-words").inner_text()
+        assert re.fullmatch(r"[^.]+\.", words), words
+        assert re.search(r"equations? \d|Algorithm \d", words), words
+        if step < 6:
+            page.get_by_role("button", name="Next", exact=True).click()  # without waiting for what it does
+    page.get_by_role("button", name="Skip the tour").click()
 
 
 def test_the_tour_can_be_left_gone_back_in_and_begun_from_the_palette(open_page):

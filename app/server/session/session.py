@@ -328,17 +328,32 @@ class Session:
     def _draw_until_closed(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(self._has_to_draw, self._playback.wait(self.state, time.monotonic()))
+                self._changed.wait_for(self._has_to_draw, self._next_frame())
                 if self._closed:
                     return
                 self._play()
-                if self.state is self._drawn:
-                    continue
-                state, write_inputs, move_gizmo = self.state, self._write_inputs, self._move_gizmo
-                self._drawn, self._write_inputs, self._move_gizmo = state, False, False
-                self._writing = write_inputs
-            assert state is not None
-            self._draw(state, write_inputs=write_inputs, move_gizmo=move_gizmo)
+                state, is_new = self.state, self.state is not self._drawn
+                write_inputs, move_gizmo = self._write_inputs, self._move_gizmo
+                if is_new:
+                    self._drawn, self._write_inputs, self._move_gizmo = state, False, False
+                    self._writing = write_inputs
+            if is_new:
+                assert state is not None
+                self._draw(state, write_inputs=write_inputs, move_gizmo=move_gizmo)
+            self._move_arms()
+
+    def _next_frame(self) -> float | None:
+        """Return the time (s) until a frame of a playback or of arms that move is due, None for never."""
+        times = (self._playback.wait(self.state, time.monotonic()), self.scene_view.wait())
+        return min((seconds for seconds in times if seconds is not None), default=None)
+
+    def _move_arms(self) -> None:
+        """Move arms that are on their way to a grasp by a frame, if it is due."""
+        try:
+            if self.scene_view.wait() == 0.0:
+                self.scene_view.step()
+        except Exception:  # must not end the drawing thread
+            log.exception("arms could not be moved")
 
     def _has_to_draw(self) -> bool:
         return self._closed or self.state is not self._drawn
