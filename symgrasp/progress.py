@@ -7,7 +7,7 @@ from functools import wraps
 from time import perf_counter
 from typing import TypeVar
 
-__all__ = ["TELL", "Progress", "at_start", "cached", "part_of", "portions", "rising"]
+__all__ = ["TELL", "Progress", "at_start", "between", "cached", "part_of", "portions", "rising"]
 
 TELL = 0.05
 """Time (s) after which progress is told, and may cancel: long computations are done in portions of about
@@ -75,6 +75,11 @@ def rising(progress: Progress) -> Progress:
         progress(most)
 
     return report
+
+
+def between(progress: Progress | None, low: float, high: float) -> Progress | None:
+    """Return the progress of the part of a computation between two shares."""
+    return None if progress is None else lambda share: progress(low + share * (high - low))
 
 
 def portions(count: int, progress: Progress | None, first: int = 1) -> Iterator[slice]:

@@ -61,7 +61,7 @@ class Keyboard(Panel):
         )
         self.command("Play or pause the plan", lambda: actions.change(plan_changes.play_arms), "K")
         self.command("Replay or pause the climb", lambda: actions.change(plan_changes.play_climb), "C")
-        self.command("Add a task with the object here", lambda: change(changes.add_task), "I")
+        self.command("Add a task after this one", lambda: change(changes.add_task), "I")
         self.command("Next task of the plan", lambda: change(lambda s: _step(s, 1)), "pagedown")
         self.command("Previous task of the plan", lambda: change(lambda s: _step(s, -1)), "pageup")
         self.command("Make a link", actions.make_link)

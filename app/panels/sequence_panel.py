@@ -84,7 +84,7 @@ class TasksPanel(Panel):
         with gui.add_folder("Tasks"):
             self.list = self.html()
             self.add = self.button(
-                "Add a task with the object here",
+                "Add a task after this one",
                 viser.Icon.PLUS,
                 lambda: actions.change(changes.add_task),
                 color="gray",

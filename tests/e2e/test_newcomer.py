@@ -36,7 +36,7 @@ SWITCHES = ("Flat map", "Drag handles", "Handprint", "Compare", "Dark")
 BUTTONS = (
     "Undo", "Redo", "Cancel", "Compute the map", "Put it back", "Let go", "One grasp for all tasks",
     "List more solutions", "With motion", "Play", "Pause", "Plan with 1 regrasp", "Make a link", "PNG",
-    "Save the scene (YAML)", "Add a task with the object here", "Earlier", "Later", "Remove",
+    "Save the scene (YAML)", "Add a task after this one", "Earlier", "Later", "Remove",
 )  # fmt: skip
 KEYS = ("m", "r", "b", "l", "f", "g", "t", "p", "j", "k", "1", "2", "3", "PageDown", "PageUp", "Escape",
         "Control+z", "Control+Shift+z")  # fmt: skip

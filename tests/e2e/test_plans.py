@@ -89,7 +89,7 @@ def test_a_sequence_is_planned_played_changed_and_explained(open_page):
     shoot(page, "sequence")
 
     page.choose("Task", "pick")
-    page.button("Add a task with the object here").click()
+    page.button("Add a task after this one").click()
     expect(page.text("panda: pick → task 4 → pour → place")).to_be_visible()
     expect(page.button("Download plan")).to_be_hidden()
     page.slider_box("Task name").fill("table")

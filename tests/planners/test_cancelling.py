@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from symgrasp.errors import Cancelled
-from symgrasp.feasibility.create import create_map
+from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.exact.engine import ExactEngine
+from symgrasp.feasibility.exact.open_candidates import OpenCandidates
 from symgrasp.planners.planning import bimanual_plans, plan_bimanual
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
-from symgrasp.world import bodies, bullet
+from symgrasp.world import bodies, bullet, open_world
 from tests.conftest import load_small
 
 CALLS: dict[str, Callable[[Scene, Progress], object]] = {
@@ -63,3 +65,30 @@ def test_it_ends_at_once_where_it_is_cancelled(events, name):
     with pytest.raises(Cancelled):
         CALLS[name](load_small("log_two_robots"), cancel)
     assert events == []
+
+
+def test_windows_that_pybullet_settles_may_be_cancelled_before_every_question(monkeypatch):
+    scene = load_small("pick_pour_place")
+    events: list[str] = []
+    ask = OpenCandidates.is_free
+
+    def asked(*arguments: object) -> bool:
+        events.append("asked")
+        return ask(*arguments)
+
+    monkeypatch.setattr(OpenCandidates, "is_free", asked)
+    with open_world(scene) as world:
+        maker = MapMaker(world)
+        m = maker.map()
+        told: list[float] = []
+
+        def tell(share: float) -> None:
+            told.append(share)
+            events.append("told")
+
+        maker.windows(m, np.argwhere(m.feasible), tell)
+    assert events.count("asked") > 20
+    questions = "".join(event[0] for event in events)
+    assert "aa" not in questions
+    assert told == sorted(told)
+    assert told[-1] == 1.0

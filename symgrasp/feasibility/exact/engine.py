@@ -39,7 +39,7 @@ from symgrasp.ik.at_phi import Locked, locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns
 from symgrasp.object.manifold import Manifold
 from symgrasp.poses import Array, axis_frame, inverse
-from symgrasp.progress import TELL, Progress, at_start, part_of, portions
+from symgrasp.progress import TELL, Progress, at_start, between, part_of, portions
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import load_of_hand
@@ -433,11 +433,12 @@ class ExactEngine:
             tools = np.ascontiguousarray(T_base_tool[tuple(some.T)])
             inputs = self._inputs(tools, some[:, 1].copy(), batch, fixed)
             inputs = inputs._replace(parts=min(len(some), PARTS * core_count()))
-            own = self._redundancy.windows(inputs, batch, locked, self._scratches(), settle=settle)
-            for k, listed in zip(range(these.start, these.stop), own, strict=True):
-                found[which[k]] = listed
-                if progress:  # PyBullet may take much longer for one cell than for those before it
-                    progress((k + 1) / len(which))
+            tell = between(progress, these.start / len(which), these.stop / len(which))
+            own = self._redundancy.windows(
+                inputs, batch, locked, self._scratches(), settle=settle, progress=tell
+            )
+            for cell, listed in zip(which[these].tolist(), own, strict=True):
+                found[cell] = listed
         self.world.set_arms(())
         return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 
 import numpy as np
@@ -24,6 +24,7 @@ from symgrasp.feasibility.exact.settling import settled
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.ik.at_phi import Locked
 from symgrasp.poses import Array
+from symgrasp.progress import Progress
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 
@@ -125,6 +126,7 @@ class RedundancySearch:
         scratches: Sequence[Scratch],
         *,
         settle: bool,
+        progress: Progress | None = None,
     ) -> Iterator[tuple[Window, ...]]:
         """Yield the windows of cells, see `symgrasp.engine.redundancy.windows`.
 
@@ -135,6 +137,8 @@ class RedundancySearch:
             scratches: of the threads.
             settle: whether PyBullet decides what pieces that all but touch leave open, at the ends of
                 windows; else only where nothing else is free.
+            progress: called with the finished share, also before every question to PyBullet, of which a cell
+                may need many; may raise `Cancelled`.
         """
         geometry, tools = self._geometry, inputs.T_base_tool
         parts = batch.compiled.chain, batch.moving, geometry.pieces, geometry.tree, scratches, inputs
@@ -147,7 +151,8 @@ class RedundancySearch:
             listed = [Window(*row) for row in zip(*(c.tolist() for c in columns), strict=True)]
             if settle or not listed:
                 left = zip(own.open_branch[k, :m].tolist(), own.open_phi[k, :m].tolist(), strict=True)
-                is_free = partial(self._is_free, batch, tools[k], int(inputs.row[k]))
+                tell = progress and partial(progress, k / len(tools))
+                is_free = partial(self._is_free, batch, tools[k], int(inputs.row[k]), tell)
                 yield settled(listed, list(left), is_free, (locked.lower, locked.upper))
             else:
                 yield tuple(sorted(listed))
@@ -156,8 +161,18 @@ class RedundancySearch:
         tools = pose_rows(inputs.T_base_tool[which])
         return CoverInput(which, tools, self._reach, locked, self._inner, PARTS)
 
-    def _is_free(self, batch: Batch, T_base_tool: Array, row: int, branch: int, phi: float) -> bool:
-        """Whether a branch is free at a value of φ (rad), as PyBullet says."""
+    def _is_free(
+        self,
+        batch: Batch,
+        T_base_tool: Array,
+        row: int,
+        tell: Callable[[], None] | None,
+        branch: int,
+        phi: float,
+    ) -> bool:
+        """Whether a branch is free at a value of φ (rad), as PyBullet says; tells the progress first."""
+        if tell:
+            tell()
         ik = batch.compiled.at(np.array([phi]))
         s = ik.solve(T_base_tool)
         these = np.flatnonzero((s.branch == branch) & s.inside)

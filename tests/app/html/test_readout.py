@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from app.html.readout import grasp_html, notes_html, solution_html, status_html
+from app.html.readout import comparison_html, grasp_html, notes_html, solution_html, status_html
 from app.state import changes, job_changes
 from app.state.plans import plan_changes
-from app.state.requests import MapResult
+from app.state.requests import CompareRequest, Comparison, MapResult
 from app.state.state import State
 from symgrasp.feasibility.create import create_map
 from symgrasp.scene.scene import Scene
@@ -60,6 +61,18 @@ def test_the_hint_follows_what_is_shown():
     for k, hint in enumerate(hints):
         assert [word in hint for word in words] == [k == at for at in range(len(words))]
     assert status_html(changes.clear_pick(planned)) == hints[0]
+
+
+def test_a_comparison_counts_every_roll_and_says_so():
+    state = changes.turn(opened(), 0.3)
+    request = CompareRequest(state.request, 0.3)
+    state = replace(
+        state,
+        map_view=replace(state.map_view, comparison=Comparison(request, state.base_map.shift(0.3), 0)),
+    )
+    html = comparison_html(state)
+    rolls, heights, angles = state.base_map.reason.shape
+    assert f"0 of {rolls * heights * angles} cells differ</b>: {heights * angles} places with 2 rolls" in html
 
 
 def test_what_is_computed_but_not_drawn_yet_is_not_left_at_its_last_percent():

@@ -156,7 +156,7 @@ def test_a_link_opens_the_tasks_that_a_person_made(server):
     with server.visit() as visitor:
         visitor.wait_for(ready)
         visitor.set("Rotation (°)", 20.0)
-        visitor.trigger("Add a task with the object here")
+        visitor.trigger("Add a task after this one")
         visitor.wait_for(lambda _: any(w.get("value") == "task 2" for w in visitor.widgets.values()))
         visitor.set("Task name", name)
         visitor.set("Chosen task", "Rename")
