@@ -72,12 +72,13 @@ class MotionPlanner:
 
     def plan(self, plan: Plan, seed: int = 0, progress: Progress | None = None) -> tuple[Plan, Motion]:
         """Plan the motion of a plan; see `plan_motion`."""
-        grips = {(hold.arm, hold.grasp): self._grip(hold) for task in plan.tasks for hold in task.holds}
+        tell = at_start(progress)
+        grips = {(hold.arm, hold.grasp): self._grip(hold, tell) for task in plan.tasks for hold in task.holds}
         found = MotionDraft(self.bodies, grips, plan, seed, progress).run()
         return with_configurations(self._world, plan, found.configurations), found.motion
 
-    def _grip(self, hold: Hold) -> Grip:
-        """Return the grasp of a hold."""
+    def _grip(self, hold: Hold, progress: Progress | None) -> Grip:
+        """Return the grasp of a hold; the progress is told between the solvers that are made for it."""
         arm = self.scene.arm(hold.arm)
         more: tuple[float, ...] = ()
         if self.scene.settings.redundancy == "auto":  # whose grasps need not be at a sample
@@ -86,6 +87,10 @@ class MotionPlanner:
         if (arm.name, more) not in self._solvers:
             samples = self.scene.settings.samples
             fine = samples * (2 * int(np.ceil((LEAST_SAMPLES / samples - 1) / 2)) + 1)
-            solvers = solver_for(arm, samples, more=more), solver_for(arm, max(samples, fine), more=more)
-            self._solvers[arm.name, more] = solvers
+            solvers: list[Solver] = []
+            for count in (samples, max(samples, fine)):
+                if progress:
+                    progress(0.0)  # on a torso there is one for each of its values
+                solvers.append(solver_for(arm, count, more=more))
+            self._solvers[arm.name, more] = solvers[0], solvers[1]
         return Grip.of(hold, arm, *self._solvers[arm.name, more], self.scene.profile)

@@ -188,7 +188,10 @@ class Evaluator:
         key = self.survey.scene_key(point)
         if self._stage is None or self._stage.key != key:
             self.close()
-            scene = with_free_homes(self.survey.scene_at(point))
+            scene = self.survey.scene_at(point)
+            if tell:
+                tell(0.0)
+            scene = with_free_homes(scene)
             if tell:
                 tell(0.0)
             try:

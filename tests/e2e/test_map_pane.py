@@ -173,6 +173,7 @@ def test_arrow_keys_move_the_picked_cell(open_page, bottle_map):
     page.page.mouse.click(*at(page, bottle_map, row, column))
     expect(page.text("panda holds it")).to_be_visible()
     page.map.focus()
+    expect(page.map).to_have_accessible_name("Unwrapped map: bottle_on_table · pick · panda")
     for key in ("ArrowUp", "ArrowRight", "ArrowRight", "ArrowDown", "ArrowLeft"):
         page.page.keyboard.press(key)
     grid = bottle_map.manifold

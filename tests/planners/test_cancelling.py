@@ -15,6 +15,7 @@ from symgrasp.feasibility.exact.open_candidates import OpenCandidates
 from symgrasp.planners.planning import bimanual_plans, plan_bimanual
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
+from symgrasp.survey.success import PoseNoise, success_map
 from symgrasp.world import bodies, bullet, open_world
 from tests.conftest import load_small
 
@@ -70,7 +71,7 @@ def test_it_ends_at_once_where_it_is_cancelled(events, name):
 def test_windows_that_pybullet_settles_may_be_cancelled_before_every_question(monkeypatch):
     scene = load_small("pick_pour_place")
     events: list[str] = []
-    ask = OpenCandidates.is_free
+    ask: Callable[..., bool] = OpenCandidates.is_free
 
     def asked(*arguments: object) -> bool:
         events.append("asked")
@@ -92,3 +93,15 @@ def test_windows_that_pybullet_settles_may_be_cancelled_before_every_question(mo
     assert "aa" not in questions
     assert told == sorted(told)
     assert told[-1] == 1.0
+
+
+def test_probabilities_may_be_cancelled_in_the_map_of_the_pose_that_is_expected(events):
+    def cancel(_: float) -> None:
+        raise Cancelled
+
+    with open_world(load_small("bottle_on_table")) as world:
+        opened = list(events)
+        task = world.scene.task()
+        with pytest.raises(Cancelled):
+            success_map(MapMaker(world), task.arms[0], task, PoseNoise(0.01), 1, progress=cancel)
+    assert events == opened  # no engine
