@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import viser
-
-from symgrasp.poses import Array, from_rotation
 
 from ..render.cell_colors import cell_colors
 from ..state.state import State
 from .cell_mesh import CellMesh, OnCell, flat_quads
 from .nodes import set_pose
-from .viewpoint import Box, Viewpoint, stand_around
+from .viewpoint import FLAT_SIZE, Box, Viewpoint, flat_map_box, flat_map_position
 
-__all__ = ["FLAT_SIZE", "FlatMap", "close_up", "flat_map_position"]
-
-
-FLAT_SIZE = (0.33, 0.22)
-"""Width and height (m) of the flat map."""
-
+__all__ = ["FlatMap"]
 
 MIN_FACING = float(np.cos(np.deg2rad(65)))
 """Cosine of the angle between its front and the camera beyond which the flat map turns to the camera."""
-
-CLOSE_WIDTH = 0.5
-"""Least width (m) of a view that is close to the object."""
-
-ABOVE = 0.12
-"""How far (m) the middle of such a view is above that of the object: hands and arms come from above."""
-
-TOWARDS_MAP = 0.45
-"""Share of the way from the object to the flat map at which the middle of such a view is."""
 
 
 class FlatMap:
@@ -53,7 +36,7 @@ class FlatMap:
         add, grid = client.scene, state.scene.manifold
         width, height = FLAT_SIZE
         self.frame = add.add_frame(root, show_axes=False)
-        self._position = flat_map_position(state, view)
+        self._position = flat_map_position(state.scene, state.T_world_object, view)
         self._turn(view)
         add.add_box(
             f"{root}/back", dimensions=(width + 0.012, height + 0.012, 0.004), position=(0, 0, -0.004),
@@ -76,8 +59,7 @@ class FlatMap:
 
     def box(self, camera: Sequence[float]) -> Box:
         """Return the box that it fills once a camera is there; see `face`."""
-        width, height = FLAT_SIZE
-        return np.array([width, height, 0.01]) / 2, self._pose(self._faced(camera))
+        return flat_map_box(self._position, self._faced(camera))
 
     def _faced(self, camera: Sequence[float]) -> Viewpoint:
         seen = self._view.seen_from((*camera[:3], *self._position))
@@ -85,11 +67,7 @@ class FlatMap:
 
     def _turn(self, view: Viewpoint) -> None:
         self._view = view
-        set_pose(self.frame, self._pose(view))
-
-    def _pose(self, view: Viewpoint) -> Array:
-        axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
-        return from_rotation(axes, self._position)
+        set_pose(self.frame, flat_map_box(self._position, view)[1])
 
     def show(self, state: State) -> None:
         """Update it to a state."""
@@ -99,26 +77,3 @@ class FlatMap:
             # A shift by whole cells is in the colours; the rest is in where the grid starts.
             rest = (state.map.manifold.theta_start + np.pi) / (2 * np.pi)
             self.cells.node.position = (rest * FLAT_SIZE[0], 0.0, 0.0)
-
-
-def flat_map_position(state: State, view: Viewpoint) -> Array:
-    """Return the centre (3,) of the flat map: beside the object away from the robots, or above it."""
-    profile, pose = state.scene.profile, state.T_world_object
-    centre = (pose @ [0.0, 0.0, (profile.h_min + profile.h_max) / 2, 1.0])[:3]
-    if stand_around(state.scene, pose):
-        return centre + np.array([0.0, 0.0, 0.55])
-    bases = np.array([robot.T_world_base[:3, 3] for robot in state.scene.robots.values()])
-    away = 1.0 if (centre - bases.mean(axis=0)) @ view.right >= 0 else -1.0
-    position = centre + away * (profile.r_max + 0.07 + FLAT_SIZE[0] / 2) * view.right
-    position[2] = max(position[2], FLAT_SIZE[1] / 2 + 0.06)
-    return position
-
-
-def close_up(state: State, view: Viewpoint) -> Viewpoint:
-    """Return a viewpoint in the direction of another, in which the object and the flat map fill the view."""
-    profile, pose, flat = state.scene.profile, state.T_world_object, flat_map_position(state, view)
-    axis = np.array([[0.0, 0.0, h, 1.0] for h in (profile.h_min, profile.h_max)])
-    ends = (axis @ pose.T)[:, :3]
-    look_at = (1 - TOWARDS_MAP) * ends.mean(axis=0) + TOWARDS_MAP * flat + [0.0, 0.0, ABOVE]
-    edges = flat + np.array([[-0.5], [0.5]]) * FLAT_SIZE[0] * view.right
-    return replace(view, look_at=look_at, width=CLOSE_WIDTH, points=np.concatenate([ends, edges]))

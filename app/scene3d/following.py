@@ -12,7 +12,7 @@ from ..render.drawn_poses import drawn_joint_values, drawn_object_pose
 from ..state.page_link import Camera
 from ..state.state import State
 from .flat_map import FlatMap
-from .viewpoint import FIELD_OF_VIEW, Box, box_of, hides, link_boxes
+from .viewpoint import FIELD_OF_VIEW, Box, box_of, hides, link_boxes, link_points, surface_points
 
 __all__ = ["followed", "hidden_points", "objects_of_plan", "points_to_follow", "unhidden"]
 
@@ -25,27 +25,19 @@ NEAREST = 0.15
 TURNS = np.deg2rad([0, 15, -15, 30, -30, 45, -45, 60, -60, 75, -75, 90, -90, 120, -120, 150, -150, 180])
 """Angles (rad) that the camera may be turned by about the vertical; the first wins a tie."""
 
-ALONG, AROUND = 5, 6
-"""Heights, and points around each, of the object's surface that are to be seen."""
-
 
 def points_to_follow(state: State) -> Array:
     """Return what has to be seen of the plan's task that is shown: points (n, 3) of the world.
 
-    The ends of the object's axis, and all links of the robots that hold it in that task; none where no task
-    of a plan is shown.
+    The object's surface, and all links of the robots that hold it in that task; none where no task of a plan
+    is shown.
     """
     if state.shown_task is None:
         return np.empty((0, 3))
-    profile, pose, values = state.scene.profile, drawn_object_pose(state), drawn_joint_values(state)
-    ends = [(pose @ [0.0, 0.0, h, 1.0])[None, :3] for h in (profile.h_min, profile.h_max)]
+    values = drawn_joint_values(state)
     robots = {state.scene.arm(hold.arm).robot.name for hold in state.shown_task.holds}
-    links = [
-        (robot.T_world_base @ robot.model.forward(values[name]))[:, :3, 3]
-        for name, robot in state.scene.robots.items()
-        if name in robots
-    ]
-    return np.concatenate([*ends, *links])
+    links = link_points(state.scene, {name: q for name, q in values.items() if name in robots})
+    return np.concatenate([surface_points(state.scene.profile, drawn_object_pose(state)), *links])
 
 
 def followed(camera: Camera, points: Array, aspect: float) -> Camera:
@@ -83,14 +75,9 @@ def followed(camera: Camera, points: Array, aspect: float) -> Camera:
 
 def objects_of_plan(state: State) -> list[Array]:
     """Return points (n, 3) of the object's surface: as it is drawn, then in every task of the plan."""
-    profile = state.scene.profile
-    heights = np.linspace(profile.h_min, profile.h_max, ALONG)
-    around = np.arange(AROUND) * 2 * np.pi / AROUND
-    x, y = profile.radius(heights)[:, None] * np.stack([np.cos(around), np.sin(around)])[:, None]
-    surface = np.stack(np.broadcast_arrays(x, y, heights[:, None], 1.0), axis=-1).reshape(-1, 4)
     tasks = state.plan.plan.tasks if state.plan else []
     poses = [drawn_object_pose(state), *(task.object_pose_turned.array() for task in tasks)]
-    return [(surface @ pose.T)[:, :3] for pose in poses]
+    return [surface_points(state.scene.profile, pose) for pose in poses]
 
 
 def hidden_points(camera: Camera, points: Array, boxes: Sequence[Box]) -> int:

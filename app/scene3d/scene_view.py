@@ -16,7 +16,7 @@ from ..render.drawn_poses import drawn_joint_values
 from ..state.page_link import Camera
 from ..state.state import State
 from .backdrop import add_floor, add_lights, add_obstacle
-from .flat_map import FlatMap, close_up
+from .flat_map import FlatMap
 from .following import followed, points_to_follow, unhidden
 from .ghost_view import GhostView
 from .glide import Glide
@@ -25,9 +25,12 @@ from .object_view import ObjectView
 from .robot_view import RobotView
 from .survey_view import SurveyView
 from .tool_path import ToolPath
-from .viewpoint import FIELD_OF_VIEW, choose_viewpoint
+from .viewpoint import FIELD_OF_VIEW, Viewpoint, choose_viewpoint
 
 __all__ = ["SceneView"]
+
+SAME_CAMERA = 0.02
+"""Cameras whose coordinates (m) differ by less are the same: browsers report them inexactly."""
 
 
 class SceneView:
@@ -70,6 +73,9 @@ class SceneView:
         self._builds = self._ghosts = 0
         self._dark = False
         self._followed: tuple[object, ...] = ()
+        self._first_camera: Camera = (0.0,) * 6
+        self._arrived = self._awaits_grasp = False
+        self._aspect_built_for = 1.0
         self.camera: Camera | None = None
         self.is_close = False
         self._root = self._object_root = ""
@@ -108,6 +114,10 @@ class SceneView:
                 set_pose(self.base_gizmo, state.robot.T_world_base)
             if self.flat_map:
                 self.flat_map.show(state)
+            if self._awaits_grasp and not state.holds_first and state.is_current:
+                self._awaits_grasp = False  # the arm has just taken it
+                view = self._choose_viewpoint(state, self._aspect_built_for, close=True)
+                self._look_from(view.camera(self._aspect_built_for))
             self._follow(state)
         if state.result is not None:  # cells may be pointed at: after all else, as nobody sees it yet
             self.ghost.prepare(state.robot.name)
@@ -127,10 +137,18 @@ class SceneView:
             self.robots[name].show(values)
 
     def camera_moved(self, camera: Camera) -> None:
-        """Turn the flat map to the camera where it can no longer be read from there; on any thread."""
-        if self.flat_map:
-            with suppress(RuntimeError):  # it was removed: another is about to take its place
-                self.flat_map.face(camera)
+        """Turn the flat map to the camera where it can no longer be read from there; on any thread.
+
+        What a browser says before it is where it was put at first is from before the scene was there.
+        Whoever looks elsewhere before the first grasp is there is not turned back to it.
+        """
+        if np.allclose(camera, self._first_camera, atol=SAME_CAMERA):
+            self._arrived = True
+        elif self._arrived:
+            self._awaits_grasp = False
+            if self.flat_map:
+                with suppress(RuntimeError):  # it was removed: another is about to take its place
+                    self.flat_map.face(camera)
 
     def _build(self, state: State) -> None:
         """Replace all nodes by those of another scene."""
@@ -140,14 +158,17 @@ class SceneView:
         given, self.camera = self.camera, None
         self._followed = _shown_of_plan(state) if given or self.is_close else ()
         values = drawn_joint_values(state)
-        view = choose_viewpoint(scene, state.T_world_object, values if self.is_close else None)
+        close, self.is_close = self.is_close, False
+        aspect = self._aspect_built_for = self._aspect()
+        view = self._choose_viewpoint(state, aspect, close=close)
         view = self._viewpoint = view.seen_from(given) if given else view
-        seen, self.is_close = close_up(state, view) if self.is_close else view, False
+        camera = given or view.camera(aspect)
+        self._first_camera, self._arrived = camera, False
+        self._awaits_grasp = close and not given
         with client.atomic():
             client.camera.fov = FIELD_OF_VIEW
             client.camera.up_direction = (0.0, 0.0, 1.0)
-            client.camera.position = np.array(given[:3]) if given else seen.camera(self._aspect())
-            client.camera.look_at = np.array(given[3:]) if given else seen.look_at
+            self._look_from(camera)
         client.scene.add_frame(root, show_axes=False)
         add_lights(client, root, view)
         self._dark = state.display.dark
@@ -204,7 +225,16 @@ class SceneView:
             flat_map = self.flat_map if state.display.flat_map else None
             after = unhidden(now, state, aspect, flat_map)
         if after != now:
-            camera.position, camera.look_at = np.array(after[:3]), np.array(after[3:])
+            self._look_from(after)
+
+    def _choose_viewpoint(self, state: State, aspect: float, *, close: bool) -> Viewpoint:
+        return choose_viewpoint(
+            state.scene, state.T_world_object, drawn_joint_values(state), aspect,
+            close=close, flat_map=state.display.flat_map,
+        )  # fmt: skip
+
+    def _look_from(self, camera: Camera) -> None:
+        self.client.camera.position, self.client.camera.look_at = np.array(camera[:3]), np.array(camera[3:])
 
     def _replace(self, old: str, new: str) -> str:
         """Remove a node and return an unused path for its successor: browsers keep the pose of a path."""

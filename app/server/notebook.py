@@ -14,6 +14,7 @@ from symgrasp.plan.plan import Plan
 from symgrasp.scene.scene import Scene
 
 from ..compute.plan_service import plan_result
+from ..render.drawn_poses import drawn_joint_values
 from ..scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
 from ..state import changes
 from ..state.plans.plan_changes import show_results, show_step
@@ -90,6 +91,8 @@ def plan_document(plan: Plan, scene: Scene, maps: Mapping[tuple[str, str], Feasi
 
 
 def _drawn(state: State) -> str:
-    view = choose_viewpoint(state.scene, state.T_world_object)
-    camera = (*view.camera(ASPECT).tolist(), *view.look_at.tolist())
-    return snapshot_html(state, camera, FIELD_OF_VIEW)
+    values = drawn_joint_values(state)
+    view = choose_viewpoint(
+        state.scene, state.T_world_object, values, ASPECT, flat_map=state.display.flat_map
+    )
+    return snapshot_html(state, view.camera(ASPECT), FIELD_OF_VIEW)

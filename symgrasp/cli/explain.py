@@ -27,12 +27,16 @@ def add_parser(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the cell's candidates; return the exit status."""
+    from symgrasp.errors import InputError, ProfileError
     from symgrasp.feasibility.create import MapMaker
     from symgrasp.reason import Reason
     from symgrasp.world import open_world
 
     scene, task, arm = chosen(args)
-    row, column = scene.manifold.cell(args.h, math.radians(args.theta))
+    try:
+        row, column = scene.manifold.cell(args.h, math.radians(args.theta))
+    except ProfileError as error:
+        raise InputError("command line", "--h", error.value, error.expected) from None
     with open_world(scene) as world, progress_of("candidates") as progress:
         cell = (args.roll // 180, row, column)
         found = MapMaker(world).explain(arm.name, task, cell, progress=progress)

@@ -54,7 +54,7 @@ class ObjectReport:
         ]
         if self.measurement is not None:
             m = self.measurement
-            axis, origin = m.T_mesh_object[:3, 2], m.T_mesh_object[:3, 3]
+            axis, origin = np.round(m.T_mesh_object[:3, 2:].T, 4) + 0.0  # no zero has a sign
             text += [
                 f"  axis in the file     ({', '.join(f'{x:.4f}' for x in axis)})",
                 f"  bottom in the file   ({', '.join(f'{x:.4f}' for x in origin)}) m",

@@ -272,6 +272,8 @@ class Plan(_Part):
             content = read_file(Path(path), LARGEST_PLAN)
         except (OSError, ValueError) as error:
             raise PlanError(path, "file", str(error), "a readable JSON file") from error
+        if Path(path).suffix in (".yaml", ".yml"):
+            raise PlanError(path, "file", Path(path).suffix, "a plan: a JSON file, not a scene")
         return Plan.parse(content, str(path))
 
     @staticmethod

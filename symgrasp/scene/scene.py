@@ -79,6 +79,8 @@ class Scene:
         path = Path(scene)
         if path.suffix not in (".yaml", ".yml"):
             shipped = shipped_scenes()
+            if path.is_file():
+                raise SceneError(path, "file", path.suffix, "a scene: a file that ends in .yaml")
             if str(scene) not in shipped:
                 raise SceneError("scene", "name", str(scene), one_of(shipped, scene) + ", or a .yaml file")
             path = shipped[str(scene)]

@@ -179,7 +179,7 @@ def test_object_of_the_library_and_from_a_mesh(tmp_path, capsys):
     mesh = tmp_path / "bottle.stl"
     Scene.load("soda_can").profile.mesh().apply_scale(1000).export(mesh)
     assert main(["object", str(mesh)]) == 2
-    assert "--scale 0.001" in capsys.readouterr().err
+    assert "; scale 0.001 would make it" in capsys.readouterr().err
     assert main(["object", str(mesh), "--scale", "0.001"]) == 0
     text = capsys.readouterr().out
     assert "11.50 cm tall" in text
@@ -241,6 +241,7 @@ def test_schemas_are_schemas(name, capsys):
         ),
         (["plan", "bimanual", "soda_can", "--out", "p.json"], "two or more arms"),
         (["plan", "sequential", "log_two_robots", "--out", "p.json"], "does alone"),
+        (["explain", "soda_can", "--h", "60", "--theta", "0"], "command line: --h: 60.0: expected within ["),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(arguments, message, capsys, tmp_path, monkeypatch):
@@ -251,6 +252,18 @@ def test_bad_input_is_one_line_and_status_2(arguments, message, capsys, tmp_path
     assert captured.err.count("\n") == 1
     assert captured.out == ""
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "expected"),
+    [("map", "plan.json", "a scene: a file that ends in .yaml"), ("verify", "a.yaml", "a plan: a JSON file")],
+)
+def test_a_file_of_another_kind_is_told_from_a_damaged_one(command, name, expected, tmp_path, capsys):
+    (tmp_path / name).write_text("{}")
+    assert main([command, str(tmp_path / name)]) == 2
+    error = capsys.readouterr().err
+    assert f"{tmp_path / name}: file: " in error
+    assert f"expected {expected}" in error
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from playwright.sync_api import Frame, Locator, Page, WebSocket, expect
 
 from app.panels.layout import panels_width
 from app.render.palette import rgb
-from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
+from app.scene3d.viewpoint import FIELD_OF_VIEW, Viewpoint, choose_viewpoint
 from app.server.door.front_door import MAP
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
@@ -208,15 +208,23 @@ class GraspPage:
         row = self.frame.locator(f"xpath=//*[normalize-space(text())='{label}']/ancestor::*[.//input][1]")
         return row.locator("input").filter(visible=True).last
 
+    @property
+    def aspect(self) -> float:
+        """Ratio of width to height of the 3D view beside the panels."""
+        size = self.page.locator("#view").bounding_box()
+        assert size
+        return (size["width"] - panels_width(round(size["width"]))) / size["height"]
+
+    def viewpoint(self, scene: Scene) -> Viewpoint:
+        """Return where the page looks at a scene from at first."""
+        return choose_viewpoint(scene, scene.task().T_world_object, aspect=self.aspect)
+
     def at(self, scene: Scene, point: np.ndarray) -> tuple[float, float]:
         """Return the pixel of a point (3,) of the world, seen from where the page looks at first."""
         box = self.frame.locator("canvas").first.bounding_box()
-        size = self.page.locator("#view").bounding_box()
         assert box
-        assert size
-        view = choose_viewpoint(scene, scene.task().T_world_object)
-        eye = view.camera((size["width"] - panels_width(round(size["width"]))) / size["height"])
-        forward = (view.look_at - eye) / np.linalg.norm(view.look_at - eye)
+        camera = np.array(self.viewpoint(scene).camera(self.aspect))
+        eye, forward = camera[:3], (camera[3:] - camera[:3]) / np.linalg.norm(camera[3:] - camera[:3])
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
         up = np.cross(right, forward)

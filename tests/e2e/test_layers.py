@@ -18,7 +18,7 @@ from symgrasp.planners.gaps import print_gap
 from symgrasp.scene.scene import Scene
 from tests.e2e.page import GraspPage
 
-LEFT, TOP, RIGHT, BOTTOM, PROFILE = 46, 4, 12, 17, 64
+LEFT, TOP, RIGHT, BOTTOM, PROFILE = 46, 7, 12, 17, 64
 """What the axes and the profile take (px) around the cells."""
 
 COLUMNS = 1440

@@ -102,8 +102,9 @@ def test_millimetres_are_refused_with_the_remedy(tmp_path):
     path = save(tmp_path, CAN.copy().apply_scale(2000), "can.stl")
     text = refused(path, "size")
     assert "230 m" in text
-    assert "--scale 0.001" in text
-    assert "--scale" in refused(save(tmp_path, CAN.copy().apply_scale(1e-3), "tiny.stl"), "size")
+    assert "; scale 0.001 would make it" in text
+    tiny = save(tmp_path, CAN.copy().apply_scale(1e-3), "tiny.stl")
+    assert "; scale 1000 would make it" in refused(tiny, "size")
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf")])

@@ -230,7 +230,8 @@ class FrontDoor:
         page = next((s.partition("=")[2] for s in reversed(settings) if s.startswith(f"{PAGE}=")), "")
         tokens = [text if TOKEN.fullmatch(text) else "" for text in page.split(".")]
         before = tokens[1] if len(tokens) == 2 else ""
-        visit = Visit(token, query, address, tokens[0], before, STACKED in settings)
+        stacked = any(s.partition("=")[0] == STACKED for s in settings)  # viser may write "stacked=" instead
+        visit = Visit(token, query, address, tokens[0], before, stacked)
         if not is_own_picture(headers) or not self._on_visit(visit):
             return connection.respond(HTTPStatus.NOT_FOUND, "")
         return _found(connection, PageFile(PICTURE, "image/svg+xml"))

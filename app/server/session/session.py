@@ -304,7 +304,10 @@ class Session:
             name = link.scene or self.cache.first
             holds = self.cache.holds_first and link == Link()
             opened = replace(State.of(scene, name), object_choice=choice, holds_first=holds)
-            return link.apply(opened), link.camera
+            opened = link.apply(opened)
+            if holds:  # arm and object have the view; the map is beside it
+                opened = changes.switched(opened, flat_map=False)
+            return opened, link.camera
 
         def done(result: tuple[State, Camera | None]) -> None:
             state, self._camera = result

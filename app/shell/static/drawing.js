@@ -4,8 +4,9 @@ import { patterned, tile } from "./patterns.js";
 
 const FONT = "11px system-ui, sans-serif";
 const ROOM = { left: 46, bottom: 38, top: 10, right: 12, profile: 64 };
-const STRIP = { ...ROOM, bottom: 17, top: 4 }; // of several maps below each other
+const STRIP = { ...ROOM, bottom: 17, top: 7 }; // of several maps below each other
 const RING = 6; // radius (px) of a mark
+const LOW = 240; // height (px) below which a map that lies has all of it, without the profile
 const NAMED = 64; // height (px) from which on an upward axis has its name
 const GREY = [236, 238, 241], UNVISITED = "#f7f8fa";
 
@@ -46,7 +47,8 @@ export function layout(pane) {
   }
   const around = cells ? TURN * Math.max(...cells.profile.map(([, r]) => r)) : 1;
   const lying = Boolean(cells) && pane.lies && cells.high - cells.low > around === width > height && width !== height && cells.high - cells.low > 1.25 * around;
-  const { left, bottom, top, right } = pane.strip ? STRIP : ROOM, profile = lying && pane.strip ? 0 : ROOM.profile;
+  pane.alone = lying && (pane.strip || height < LOW);
+  const { left, bottom, top, right } = pane.strip ? STRIP : ROOM, profile = pane.alone ? 0 : ROOM.profile;
   frame.place(left, top + (lying ? profile : 0), Math.max(20, width - left - right - (lying ? 0 : profile)),
     Math.max(20, height - top - bottom - (lying ? profile : 0)), lying);
 }
@@ -94,7 +96,7 @@ export function draw(pane) {
   context.lineWidth = 1;
   context.strokeRect(x - 0.5, y - 0.5, width + 1, height + 1);
   axes(context, pane);
-  if (!(pane.strip && frame.lying)) profile(context, pane);
+  if (!pane.alone) profile(context, pane);
 }
 
 /** Draw a picture of all cells that begins at a share of the turn, and goes on from its other end. */

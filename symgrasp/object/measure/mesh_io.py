@@ -52,7 +52,7 @@ def read_single_object(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     if not len(mesh.faces):
         raise MeshError(path, "surface", "no area", "triangles that enclose an object")
     mesh.remove_unreferenced_vertices()
-    check_size(path, "size", mesh, SIZES, scale, "--scale")
+    check_size(path, "size", mesh, SIZES, scale)
     _check_not_flat(path, mesh)
     _check_one_object(path, mesh)
     return mesh

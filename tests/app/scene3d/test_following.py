@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,13 +13,16 @@ import viser
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.render.drawn_poses import drawn_joint_values
 from app.scene3d.following import KEPT, followed, points_to_follow
 from app.scene3d.scene_view import SceneView
-from app.scene3d.viewpoint import FIELD_OF_VIEW
 from app.server.door.viser_server import quiet_server
+from app.state.changes import switched
+from app.state.first_grasp import with_first_grasp
 from app.state.page_link import Camera
 from app.state.plans.plan_changes import show_position, show_step
 from app.state.state import State
+from tests.app.scene3d.seen import in_view, link_corners
 from tests.app.state.states import opened, with_plan
 
 SIZE = (468, 800)
@@ -29,22 +33,10 @@ POINTS = st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=1, max_size=6).
 CAMERAS = st.tuples(*[NUMBERS] * 6).filter(lambda c: np.hypot(c[0] - c[3], c[1] - c[4]) > 0.1)
 
 
-def seen(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
-    """Where points (n, 3) are in the view: from -1 to 1 across and upwards; NaN behind the camera."""
-    eye, target = np.array(camera[:3]), np.array(camera[3:])
-    forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    x, y, depth = np.stack([right, np.cross(right, forward), forward]) @ (points - eye).T
-    half = np.tan(FIELD_OF_VIEW / 2)
-    depth = np.where(depth > 0, depth, np.nan)
-    return np.stack([x / (depth * half * aspect), y / (depth * half)], axis=-1)
-
-
 @given(CAMERAS, POINTS, st.floats(0.4, 2.5))
 def test_all_is_in_view_afterwards_and_the_direction_stays(camera, points, aspect):
     after = followed(camera, points, aspect)
-    assert (np.abs(seen(after, points, aspect)) <= KEPT + 1e-6).all()
+    assert (np.abs(in_view(after, points, aspect)) <= KEPT + 1e-6).all()
     before, now = (np.array(c[3:]) - c[:3] for c in (camera, after))
     assert np.allclose(np.cross(before, now), 0, atol=1e-6 * np.linalg.norm(before) * np.linalg.norm(now))
     assert before @ now > 0
@@ -53,7 +45,7 @@ def test_all_is_in_view_afterwards_and_the_direction_stays(camera, points, aspec
 
 @given(CAMERAS, POINTS, st.floats(0.4, 2.5))
 def test_a_camera_that_sees_all_is_left_where_it_is(camera, points, aspect):
-    inside = (np.abs(seen(camera, points, aspect)) < KEPT - 1e-6).all()
+    inside = (np.abs(in_view(camera, points, aspect)) < KEPT - 1e-6).all()
     near = ((points - camera[:3]) @ (np.array(camera[3:]) - camera[:3])).min() < 0.2 * np.linalg.norm(
         np.array(camera[3:]) - camera[:3]
     )
@@ -95,9 +87,11 @@ def test_every_task_of_a_plan_is_in_view(view, camera, name, kind):
         camera.position, camera.look_at = np.array([9.0, 9.0, 2.0]), np.array([9.0, 5.0, 1.0])  # elsewhere
         state = show_step(state, step)
         view.show(state, move_gizmo=True)
-        points = points_to_follow(state)
-        assert len(points) > 5
-        assert (np.abs(seen(pose(camera), points, SIZE[0] / SIZE[1])) <= KEPT + 1e-6).all()
+        assert state.shown_task
+        robots = [state.scene.arm(hold.arm).robot for hold in state.shown_task.holds]
+        values = drawn_joint_values(state)
+        points = np.concatenate([link_corners(robot, values[robot.name]) for robot in robots])
+        assert (np.abs(in_view(pose(camera), points, SIZE[0] / SIZE[1])) <= KEPT + 1e-6).all()
 
 
 def test_who_looks_elsewhere_while_nothing_changes_is_not_turned_back(view, camera):
@@ -147,7 +141,9 @@ def test_no_obstacle_is_before_the_object_of_a_plan(view, camera, azimuth):
         camera.position, camera.look_at = eye, middle
         view.show(state, move_gizmo=True)
         assert behind_obstacles(state, pose(camera)) == 0
-        assert (np.abs(seen(pose(camera), points_to_follow(state), SIZE[0] / SIZE[1])) <= KEPT + 1e-6).all()
+        assert (
+            np.abs(in_view(pose(camera), points_to_follow(state), SIZE[0] / SIZE[1])) <= KEPT + 1e-6
+        ).all()
 
 
 def test_what_plays_turns_no_camera_around(view, camera):
@@ -164,9 +160,41 @@ def test_what_plays_turns_no_camera_around(view, camera):
     assert np.cross(ahead, later) == pytest.approx(np.zeros(3), abs=1e-9)
 
 
-def test_a_camera_moves_while_its_scene_is_replaced(view):
+def test_a_camera_moves_while_its_scene_is_replaced(view, camera):
     view.show(opened("pick_pour_place"), move_gizmo=True)
+    view.camera_moved(pose(camera))
     assert view.flat_map
     view.flat_map.frame.remove()
     for azimuth in np.linspace(0, 2 * np.pi, 5):
         view.camera_moved((3 * np.cos(azimuth), 3 * np.sin(azimuth), 1.0, 0.0, 0.0, 0.0))
+
+
+def first_grasp(view: SceneView, state: State) -> State:
+    """Show a page that begins with a grasp before its map is there; return it with the grasp."""
+    view.is_close, state = True, switched(state, flat_map=False)
+    view.show(replace(state, result=None, holds_first=True), move_gizmo=True)
+    held = with_first_grasp(replace(state, holds_first=True))
+    assert held.pick
+    return held
+
+
+def test_the_arm_is_in_view_when_it_has_taken_its_first_grasp(view, camera):
+    held = first_grasp(view, opened("pick_pour_place"))
+    view.camera_moved(pose(camera))
+    view.show(held, move_gizmo=True)
+    arm = held.scene.arm()
+    seen = in_view(
+        pose(camera), link_corners(arm.robot, drawn_joint_values(held)[arm.robot.name]), SIZE[0] / SIZE[1]
+    )
+    assert (np.abs(seen) < 1).all()
+    assert (seen.max(axis=0) - seen.min(axis=0)).max() > 1.7  # from nearer than the arm at home is seen
+
+
+def test_who_looks_elsewhere_before_the_first_grasp_is_not_turned_back(view, camera):
+    held = first_grasp(view, opened("pick_pour_place"))
+    view.camera_moved(pose(camera))
+    elsewhere = np.array([9.0, 9.0, 2.0]), np.array([9.0, 5.0, 1.0])
+    camera.position, camera.look_at = elsewhere
+    view.camera_moved(pose(camera))
+    view.show(held, move_gizmo=True)
+    assert (camera.position, camera.look_at) == elsewhere

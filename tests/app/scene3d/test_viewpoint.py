@@ -15,9 +15,10 @@ from scipy.spatial.transform import Rotation
 from app.panels.pose_panel import position_range
 from app.scene3d.flat_map import MIN_FACING
 from app.scene3d.scene_view import SceneView
-from app.scene3d.viewpoint import FIELD_OF_VIEW, choose_viewpoint
+from app.scene3d.viewpoint import choose_viewpoint
 from app.server.door.viser_server import quiet_server
 from symgrasp.scene.scene import Scene
+from tests.app.scene3d.seen import in_view, link_corners
 from tests.app.state.states import opened
 from tests.conftest import PLAIN
 
@@ -36,6 +37,8 @@ def view_of(server: viser.ViserServer, camera: tuple[float, ...] | None) -> Scen
     view = SceneView(client, None, *ignored)  # pyright: ignore[reportArgumentType]
     view.camera = camera
     view.show(opened("soda_can"), move_gizmo=True)
+    view.camera_moved((3.0, 3.0, 3.0, 0.0, 0.0, 0.0))  # from before the scene was there
+    view.camera_moved((*looker.position, *looker.look_at))
     return view
 
 
@@ -84,23 +87,32 @@ def test_a_view_that_begins_with_a_camera_has_the_flat_map_towards_it(server, an
 def test_every_robot_and_every_task_is_in_the_picture(name, aspect):
     scene = Scene.load(name)
     pose = scene.task().T_world_object
-    seen = choose_viewpoint(scene, pose)
-    eye = seen.camera(aspect)
-    forward = (seen.look_at - eye) / np.linalg.norm(seen.look_at - eye)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
+    camera = choose_viewpoint(scene, pose, aspect=aspect).camera(aspect)
     middle = [0.0, 0.0, (scene.profile.h_min + scene.profile.h_max) / 2, 1.0]
-    points = [
-        (robot.T_world_base @ pose)[:3, 3]
-        for robot in scene.robots.values()
-        for pose in robot.model.forward(robot.home)
-    ]
-    points += [(task.T_world_object @ middle)[:3] for task in scene.tasks.values()]
-    edge = np.tan(FIELD_OF_VIEW / 2)
-    for point in points:
-        depth = (point - eye) @ forward
-        assert abs((point - eye) @ right) < aspect * edge * depth
-        assert abs((point - eye) @ np.cross(right, forward)) < edge * depth
+    places = [(task.T_world_object @ middle)[None, :3] for task in scene.tasks.values()]
+    points = np.concatenate([*links_at_home(scene), ends_of(scene, pose), *places])
+    assert (np.abs(in_view(camera, points, aspect)) < 1).all()
+
+
+@pytest.mark.parametrize("aspect", [472 / 800, 820 / 268, 390 / 205])
+@pytest.mark.parametrize("name", PLAIN)
+def test_a_close_view_is_filled_by_robots_and_object(name, aspect):
+    scene = Scene.load(name)
+    pose = scene.task().T_world_object
+    camera = choose_viewpoint(scene, pose, aspect=aspect, close=True, flat_map=False).camera(aspect)
+    seen = in_view(camera, np.concatenate([*links_at_home(scene), ends_of(scene, pose)]), aspect)
+    assert (np.abs(seen) < 1).all()
+    if np.linalg.norm(np.subtract(camera[:3], camera[3:])) > 1.2:  # else it would be too near
+        assert (seen.max(axis=0) - seen.min(axis=0)).max() > 1.6
+
+
+def links_at_home(scene: Scene) -> list[np.ndarray]:
+    return [link_corners(robot, robot.home) for robot in scene.robots.values()]
+
+
+def ends_of(scene: Scene, pose: np.ndarray) -> np.ndarray:
+    ends = np.array([[0.0, 0.0, h, 1.0] for h in (scene.profile.h_min, scene.profile.h_max)])
+    return (ends @ pose.T)[:, :3]
 
 
 @pytest.mark.parametrize("name", PLAIN)
