@@ -105,6 +105,10 @@ def is_harmless(plan: Plan, other: Plan) -> bool:
     if other.scene != plan.scene:
         return other.model_copy(update={"scene": plan.scene}) == plan and is_true(other)
     for task, now in zip(plan.tasks, other.tasks, strict=True):
+        if task.balance.keys() != now.balance.keys():
+            return False
+        if any(stated > task.balance[robot] for robot, stated in now.balance.items()):
+            return False
         for hold, held in zip(task.holds, now.holds, strict=True):
             for name in LESS:
                 stated = getattr(held, name)
@@ -122,7 +126,7 @@ def _without(plan: Plan) -> dict:
     """Return what a plan says but for poses, its making, and numbers that say less when they are smaller."""
     content = plan.model_dump(exclude=set(MAKING))
     for task in content["tasks"]:
-        del task["object_pose"], task["object_pose_turned"], task["delta"]
+        del task["object_pose"], task["object_pose_turned"], task["delta"], task["balance"]
         for hold in task["holds"]:
             for name in ("tool_pose", *LESS):
                 del hold[name]
