@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from symgrasp.collision.boxes import box_of, boxes_of
 from symgrasp.collision.simplex import FAST
 from symgrasp.collision.walk import WAITING
 from symgrasp.compiling import njit
+from symgrasp.ik.vectors import sine_and_cosine
 from symgrasp.poses import Array
 
 __all__ = [
@@ -23,15 +23,7 @@ __all__ = [
     "place_frames",
     "place_hand",
     "place_pieces",
-    "sine_and_cosine",
 ]
-
-QUARTER, QUARTER_REST = 0.5 * math.pi, 6.123233995736766e-17
-"""A quarter turn (rad), as a float and what that lacks."""
-
-S3, S5, S7, S9, S11, S13, S15 = ((-1) ** (n // 2) / math.factorial(n) for n in range(3, 16, 2))
-C4, C6, C8, C10, C12, C14, C16 = ((-1) ** (n // 2) / math.factorial(n) for n in range(4, 17, 2))
-"""The coefficients of the Taylor series of sine and cosine."""
 
 
 class MovingPieces(NamedTuple):
@@ -224,21 +216,3 @@ def _mix_columns(frame, u, v, s, c):
         a, b = frame[3 * i + u], frame[3 * i + v]
         frame[3 * i + u] = a * c + b * s
         frame[3 * i + v] = b * c - a * s
-
-
-@njit(**FAST)
-def sine_and_cosine(angle):
-    """Return sine and cosine of an angle (rad) to 2e-15, for the angles of joints: a few turns at most.
-
-    By their Taylor series about the nearest quarter turn, of which the terms left out are below 5e-17. It
-    takes a quarter of the time of the library's, which also serve huge angles and come one by one.
-    """
-    quarters = math.floor(angle * (2.0 / math.pi) + 0.5)
-    x = (angle - quarters * QUARTER) - quarters * QUARTER_REST
-    z = x * x
-    s = x + x * z * (S3 + z * (S5 + z * (S7 + z * (S9 + z * (S11 + z * (S13 + z * S15))))))
-    c = 1.0 + z * (-0.5 + z * (C4 + z * (C6 + z * (C8 + z * (C10 + z * (C12 + z * (C14 + z * C16)))))))
-    n = int(quarters) & 3
-    if n & 1:
-        s, c = c, s
-    return (-s if n & 2 else s), (-c if (n + 1) & 2 else c)

@@ -174,6 +174,9 @@ def _check_rows(moving, pieces, scratch, inputs, run, length, T, rows):
 @njit(**STRICT)
 def _search_cell(chain, moving, pieces, tree, scratch, branches, inputs, balance, rows, cell, result):
     """Search one cell and write its result."""
+    if inputs.beyond[cell]:
+        result.proven[cell] = True
+        return
     T = inputs.T_base_tool[cell]
     run = cell * len(inputs.row) // len(inputs.T_base_tool)
     q, exists, inside = branches.q[0], branches.exists[0], branches.inside[0]

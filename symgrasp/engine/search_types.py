@@ -70,6 +70,7 @@ class SearchInput(NamedTuple):
         clearance: the clearance (m) of pieces that the arm does not move; that of a candidate is not
             larger.
         always_collides: whether pieces that the arm does not move collide, so that no candidate is free.
+        beyond: (m,) which cells are out of reach whatever the redundancy is, so that no sample is tried.
         parts: number of parts that the cells are split into for the threads.
     """
 
@@ -82,6 +83,7 @@ class SearchInput(NamedTuple):
     margin: float
     clearance: float
     always_collides: bool
+    beyond: np.ndarray
     parts: int
 
 
@@ -99,8 +101,8 @@ class SearchResult(NamedTuple):
         undecided_count: (m,) number of undecided candidates.
         undecided_q: (m, UNDECIDED_KEPT, n) joint values of the first of them.
         undecided_solution: (m, UNDECIDED_KEPT, 2) their redundancy samples and branches.
-        proven: (m,) whether nothing is free whatever the redundancy is: what the tool pose alone places
-            collides, at the grasp or on its retreat.
+        proven: (m,) whether nothing is free whatever the redundancy is: the cell is out of reach, or what the
+            tool pose alone places collides, at the grasp or on its retreat.
         rows: the row checks.
     """
 

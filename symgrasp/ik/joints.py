@@ -15,6 +15,7 @@ from symgrasp.ik.vectors import (
     plus,
     rotate,
     row,
+    sine_and_cosine,
     subproblem1,
     transposed_times,
     vec,
@@ -203,7 +204,7 @@ def misses(forward, q, T):
     n = q.shape[0]
     x, y, p = column(forward, 2 * n + 1, 0), column(forward, 2 * n + 1, 1), (0.0, 0.0, 0.0)
     for j in range(n - 1, -1, -1):
-        axis, s, c = row(forward, j), math.sin(q[j]), math.cos(q[j])
+        axis, (s, c) = row(forward, j), sine_and_cosine(q[j])
         x, y = rotate(axis, s, c, x), rotate(axis, s, c, y)
         p = rotate(axis, s, c, plus(p, row(forward, n + j + 1)))
     d = minus(plus(p, row(forward, n)), column(T, 0, 3))

@@ -50,7 +50,7 @@ from symgrasp.ik.vectors import (
     vec,
 )
 
-__all__ = ["reach_cosine", "spherical_branches"]
+__all__ = ["reach", "spherical_branches"]
 
 CERTAIN = 1e-7
 """A cosine, or the square of a sine, that is beyond a limit by this is so however it was computed."""
@@ -66,7 +66,7 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, miss
         sure, reaches = _sure_reach(g, joint, limits, T)
         if sure:
             return reaches
-    R, t, c = _reach(g, joint, T)
+    R, t, c = reach(g, joint, T)
     a = vec(g, CENTRE_SEEN)
     # Where possible sines and cosines are computed without their angles: most branches are dropped at a joint
     # limit before an angle is needed.
@@ -94,8 +94,11 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, miss
 
 
 @njit(**STRICT)
-def _reach(g, joint, T):
-    """Subproblem 3, |R4⁻¹ a − b| = |t|: return R_G, t = G⁻¹ S − W, and the cosine that joint 4 needs."""
+def reach(g, joint, T):
+    """Subproblem 3, |R4⁻¹ a − b| = |t|: return R_G, t = G⁻¹ S − W, and the cosine that joint 4 needs.
+
+    Beyond ±1 the pose (4, 4) is out of reach.
+    """
     R, p = tool_motion(g, joint[7], T)
     t = minus(transposed_times(R, minus(vec(g, CENTRE), p)), vec(g, WRIST))
     return R, t, (-0.5 * dot(t, t) - g[MIDDLE + 2]) / g[MIDDLE + 1]
@@ -136,12 +139,6 @@ def _sure_reach(g, joint, limits, T):
 def _third(g, i):
     """Return every third of nine entries of a vector, from i on: a column of a matrix."""
     return (g[i], g[i + 3], g[i + 6])
-
-
-@njit(**STRICT)
-def reach_cosine(g, joint, T):
-    """Return the cosine that joint 4 needs for a pose (4, 4); beyond ±1 it is out of reach."""
-    return _reach(g, joint, T)[2]
 
 
 @njit(**STRICT)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -107,7 +107,18 @@ class Hand:
 
     def joint_values(self, opening: float) -> dict[str, float]:
         """Return joint name → value of the hand's joints (rad or m) at an opening (m)."""
-        return {name: float(_value(table, opening)) for name, table in self.joints.items()}
+        return {
+            name: float(table * opening if isinstance(table, float | int) else np.interp(opening, *table))
+            for name, table in self._tables.items()
+        }
+
+    @cached_property
+    def _tables(self) -> dict[str, float | Array]:
+        """What `joints` holds, as ratios and as knots (2, k)."""
+        return {
+            name: float(table) if isinstance(table, float | int) else _knots(tuple(map(tuple, table)))
+            for name, table in self.joints.items()
+        }
 
     def standoff(self, radius: float) -> float:
         """Return the distance d (m) of the tool frame from the axis: ``max(0, radius − finger_depth)``."""

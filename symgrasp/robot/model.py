@@ -17,7 +17,7 @@ from symgrasp.descriptions.urdf import UrdfJoint, UrdfRobot, read_urdf
 from symgrasp.errors import UrdfError, one_of
 from symgrasp.poses import Array
 from symgrasp.robot.assembly import Mount, assemble
-from symgrasp.robot.joint import DEFAULT_VELOCITY, Joint, joint_motion
+from symgrasp.robot.joint import DEFAULT_VELOCITY, Joint, JointMotions
 from symgrasp.robot.link_mass import link_mass
 from symgrasp.robot.link_shapes import CollisionShape, collision_hulls, link_shape
 
@@ -92,6 +92,7 @@ class RobotModel:
         self._unusable_limits: dict[str, tuple[float, float] | None] = {}  # as the URDF states them
         self.joints, self.link_names = self._build_tree(urdf, root)
         self._link_indices = {link: k for k, link in enumerate(self.link_names)}
+        self._motions = JointMotions(self.joints)
         self._above = {joint.child: joint for joint in self.joints}
         mass, centre = zip(*(inertials[link] for link in self.link_names), strict=True)
         self._masses = np.array(mass), np.array(centre)
@@ -246,10 +247,12 @@ class RobotModel:
         q = np.asarray(q, dtype=float)
         poses = np.zeros((*q.shape[:-1], len(self.link_names), 4, 4))
         poses[..., 0, :, :] = np.eye(4)
+        motions, k = self._motions.poses(q), 0
         for joint in self.joints:
             pose = poses[..., joint.parent, :, :] @ joint.origin
             if joint.source >= 0:
-                pose = pose @ joint_motion(joint, joint.ratio * q[..., joint.source] + joint.offset)
+                pose = pose @ motions[..., k, :, :]
+                k += 1
             poses[..., joint.child, :, :] = pose
         return poses
 

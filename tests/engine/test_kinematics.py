@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from symgrasp.engine.kinematics import rotate, sine_and_cosine
+from symgrasp.engine.kinematics import rotate
+from symgrasp.ik.vectors import sine_and_cosine
 
 AXES = [*np.eye(3), *-np.eye(3), np.array([0.6, 0.0, 0.8]), np.array([2.0, -3.0, 6.0]) / 7.0]
 

@@ -18,7 +18,6 @@ from symgrasp.hands.measure import measure_hand
 from symgrasp.hands.structure import find_hand_structure
 from symgrasp.references import resolve
 from symgrasp.robot.hand import Hand
-from symgrasp.robot.joint import joint_motion
 from symgrasp.robot.model import RobotModel
 from symgrasp.world.client import load_urdf, pybullet
 
@@ -70,17 +69,14 @@ class Cylinders:
         values = dict(zip(robot.joint_names, robot.default_values(), strict=True)) | hand.joint_values(
             opening
         )
-        pose = {robot.root: np.eye(4)}
+        poses = robot.forward([values[name] for name in robot.joint_names])
+        pose = dict(zip(robot.link_names, poses, strict=True))
         for joint in robot.joints:
-            parent, child = robot.link_names[joint.parent], robot.link_names[joint.child]
-            pose[child] = pose[parent] @ joint.origin
-            if joint.source >= 0:
+            if joint.source >= 0 and joint.name in self.joints:  # those that move nothing are left out
                 value = joint.ratio * values[robot.joint_names[joint.source]] + joint.offset
-                pose[child] = pose[child] @ joint_motion(joint, np.asarray(value))
-                if joint.name in self.joints:  # those that move nothing are left out
-                    pybullet.resetJointState(
-                        self.body, self.joints[joint.name], value, physicsClientId=self.client
-                    )
+                pybullet.resetJointState(
+                    self.body, self.joints[joint.name], value, physicsClientId=self.client
+                )
         T = pose[hand.tool.link] @ hand.tool.matrix()
         turns = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
         around = [np.sin(turns), hand.standoff(radius) / radius + np.cos(turns)]

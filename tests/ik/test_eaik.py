@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import ssik
@@ -25,7 +27,7 @@ def arm() -> Arm:
 def kuka() -> Arm:
     model = RobotModel(KUKA)
     hand = load_small("soda_can").arm().hand
-    bare = type(hand)(**{**hand.__dict__, "links": (), "touch_links": (), "joints": {}})
+    bare = replace(hand, links=(), touch_links=(), joints={})
     return Arm("kuka", Robot("kuka", model, np.eye(4), model.default_values()), "lbr_iiwa_link_7", bare)
 
 

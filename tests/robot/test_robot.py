@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import yourdfpy
 
 from symgrasp.errors import UrdfError
 from symgrasp.references import package_dir
-from symgrasp.robot.hand import HANDS, Hand
+from symgrasp.robot.hand import HANDS
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 
@@ -118,10 +119,9 @@ def test_arms_of_five_to_seven_joints_only(panda):
     ],
 )
 def test_a_hand_that_is_not_on_the_robot(panda, change, message):
-    fields = {**HANDS["franka"].__dict__, **change}
     robot = Robot("panda", panda, np.eye(4), panda.default_values())
     with pytest.raises(UrdfError, match=message):
-        Arm("panda", robot, "panda_grasptarget", Hand(**fields))
+        Arm("panda", robot, "panda_grasptarget", replace(HANDS["franka"], **change))
 
 
 @pytest.mark.parametrize(

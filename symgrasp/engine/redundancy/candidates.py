@@ -13,9 +13,48 @@ from symgrasp.engine.retreat_search import arm_retreats, copy_row
 from symgrasp.engine.search_types import BLOCKED, RETREAT_UNDECIDED
 from symgrasp.ik.at_phi import geometry_at
 from symgrasp.ik.branches import branches_at
+from symgrasp.ik.spans import FINEST, HALVES, find_spans, span_over
 from symgrasp.ik.vectors import STRICT
 
-__all__ = ["arm_gap", "find_branches", "is_to_check", "retreat_gap"]
+__all__ = ["arm_gap", "find_branches", "is_to_check", "plan_values", "retreat_gap"]
+
+
+@njit(**STRICT)
+def plan_values(nodes, covered, T):
+    """Write the values of φ with which the search of a pose (4, 4) begins, in order; return how many.
+
+    Beside the ends of its range they are those to both sides of the ends of branches, where these are known,
+    and others in between, where branches reach the pose.
+    """
+    locked, spans, planned = covered.locked, nodes.spans, nodes.planned
+    find_spans(spans, nodes.chain, locked, T)
+    planned[0], planned[1] = locked.lower, locked.upper
+    count = 2
+    for half in range(HALVES):
+        for k in range(spans.number[half]):
+            for end in range(2):
+                for side in range(2):
+                    phi = spans.ends[half, k, end] + (FINEST if side else -FINEST)
+                    if locked.lower < phi < locked.upper:
+                        count = _sort_in(planned, count, phi)
+    for k in range(count - 2, -1, -1):
+        low, high = planned[k], planned[k + 1]
+        if spans.number[0] < 0 or span_over(spans, 0, low, high) or span_over(spans, 1, low, high):
+            parts = math.ceil((high - low) / covered.step)
+            for i in range(1, parts):
+                count = _sort_in(planned, count, low + (high - low) * i / parts)
+    return count
+
+
+@njit(**STRICT)
+def _sort_in(values, count, value):
+    """Put a value among the first ``count``, which are in order; return the new count."""
+    i = count
+    while values[i - 1] > value:
+        values[i] = values[i - 1]
+        i -= 1
+    values[i] = value
+    return count + 1
 
 
 @njit(**STRICT)

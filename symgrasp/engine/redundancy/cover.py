@@ -5,7 +5,7 @@ The range of φ is divided into parts, and a part is halved until every branch i
 
 By how much curves bend is bounded by what is usual for arms, not by a proof: so an infeasible cell is
 infeasible to the resolution of the parts that were left. What does not depend on φ is proven: a hand that
-collides, and a pose further away than the arm ever reaches.
+collides, and poses out of reach, which are not covered (see `symgrasp.engine.redundancy.out_of_reach`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,13 @@ from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, is_compiled, njit
 from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm
 from symgrasp.engine.kinematics import MovingPieces, Scratch, place_hand
-from symgrasp.engine.reach import beyond_reach
-from symgrasp.engine.redundancy.candidates import arm_gap, find_branches, is_to_check, retreat_gap
+from symgrasp.engine.redundancy.candidates import (
+    arm_gap,
+    find_branches,
+    is_to_check,
+    plan_values,
+    retreat_gap,
+)
 from symgrasp.engine.redundancy.cover_types import OPEN_KEPT, CoverInput, CoverResult, Nodes, new_nodes
 from symgrasp.engine.redundancy.exclusion import (
     EXCLUDED,
@@ -42,10 +47,9 @@ from symgrasp.engine.search_types import (
     new_branches,
 )
 from symgrasp.engine.threads import in_parallel
-from symgrasp.ik.at_phi import geometry_at
 from symgrasp.ik.branches import branch_count
 from symgrasp.ik.chain import Chain
-from symgrasp.ik.spherical import reach_cosine
+from symgrasp.ik.spans import prepare_spans
 from symgrasp.ik.vectors import STRICT
 
 __all__ = ["COARSE", "FINEST", "cover", "is_cover_compiled"]
@@ -62,9 +66,6 @@ COARSE = 3e-3
 OVERLAP = 2e-5
 """By how much (m) pieces overlap, or are closer than their margin, that collide whatever PyBullet says, whose
 distances may be too large near contact: more than pieces and poses are rounded by."""
-
-CERTAIN = 1e-6
-"""By how much (m) a pose is certain to be out of reach: more than numbers are rounded by."""
 
 MOST_VISITED = 20_000
 """Values of φ of a cell after which the search gives up."""
@@ -107,7 +108,7 @@ def cover(
     idle: SimpleQueue[tuple[Nodes, Scratch, BranchScratch]] = SimpleQueue()
     for scratch in scratches:
         branches = new_branches(chain, joints, len(inputs.retreat), len(moving.frame))
-        idle.put((new_nodes(chain, branch_count(chain), joints), scratch, branches))
+        idle.put((new_nodes(chain, covered.locked, branch_count(chain), joints), scratch, branches))
 
     def cover_part(part: int) -> None:
         own = idle.get()
@@ -129,8 +130,7 @@ def is_cover_compiled() -> bool:
 @njit(**ENTRY)
 def _cover_part(nodes, scratch, branches, moving, pieces, tree, inputs, balance, rows, covered, result, part):
     """Cover the cells of one part; parts are interleaved."""
-    for k in range(len(nodes.reach)):
-        geometry_at(covered.locked, 0.4 * math.pi * k, nodes.reach[k])
+    prepare_spans(nodes.spans, covered.locked)
     for i in range(part, len(covered.cells), inputs.parts):
         _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance, rows, covered, result, i)
 
@@ -140,10 +140,6 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
     """Cover one cell and write its result."""
     cell = covered.cells[i]
     T, run = inputs.T_base_tool[cell], cell * len(inputs.row) // len(inputs.T_base_tool)
-    locked = covered.locked
-    if beyond_reach(covered.reach, covered.tool[i])[0] > CERTAIN or _out_of_reach(nodes, locked, T):
-        result.proven[i] = True
-        return
     hand = tool_clearance(moving, pieces, tree, scratch, inputs, rows, run, T)
     if hand == -math.inf:
         result.proven[i] = True
@@ -157,15 +153,15 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
             return
     scratch.hit[2] = -1
     nodes.used[:] = False
-    step = (locked.upper - locked.lower) / covered.first
+    planned = plan_values(nodes, covered, T)
     left = _slot(nodes)
     nodes.excluded[left] = False
     those = i, T, inputs.row[run], hand, tool
     free = _visit(
         nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, left,
-        locked.lower,
+        nodes.planned[0],
     )  # fmt: skip
-    for k in range(covered.first):
+    for k in range(1, planned):
         if free:
             return
         nodes.stack[0] = _slot(nodes)
@@ -173,7 +169,7 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
         count = 1
         free = _visit(
             nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those,
-            nodes.stack[0], locked.lower + (k + 1) * step,
+            nodes.stack[0], nodes.planned[k],
         )  # fmt: skip
         while count > 0 and not free:
             right = nodes.stack[count - 1]
@@ -205,30 +201,6 @@ def _slot(nodes):
         k += 1
     nodes.used[k] = True
     return k
-
-
-@njit(**STRICT)
-def _out_of_reach(nodes, locked, T):
-    """Whether a pose (4, 4) is further away than the arm reaches at any φ; else it may be, too.
-
-    Where all free joints are on one side of the locked one, the cosine that joint 4 needs is a trigonometric
-    polynomial of φ of degree 2, so five values determine it.
-    """
-    if not locked.spherical:
-        return False
-    for k in range(1, 6):
-        if locked.after[k] != locked.after[0]:
-            return False
-    mean = c1 = s1 = c2 = s2 = 0.0
-    for k in range(5):
-        angle = 0.4 * math.pi * k
-        value = 0.2 * reach_cosine(nodes.reach[k], nodes.chain.joint, T)
-        mean += value
-        c1 += 2.0 * value * math.cos(angle)
-        s1 += 2.0 * value * math.sin(angle)
-        c2 += 2.0 * value * math.cos(2.0 * angle)
-        s2 += 2.0 * value * math.sin(2.0 * angle)
-    return abs(mean) - math.sqrt(c1 * c1 + s1 * s1) - math.sqrt(c2 * c2 + s2 * s2) > 1.0 + 1e-9
 
 
 @njit(**STRICT)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.collision.pieces import PackedPieces
-from symgrasp.engine.reach import Reach
 from symgrasp.ik.at_phi import Locked
 from symgrasp.ik.chain import Chain
+from symgrasp.ik.spans import HALVES, MOST_SPANS, Spans, new_spans
 from symgrasp.poses import Array
 
 __all__ = ["OPEN_KEPT", "SLOTS", "CoverInput", "CoverResult", "Nodes", "new_nodes"]
@@ -20,25 +20,24 @@ OPEN_KEPT = 512
 SLOTS = 32
 """Values of the redundancy that are kept at a time: both ends of a part that is halved again and again."""
 
+PLANNED = 2 + 4 * HALVES * MOST_SPANS + 64
+"""Values of the redundancy with which the search of a cell begins, at most."""
+
 
 class CoverInput(NamedTuple):
     """What to cover.
 
     Attributes:
         cells: (c,) the cells, as indices into those of the search.
-        tool: (c, 12) their tool poses in the base.
-        reach: how far the arm reaches, with its shoulder in the base.
         locked: the locked joint.
         inner: bodies inside the pieces, see `inner_pieces`.
-        first: number of equal parts of the range of φ to begin with.
+        step: width (rad) of parts of the range of φ to begin with, at most.
     """
 
     cells: np.ndarray
-    tool: Array
-    reach: Reach
     locked: Locked
     inner: tuple[PackedPieces, ...]
-    first: int
+    step: float
 
 
 class CoverResult(NamedTuple):
@@ -89,7 +88,8 @@ class Nodes(NamedTuple):
         excluded: (SLOTS, B) which branches are excluded on the part that ends at a slot.
         stack: (SLOTS,) slots of the ends of parts.
         used: (SLOTS,) which slots are taken.
-        reach: (5, m) geometries at equal parts of a turn, see `Chain.geometry`.
+        spans: where branches reach the pose.
+        planned: (PLANNED,) values of φ (rad) with which the search begins.
         end: (2, 12) poses of a pair of pieces at the other end of a part.
         half: (n,) joint values half way.
         middle: (12,) pose of a piece there.
@@ -107,14 +107,15 @@ class Nodes(NamedTuple):
     excluded: np.ndarray
     stack: np.ndarray
     used: np.ndarray
-    reach: Array
+    spans: Spans
+    planned: Array
     end: Array
     half: Array
     middle: Array
 
 
-def new_nodes(chain: Chain, branches: int, joints: int) -> Nodes:
-    """Return arrays for an arm with that many branches and joints."""
+def new_nodes(chain: Chain, locked: Locked, branches: int, joints: int) -> Nodes:
+    """Return arrays for an arm with a locked joint and that many branches and joints."""
     return Nodes(
         chain=chain._replace(geometry=chain.geometry[:1].copy()),
         phi=np.empty(SLOTS),
@@ -128,7 +129,8 @@ def new_nodes(chain: Chain, branches: int, joints: int) -> Nodes:
         excluded=np.zeros((SLOTS, branches), dtype=bool),
         stack=np.empty(SLOTS, dtype=np.int64),
         used=np.zeros(SLOTS, dtype=bool),
-        reach=np.empty((5, chain.geometry.shape[1])),
+        spans=new_spans(locked),
+        planned=np.empty(PLANNED),
         end=np.empty((2, 12)),
         half=np.empty(joints),
         middle=np.empty(12),

@@ -8,7 +8,8 @@ A branch is excluded on a part by what is the matter with it at both ends:
   fixed direction is at most the larger one, but for how much their points leave straight lines, and for a
   quarter of the way that the turn of each body moves its far end: other points may be nearest at the
   other end;
-* the same root of the closed form has a negative radicand, by more than it bends in between.
+* the same root of the closed form has a negative radicand, by more than it bends in between, or the branch is
+  known to reach the pose nowhere in between (see `symgrasp.ik.spans`).
 
 Where two branches end in a root, they are one curve: it is excluded from one branch to the other. It leads
 away from both by as far as joints change with φ up to the root, which is anywhere in the part (`DRIFT`).
@@ -24,6 +25,7 @@ from symgrasp.collision.distance import distance_bounds
 from symgrasp.compiling import njit
 from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.kinematics import compose, place_frames
+from symgrasp.ik.spans import span_over
 from symgrasp.ik.vectors import STRICT
 from symgrasp.robot.limits import LIMIT_TOLERANCE
 
@@ -93,10 +95,12 @@ def what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, 
             continue
         here, there = nodes.state[left, b] != GONE, nodes.state[right, b] != GONE
         known = EXCLUDED
-        if here:
+        if here and there and _stays_outside(nodes, left, right, b):
+            pass
+        elif here:
             known = _curve(nodes, scratch, moving, pieces, inputs, covered, left, right, b, width)
         elif not there:
-            known = _none(nodes.missing[left, b], nodes.missing[right, b], width)
+            known = _none(nodes, left, right, b, width)
         if known != HARD and there and not (here and _is_near(nodes, left, b, right, b)):
             back = _curve(nodes, scratch, moving, pieces, inputs, covered, right, left, b, width)
             known = min(known, back)
@@ -110,11 +114,23 @@ def what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, 
 
 
 @njit(**STRICT)
-def _none(here, there, width):
+def _stays_outside(nodes, left, right, b):
+    """Whether a branch that is there at both ends of a part is outside its limits all along it."""
+    apart = _apart(nodes, left, b, right, b, SAME_CURVE)
+    bend = (BEND * apart + LEAST_BEND) * apart
+    return apart < SAME_CURVE and _limits_exclude(nodes, left, b, right, b, bend)
+
+
+@njit(**STRICT)
+def _none(nodes, left, right, b, width):
     """Return what is known of a branch that exists at neither end of a part, from what is missing there."""
+    here, there = nodes.missing[left, b], nodes.missing[right, b]
     if here == 0.0 or there == 0.0:
         return EXCLUDED if width <= UNKNOWN else HARD
     root, other = _root(here), _root(there)
+    half = b // 4
+    if max(root, other) <= 2 and nodes.spans.number[half] >= 0:
+        return HARD if span_over(nodes.spans, half, nodes.phi[left], nodes.phi[right]) else EXCLUDED
     first, second = -(here + 10.0 * root), -(there + 10.0 * other)
     if root == other:
         bend = RADICAND_BEND * width * width + 0.1 * abs(first - second)
@@ -164,7 +180,13 @@ def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a, width
     if nodes.state[other, a] != GONE and _is_near(nodes, one, a, other, a):
         return _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, a, width)
     nearest, at, least = -1, other, SAME_CURVE
-    for b in range(nodes.state.shape[1]):
+    for k in range(nodes.state.shape[1]):
+        if covered.locked.spherical:
+            if k == 3:
+                break
+            b = a ^ (1 << k)  # the other value of one root
+        else:
+            b = k
         if nodes.state[other, b] != GONE:
             apart = _apart(nodes, one, a, other, b, least)
             if apart < least:
@@ -357,6 +379,6 @@ def _depth(scratch, moving, pieces, inputs, covered, first, second, level, least
     if bar == -math.inf:
         return -1.0
     _, upper = distance_bounds(
-        covered.inner[level], scratch.pose, first, second, bar - least, math.inf, -math.inf, scratch.simplex
+        covered.inner[level], scratch.pose, first, second, bar - least, -math.inf, -math.inf, scratch.simplex
     )
     return bar - upper

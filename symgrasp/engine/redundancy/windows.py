@@ -24,7 +24,13 @@ from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.checks import UNDECIDED
 from symgrasp.engine.kinematics import MovingPieces, Scratch, place_hand
-from symgrasp.engine.redundancy.candidates import arm_gap, find_branches, is_to_check, retreat_gap
+from symgrasp.engine.redundancy.candidates import (
+    arm_gap,
+    find_branches,
+    is_to_check,
+    plan_values,
+    retreat_gap,
+)
 from symgrasp.engine.redundancy.cover import COARSE, FINEST, MEDIUM
 from symgrasp.engine.redundancy.cover_types import CoverInput, Nodes, new_nodes
 from symgrasp.engine.redundancy.exclusion import (
@@ -54,6 +60,7 @@ from symgrasp.engine.search_types import (
 from symgrasp.engine.threads import in_parallel
 from symgrasp.ik.branches import branch_count
 from symgrasp.ik.chain import Chain
+from symgrasp.ik.spans import prepare_spans
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
 
@@ -153,7 +160,7 @@ def windows(
     count = branch_count(chain)
     for scratch in scratches:
         branches = new_branches(chain, joints, len(inputs.retreat), len(moving.frame))
-        nodes = new_nodes(chain, count, joints)
+        nodes = new_nodes(chain, covered.locked, count, joints)
         slots = len(nodes.phi)
         free = _Free(
             gap=np.empty((slots, count)),
@@ -183,6 +190,7 @@ def _find_part(
     nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, rows, covered, result, part
 ):
     """Find the windows of the cells of one part; parts are interleaved."""
+    prepare_spans(nodes.spans, covered.locked)
     for i in range(part, len(covered.cells), inputs.parts):
         _find(nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, rows, covered, result, i)
 
@@ -204,20 +212,19 @@ def _find(nodes, free, scratch, branches, moving, pieces, tree, inputs, balance,
     nodes.used[:] = False
     free.begun[:] = math.nan
     locked = covered.locked
-    step = (locked.upper - locked.lower) / covered.first
     those = i, T, inputs.row[run], tool
+    planned = plan_values(nodes, covered, T)
     left = _slot(nodes, free)
     _visit(
         nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those, left,
-        locked.lower, locked,
+        nodes.planned[0], locked,
     )  # fmt: skip
-    for k in range(covered.first):
+    for k in range(1, planned):
         nodes.stack[0] = _slot(nodes, free)
         count = 1
-        end = locked.upper if k == covered.first - 1 else locked.lower + (k + 1) * step
         _visit(
             nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those,
-            nodes.stack[0], end, locked,
+            nodes.stack[0], nodes.planned[k], locked,
         )  # fmt: skip
         while count > 0:
             right = nodes.stack[count - 1]

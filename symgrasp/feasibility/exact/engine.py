@@ -348,6 +348,10 @@ class ExactEngine:
             if not len(runs):
                 return
         inputs = self._inputs(np.ascontiguousarray(T_base_tool[cells]), runs, batch, fixed)
+        locked = locked_joint(batch.compiled) if self._searches_all else None
+        if locked is not None:
+            beyond = self._redundancy.out_of_reach(batch, locked, inputs.T_base_tool)
+            inputs = inputs._replace(beyond=beyond)
         found = search.search(
             batch.compiled.chain,
             batch.moving,
@@ -368,7 +372,6 @@ class ExactEngine:
             by_tool = self._open.decide(draft, cell, T, batch.ik, listed)
             left[i] = not by_tool and draft.reason[cell] != Reason.FEASIBLE
             yield
-        locked = locked_joint(batch.compiled) if self._searches_all else None
         if locked is None or inputs.always_collides:
             return
         draft.proven[tuple(part[found.proven] for part in cells)] = True
@@ -390,6 +393,7 @@ class ExactEngine:
             margin=float(self._settings.margin),
             clearance=fixed.gap,
             always_collides=fixed.collision is not None,
+            beyond=np.zeros(len(T_base_tool), dtype=bool),
             parts=min(PARTS * core_count(), 1 + tries // WORTH_A_PART),
         )
 

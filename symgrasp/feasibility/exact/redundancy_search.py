@@ -8,13 +8,14 @@ from functools import cached_property, partial
 import numpy as np
 
 from symgrasp.collision.inner_pieces import inner_pieces
-from symgrasp.collision.pieces import PackedPieces, pose_rows
+from symgrasp.collision.pieces import PackedPieces
 from symgrasp.engine import search
 from symgrasp.engine.geometry import ArmGeometry
 from symgrasp.engine.kinematics import Scratch
 from symgrasp.engine.reach import Reach, reach_of
 from symgrasp.engine.redundancy.cover import cover
 from symgrasp.engine.redundancy.cover_types import OPEN_KEPT, CoverInput, CoverResult
+from symgrasp.engine.redundancy.out_of_reach import out_of_reach
 from symgrasp.engine.redundancy.windows import MOST_OPEN, windows
 from symgrasp.engine.search_types import RowChecks
 from symgrasp.feasibility.cell import Window
@@ -30,8 +31,8 @@ from symgrasp.robot.robot import Arm
 
 __all__ = ["RedundancySearch"]
 
-PARTS = 8
-"""Equal parts of the range of the redundancy with which the search begins."""
+STEP = 0.75
+"""Width (rad) of the parts of the range of the redundancy with which the search begins, at most."""
 
 MOST_OVERLAPPING = 32
 """Candidates of a cell at most that PyBullet is asked for between the samples although their pieces overlap,
@@ -57,6 +58,10 @@ class RedundancySearch:
     @cached_property
     def _inner(self) -> tuple[PackedPieces, ...]:
         return inner_pieces(self._geometry.pieces)
+
+    def out_of_reach(self, batch: Batch, locked: Locked, tools: Array) -> np.ndarray:
+        """Return which tool poses (m, 4, 4) are proven to be out of reach, whatever the redundancy is."""
+        return out_of_reach(batch.compiled.chain, locked, self._reach, tools)
 
     def cover(
         self,
@@ -85,7 +90,7 @@ class RedundancySearch:
             inputs,
             geometry.balance,
             rows,
-            self._covered(which, inputs, locked),
+            self._covered(which, locked),
             self._arm.dof,
         )
 
@@ -143,7 +148,7 @@ class RedundancySearch:
         geometry, tools = self._geometry, inputs.T_base_tool
         parts = batch.compiled.chain, batch.moving, geometry.pieces, geometry.tree, scratches, inputs
         rows = search.search(*parts, geometry.balance, self._arm.dof).rows
-        covered = self._covered(np.arange(len(tools)), inputs, locked)
+        covered = self._covered(np.arange(len(tools)), locked)
         own = windows(*parts, geometry.balance, rows, covered, self._arm.dof)
         for k in range(len(tools)):
             n, m = int(own.found[k]), min(int(own.open_count[k]), MOST_OPEN)
@@ -157,9 +162,8 @@ class RedundancySearch:
             else:
                 yield tuple(sorted(listed))
 
-    def _covered(self, which: np.ndarray, inputs: search.SearchInput, locked: Locked) -> CoverInput:
-        tools = pose_rows(inputs.T_base_tool[which])
-        return CoverInput(which, tools, self._reach, locked, self._inner, PARTS)
+    def _covered(self, which: np.ndarray, locked: Locked) -> CoverInput:
+        return CoverInput(which, locked, self._inner, STEP)
 
     def _is_free(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ def from_urdf(name: str) -> Arm:
     """Return an arm of tests/data, with a hand that has no links."""
     model = RobotModel(DATA / f"{name}.urdf")
     hand = load_small("soda_can").arm().hand
-    bare = type(hand)(**{**hand.__dict__, "links": (), "touch_links": (), "joints": {}})
+    bare = replace(hand, links=(), touch_links=(), joints={})
     return Arm(name, Robot(name, model, np.eye(4), model.default_values()), "flange", bare)
 
 
