@@ -5,7 +5,8 @@ about its axis, so what the closed form takes from the target and is linear in t
 that joint 4 needs, is ``m + a cos φ + b sin φ``. The branches of either value of joint 4 exist where |c| ≤ 1
 and the radicand of the pair is not negative (see `symgrasp.ik.spherical`), which is computed much faster than
 the whole closed form. Its signs are found at values of φ that are near enough to each other: by how much a
-radicand may rise between two of them is not proven, but measured on the poses of arms.
+radicand may rise between two of them is not proven, but measured on the poses of arms. Gaps may be missed: a
+span may hold values of φ at which no branch reaches the pose.
 """
 
 from __future__ import annotations
