@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from symgrasp.compiling import ENTRY, njit
-from symgrasp.ik import solver_for
+from symgrasp.ik import CompiledIK, solver_for
 from symgrasp.ik.at_phi import geometry_at, locked_joint
 from symgrasp.ik.branches import branches_at, new_memory
 from symgrasp.ik.spans import FINEST, find_spans, new_spans, prepare_spans
@@ -41,6 +41,7 @@ def test_branches_reach_poses_on_their_spans_and_nowhere_else(name):
     arm = Scene.load(name).arm(ARMS[name])
     arm = arm.at(0) if arm.robot.torso else arm
     ik = solver_for(arm, 32)
+    assert isinstance(ik, CompiledIK)
     locked = locked_joint(ik)
     assert locked is not None
     spans, memory = new_spans(locked), new_memory(arm.dof)
@@ -72,6 +73,7 @@ def test_branches_reach_poses_on_their_spans_and_nowhere_else(name):
 def test_of_arms_with_the_locked_joint_in_the_middle_no_spans_are_known():
     arm = Scene.load("log_two_gr3").arm("west_left")
     ik = solver_for(arm, 32)
+    assert isinstance(ik, CompiledIK)
     locked = locked_joint(ik)
     assert locked is not None
     spans = new_spans(locked)
