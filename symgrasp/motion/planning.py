@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from symgrasp.ik import Solver, redundancy_of, solver_for
@@ -10,7 +12,7 @@ from symgrasp.motion.drafting.draft import MotionDraft
 from symgrasp.motion.drafting.ways import Grip
 from symgrasp.motion.paths.search import NoMotionError
 from symgrasp.motion.segments import Motion
-from symgrasp.plan.plan import Hold, Plan
+from symgrasp.plan.plan import Grasp, Hold, Plan
 from symgrasp.plan.writing import with_configurations
 from symgrasp.progress import Progress, at_start
 from symgrasp.scene.scene import Scene
@@ -72,18 +74,26 @@ class MotionPlanner:
 
     def plan(self, plan: Plan, seed: int = 0, progress: Progress | None = None) -> tuple[Plan, Motion]:
         """Plan the motion of a plan; see `plan_motion`."""
+        holds: dict[tuple[str, Grasp], list[Hold]] = {}
+        for task in plan.tasks:
+            for hold in task.holds:
+                holds.setdefault((hold.arm, hold.grasp), []).append(hold)
         tell = at_start(progress)
-        grips = {(hold.arm, hold.grasp): self._grip(hold, tell) for task in plan.tasks for hold in task.holds}
+        grips = {grasp: self.grip(own, tell) for grasp, own in holds.items()}
         found = MotionDraft(self.bodies, grips, plan, seed, progress).run()
         return with_configurations(self._world, plan, found.configurations), found.motion
 
-    def _grip(self, hold: Hold, progress: Progress | None) -> Grip:
-        """Return the grasp of a hold; the progress is told between the solvers that are made for it."""
-        arm = self.scene.arm(hold.arm)
+    def grip(self, holds: Sequence[Hold], progress: Progress | None = None) -> Grip:
+        """Return the grasp by which an arm holds the object in one or several tasks of a plan.
+
+        The progress is told between the solvers that are made for it.
+        """
+        hold, arm = holds[0], self.scene.arm(holds[0].arm)
         more: tuple[float, ...] = ()
         if self.scene.settings.redundancy == "auto":  # whose grasps need not be at a sample
-            phi = redundancy_of(arm, np.array([hold.joints[name] for name in arm.joint_names]))
-            more = () if phi is None else (phi,)
+            q = [np.array([own.joints[name] for name in arm.joint_names]) for own in holds]
+            phi = dict.fromkeys(redundancy_of(arm, own) for own in q)
+            more = tuple(value for value in phi if value is not None)
         if (arm.name, more) not in self._solvers:
             samples = self.scene.settings.samples
             fine = samples * (2 * int(np.ceil((LEAST_SAMPLES / samples - 1) / 2)) + 1)

@@ -55,7 +55,7 @@ def tried(world: BulletWorld, m: FeasibilityMap, cell: tuple[int, int, int]) -> 
         ("pick_pour_place", "place", {"approach": 0.05}),
         ("log_iiwa_and_panda", "lift", {}),
         ("pr2_handover", None, {}),
-        ("log_two_humanoids", None, {}),
+        ("log_two_humanoids", None, {"approach": 0.0}),
     ],
 )
 def test_windows_hold_what_dense_samples_hold(name, task, settings):

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from symgrasp.errors import Cancelled, NoPlanError, SceneError
-from symgrasp.ik import solver_for
+from symgrasp.ik import redundancy_of, solver_for
 from symgrasp.motion.bodies.motion_scene import RESTING
 from symgrasp.motion.choosing import Failure, best_motion, failures_in_words
 from symgrasp.motion.drafting.ways import Grip, retreating
-from symgrasp.motion.planning import plan_motion
+from symgrasp.motion.paths.lines import configurations
+from symgrasp.motion.planning import MotionPlanner, plan_motion
 from symgrasp.motion.segments import Motion
 from symgrasp.motion.times.timing import timed
 from symgrasp.plan.plan import Plan
@@ -211,6 +212,29 @@ def test_a_plan_whose_motion_has_no_times_is_passed_over(monkeypatch):
     assert "no times" in [failure.reason for failure in failures]
     assert len(calls) == 2
     assert plan.motion
+
+
+def test_the_motion_may_use_the_configurations_of_all_tasks_that_the_plan_states():
+    """Where all of the redundancy is searched, they are at values of it that no sample has."""
+    scene = load_small("pick_pour_place", 12, 24).with_settings(redundancy="auto")
+    plan = plan_sequential(scene)
+    holds, stated = [], []
+    with open_world(scene) as world:
+        planner = MotionPlanner(scene, world)
+        for k, task in enumerate(plan.tasks):
+            hold, T = task.holds[0], task.object_pose_turned.array()
+            grip = planner.grip([hold])
+            phi = redundancy_of(grip.arm, np.array([hold.joints[name] for name in grip.arm.joint_names]))
+            assert phi is not None
+            near = solver_for(grip.arm, 1, more=[phi + 0.003 * (k + 1)])
+            q = configurations(near, grip.tool(T))
+            stated.append(q[np.abs(q[:, 6] - near.phi[-1]).argmin()])
+            joints = dict(zip(grip.arm.joint_names, stated[-1].tolist(), strict=True))
+            holds.append(hold.model_copy(update={"joints": joints}))
+        grip = planner.grip(holds)
+    for task, q in zip(plan.tasks, stated, strict=True):
+        found = grip.configurations(task.object_pose_turned.array())
+        assert np.isclose(found, q, atol=1e-9).all(axis=1).any()
 
 
 def test_planning_can_be_cancelled():

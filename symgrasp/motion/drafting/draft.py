@@ -245,7 +245,14 @@ class MotionDraft:
         poses = retreating(grip, state.T_world_object, self._scene.settings.approach, self._scene.profile)
         # Followed inwards: so every configuration of the grasp that can be reached is kept.
         end = _configurations(grip, task, state.T_world_object)
-        return follow([Leg(situation, poses[::-1])], grip.fine, end=end, progress=self._progress)
+        try:
+            return follow([Leg(situation, poses[::-1])], grip.fine, end=end, progress=self._progress)
+        except NoMotionError as error:
+            length = float(np.linalg.norm(poses[-1][:3, 3] - poses[0][:3, 3]))
+            if length <= self._scene.settings.approach + 1e-9:
+                raise
+            asked = f"approach: {np.ceil(100 * length - 1e-6) / 100:g}"
+            raise NoMotionError(f"{error}; grasps of maps with {asked} have one") from None
 
     def _decide_all(self, task: PlanTask) -> None:
         self._decide(task, dict.fromkeys(self._trees))
