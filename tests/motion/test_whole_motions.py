@@ -18,9 +18,10 @@ DATA = Path(__file__).parent.parent / "data"
 
 
 @pytest.mark.parametrize(
-    ("name", "arms"), [("log_two_humanoids", 4), ("log_two_gr3", 4), ("tiago_dual_tray", 2)]
+    ("name", "arms", "redundancy"),
+    [("log_two_humanoids", 4, "auto"), ("log_two_gr3", 4, 16), ("tiago_dual_tray", 2, 16)],
 )
-def test_all_hands_of_humanoids_take_an_object_together_and_lift_it(name, arms):
+def test_all_hands_of_humanoids_take_an_object_together_and_lift_it(name, arms, redundancy):
     """The plans are the best ones of shipped scenes, whose maps take long.
 
     An arm reaches for the object beside others where there is room.
@@ -28,7 +29,7 @@ def test_all_hands_of_humanoids_take_an_object_together_and_lift_it(name, arms):
     path = DATA / f"plan_{name}.json"
     plan = Plan.parse(path.read_text(encoding="utf-8"), str(path))
     scene = Scene.from_content(plan.scene.content)
-    assert scene.file == Scene.load(name).with_settings(redundancy=16).file
+    assert scene.file == Scene.load(name).with_settings(redundancy=redundancy).file
     found, failures = best_motion(scene, (plan for plan in [plan]))
     assert failures == []
     assert found.motion
