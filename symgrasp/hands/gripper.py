@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -29,6 +29,9 @@ PAD_DEPTH = 0.001
 
 PAD_HALF_HEIGHT = 0.002
 """Pads are measured where z of the tool frame is within this distance (m) of 0."""
+
+HULL_MARGIN = 0.001
+"""Margin (m) that Bullet keeps around the hulls of a URDF."""
 
 SNAP_COSINE = np.cos(np.deg2rad(15))
 """Directions within 15° of a coordinate axis (this is the cosine) are taken to be that axis."""
@@ -70,8 +73,12 @@ class FingerMotion(NamedTuple):
             t: the parameter, one for all joints or one for each (k,).
             T_base_frame: pose (4, 4) in the base of the frame to express the vertices in.
         """
+        return self.hulls_at(links, self.joint_values(t), T_base_frame)
+
+    def hulls_at(self, links: Iterable[str], values: Array, T_base_frame: Array) -> list[Array]:
+        """Return what `hulls` does, at given values (k,) of the joints."""
         q = self.model.default_values()
-        q[self.sources] = self.joint_values(t)
+        q[self.sources] = values
         poses = self.model.forward(q)
         T_frame_root = inverse(poses[self.model.link_index(self.base)] @ T_base_frame)
         hulls = []
@@ -79,6 +86,24 @@ class FingerMotion(NamedTuple):
             pose = T_frame_root @ poses[self.model.link_index(link)]
             hulls += [points @ pose[:3, :3].T + pose[:3, 3] for points in self.model.hulls(link)]
         return hulls
+
+    def width_beside(self, links: Collection[str], values: Array, T_base_tool: Array, depth: float) -> float:
+        """Return the extent (m) of fingers along x of the tool frame, symmetric about it, where objects are.
+
+        Hulls count as far as objects reach behind the tool frame, with the margin that Bullet gives them.
+
+        Args:
+            links: names of the fingers' links.
+            values: (m, k) values of the joints, for all openings at which objects are held.
+            T_base_tool: pose (4, 4) of the tool frame in the base.
+            depth: how far (m) objects reach behind the tool frame.
+        """
+        half = 0.0
+        for at in values:
+            for points in self.hulls_at(links, at, T_base_tool):
+                cut = slab_corners(points, hull_edges(points), -depth, np.inf)
+                half = max(half, float(np.abs(cut[:, 0]).max(initial=0.0)) + HULL_MARGIN)
+        return 2 * half
 
     def centre(self, links: Iterable[str], t: ArrayLike) -> Array:
         """Return the mean (3,) of the hull vertices of links, in the base frame."""

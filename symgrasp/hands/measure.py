@@ -64,6 +64,7 @@ def measure_hand(urdf: RobotModel | str | Path, tool: str | None = None) -> Hand
         pad_width=_round(2 * np.abs(pads).max()),
         palm_width=_round(fit.palm_width),
         palm_depth=_round(fit.palm_depth),
+        finger_width=_round(fit.gripper.motion.width_beside(fingers, values, fit.T_base_tool, fit.depth)),
         tool=_tool_frame(model, fit.T_base_tool, structure.base, tool),
         urdf=str(model.path.resolve()) if structure.standalone else None,
     )
@@ -96,6 +97,7 @@ def _jaw_hand(model: RobotModel, structure: HandStructure, tool: str | None) -> 
         pad_width=_round(fit.pad_width),
         palm_width=_round(fit.palm_width),
         palm_depth=_round(fit.palm_depth),
+        finger_width=_round(fit.motion.width_beside(jaw, fit.values, fit.T_base_tool, fit.depth)),
         shift=_table(fit.openings, fit.shifts),
         tool=_tool_frame(model, fit.T_base_tool, structure.base, tool),
         urdf=str(model.path.resolve()) if structure.standalone else None,
@@ -115,6 +117,7 @@ def hand_yaml(hand: Hand) -> str:
     summary = [
         f"# fingers: {_listed(hand.touch_links, 'links')}, moved by {_listed(hand.joints, 'joints')}",
         f"# they open from {mm['min_opening']} to {mm['max_opening']}; their pads are {mm['pad_width']} wide",
+        f"# beside the object fingers are {mm['finger_width']} wide",
         f"# objects may reach {mm['finger_depth']} behind the tool frame; the palm is {mm['palm_depth']}"
         f" behind it, {mm['palm_width']} wide there",
     ]
@@ -133,7 +136,15 @@ def hand_yaml(hand: Hand) -> str:
         "touch_links": list(hand.touch_links),
         "joints": {name: _table_content(table) for name, table in hand.joints.items()},
     }
-    for key in ("min_opening", "max_opening", "finger_depth", "pad_width", "palm_width", "palm_depth"):
+    for key in (
+        "min_opening",
+        "max_opening",
+        "finger_depth",
+        "pad_width",
+        "palm_width",
+        "palm_depth",
+        "finger_width",
+    ):
         content[key] = getattr(hand, key)
     if hand.shift:
         content["shift"] = _table_content(hand.shift)

@@ -23,6 +23,8 @@ from tests.plan.test_plan import sequential
 
 STEP = [[0, 0.015], [0.15, 0.015], [0.1501, 0.03], [0.3, 0.03]]
 RIM = [[0, 0.015], [0.15, 0.015], [0.1501, 0.022], [0.16, 0.022], [0.1601, 0.015], [0.3, 0.015]]
+FLANGE = [[0, 0.015], [0.15, 0.015], [0.1501, 0.05], [0.3, 0.05]]
+PROFILES = {"step": STEP, "rim": RIM, "flange": FLANGE}
 HANDS = [
     ("log_iiwa_and_panda", "panda"),
     ("log_iiwa_and_panda", "iiwa"),
@@ -33,9 +35,9 @@ HANDS = [
 
 
 @cache
-def scene_of(name: str, step: bool) -> Scene:
+def scene_of(name: str, shape: str) -> Scene:
     content = Scene.load(name).content
-    object_ = {"name": content["object"]["name"], "profile": STEP if step else RIM}
+    object_ = {"name": content["object"]["name"], "profile": PROFILES[shape]}
     return Scene.from_content({**content, "object": object_})
 
 
@@ -56,12 +58,12 @@ def distance(world: BulletWorld, arm: Arm, h: float, roll: float) -> float:
     return min(found)
 
 
-@pytest.mark.parametrize("step", [True, False])
+@pytest.mark.parametrize("shape", PROFILES)
 @pytest.mark.parametrize(("name", "own"), HANDS)
-def test_fingers_stay_out_of_steps_beside_their_pads(name, own, step):
-    scene = scene_of(name, step)
+def test_fingers_stay_out_of_steps_beside_their_pads(name, own, shape):
+    scene = scene_of(name, shape)
     arm = scene.arm(own)
-    reach = arm.hand.finger_width / 2 + 0.002
+    reach = max(arm.hand.finger_width, arm.hand.palm_width) / 2 + 0.004  # the palm has to fit, too
     heights = [h for edge in (0.15, 0.16) for h in np.arange(edge - reach, edge + reach, 7e-4)]
     held = [float(h) for h in heights if fit(arm.hand, scene.profile, float(h)) is None]
     assert len(held) > 4

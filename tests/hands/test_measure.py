@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from symgrasp.cli.main import main
 from symgrasp.errors import UrdfError
 from symgrasp.hands.measure import hand_yaml, measure_hand
-from symgrasp.poses import from_rotation, rpy
+from symgrasp.poses import from_rotation, inverse, rpy
 from symgrasp.references import resolve
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
 from symgrasp.robot.model import RobotModel
@@ -47,7 +48,16 @@ def model(reference: str) -> RobotModel:
 def test_the_shipped_hands_are_as_measured(name, reference, tool):
     measured, shipped = measure_hand(model(reference), tool), {**HANDS, **SIDED_HANDS}[name]
     assert (set(measured.links), set(measured.touch_links)) == (set(shipped.links), set(shipped.touch_links))
-    for field in ("min_opening", "max_opening", "finger_depth", "pad_width", "palm_width", "palm_depth"):
+    fields = (
+        "min_opening",
+        "max_opening",
+        "finger_depth",
+        "pad_width",
+        "palm_width",
+        "palm_depth",
+        "finger_width",
+    )
+    for field in fields:
         assert getattr(measured, field) == pytest.approx(getattr(shipped, field), abs=5e-4), field
     assert measured.tool is not None
     assert shipped.tool is not None
@@ -56,6 +66,38 @@ def test_the_shipped_hands_are_as_measured(name, reference, tool):
     for opening in np.linspace(measured.min_opening + 0.003, measured.max_opening, 9):
         ours, theirs = shipped.joint_values(opening), measured.joint_values(opening)
         assert ours == pytest.approx(theirs, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("reference", "tool"),
+    [
+        (PANDA, "panda_grasptarget"),
+        (WSG, "wsg50_tool"),
+        (PR2, None),
+        (f"{EXAMPLES}/pr2_description/urdf/pr2.urdf", "l_gripper_tool_frame"),
+        (f"{EXAMPLES}/{G1}", "left_hand_palm_link"),
+    ],
+)
+def test_fingers_are_as_wide_as_trimesh_cuts_them(reference, tool):
+    """Convex hulls in front of the plane that objects reach back to, fingers closed, half open and open."""
+    urdf = model(reference)
+    hand = measure_hand(urdf, tool)
+    assert hand.tool is not None
+    widest = 0.0
+    for opening in np.linspace(hand.min_opening, hand.max_opening, 3):
+        q = urdf.default_values()
+        for joint, value in hand.joint_values(opening).items():
+            q[urdf.joint_names.index(joint)] = value
+        poses = urdf.forward(q)
+        T_tool_root = inverse(poses[urdf.link_index(hand.tool.link)] @ hand.tool.matrix())
+        for link in hand.touch_links:
+            for points in urdf.hulls(link):
+                hull = trimesh.PointCloud(points).convex_hull
+                hull.apply_transform(T_tool_root @ poses[urdf.link_index(link)])
+                front = hull.slice_plane([0, 0, -hand.finger_depth], [0, 0, 1])
+                if len(front.vertices):
+                    widest = max(widest, 2 * float(np.abs(front.bounds[:, 0]).max()))
+    assert hand.finger_width == pytest.approx(widest + 0.002, abs=5e-4)
 
 
 def box(size: np.ndarray, at: np.ndarray) -> str:
@@ -117,6 +159,7 @@ def test_a_hand_of_boxes_is_measured_as_it_was_built(tmp_path_factory, axes, ope
     assert hand.finger_depth == pytest.approx(depth, abs=1e-4)
     assert hand.pad_width == pytest.approx(sizes["width"], abs=1e-4)
     assert hand.palm_width == pytest.approx(2 * sizes["width"], abs=1e-4)
+    assert hand.finger_width == pytest.approx(sizes["width"] + 0.002, abs=1e-4)  # Bullet's margin of 1 mm
     for name, way in zip(("slide_one", "slide_two"), opens, strict=True):
         for opening in (0.0, 0.4 * hand.max_opening, hand.max_opening):
             assert hand.joint_values(opening)[name] == pytest.approx(way * opening / 2, abs=2e-4)
@@ -231,7 +274,16 @@ def test_the_command_prints_a_hand_that_a_scene_takes(reference, capsys):
     assert printed.tool is not None
     assert measured.tool is not None
     np.testing.assert_allclose(printed.tool.matrix(), measured.tool.matrix(), atol=1e-6)
-    for field in ("links", "touch_links", "min_opening", "max_opening", "palm_width", "palm_depth"):
+    fields = (
+        "links",
+        "touch_links",
+        "min_opening",
+        "max_opening",
+        "palm_width",
+        "palm_depth",
+        "finger_width",
+    )
+    for field in fields:
         assert getattr(printed, field) == getattr(measured, field)
 
 
