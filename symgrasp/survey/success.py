@@ -23,7 +23,7 @@ from symgrasp.plan.plan import Plan
 from symgrasp.planners.planning import plan_sequential, tasks_of_plan
 from symgrasp.planners.sequential import surface_margin
 from symgrasp.poses import Array, from_rotation
-from symgrasp.progress import Progress, at_start, part_of
+from symgrasp.progress import Progress, between, part_of
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
@@ -120,13 +120,14 @@ def success_map(
     Raises:
         InputError: the maps of so many draws are too large.
     """
-    nominal = maker.map(arm, task, progress=at_start(progress))
+    found = [] if known is None else known
+    done = len(found) / max(1, count)
+    nominal = maker.map(arm, task, progress=between(progress, done, done))
     most = MOST_CELLS // nominal.feasible.size
     if count > most:
         raise InputError(
             "success", "draws", count, f"at most {most:,} for maps of {nominal.feasible.size:,} cells"
         )
-    found = [] if known is None else known
     for k, draw in enumerate(noise.draws(count, seed)):
         if k < len(found):
             continue
