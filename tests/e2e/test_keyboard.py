@@ -18,9 +18,9 @@ def shoot(page: GraspPage, name: str) -> None:
 
 
 def brightness(page: GraspPage) -> float:
-    """How bright the floor is, in the middle of the lower edge of the 3D view."""
+    """How bright the background is, in the middle of the upper edge of the 3D view."""
     view = page.view()
-    return float(view[-20:-10, view.shape[1] // 2 - 10 : view.shape[1] // 2 + 10].mean())
+    return float(view[10:20, view.shape[1] // 2 - 10 : view.shape[1] // 2 + 10].mean())
 
 
 def test_everything_has_a_key(open_page):
