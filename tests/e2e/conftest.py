@@ -38,16 +38,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 # Of the package, not of the session: an event loop of Playwright runs meanwhile, where others want their own.
 @pytest.fixture(scope="package")
-def browser() -> Iterator[Browser]:
+def launch() -> Iterator[Callable[[], Browser]]:
+    """Starts Chromium."""
     chromium = shutil.which("chromium")
     if chromium is None:
         if os.environ.get("CI") == "true":
             pytest.fail(HOW_TO_GET_IT)
         pytest.skip(HOW_TO_GET_IT)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        yield browser
-        browser.close()
+        yield lambda: playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+
+
+# Of the module: after a hundred 3D views in one Chromium, its frames may come no more.
+@pytest.fixture(scope="module")
+def browser(launch: Callable[[], Browser]) -> Iterator[Browser]:
+    browser = launch()
+    yield browser
+    browser.close()
 
 
 def start_app(scene: str, port: int, caches: Path) -> subprocess.Popen[str]:
@@ -71,7 +78,7 @@ def free_port() -> int:
 
 @pytest.fixture(scope="package")
 def start_server(
-    browser: Browser, tmp_path_factory: pytest.TempPathFactory
+    launch: Callable[[], Browser], tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], str]]:
     """Start servers for scenes, one a scene; gives their addresses."""
     running: dict[str, tuple[subprocess.Popen[str], str]] = {}
