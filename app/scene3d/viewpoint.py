@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -222,26 +222,25 @@ def box_of(o: Obstacle) -> Box | None:
 
 def link_points(scene: Scene, values: Mapping[str, Array]) -> list[Array]:
     """Return the corners (n, 3) of each convex piece of the links of robots at joint values."""
-    points = []
-    for name, q in values.items():
-        robot = scene.robots[name]
-        poses = robot.T_world_base @ robot.model.forward(q)
-        for link, pose in zip(robot.model.link_names, poses, strict=True):
-            points += [hull @ pose[:3, :3].T + pose[:3, 3] for hull in robot.model.hulls(link)]
-    return points
+    return [hull @ pose[:3, :3].T + pose[:3, 3] for hull, pose in _link_hulls(scene, values)]
 
 
 def link_boxes(scene: Scene, values: Mapping[str, Array]) -> list[Box]:
     """Return boxes around the pieces of the links of robots at joint values."""
     boxes = []
+    for hull, pose in _link_hulls(scene, values):
+        low, high = hull.min(axis=0), hull.max(axis=0)
+        boxes.append(((high - low) / 2, pose @ translation((low + high) / 2)))
+    return boxes
+
+
+def _link_hulls(scene: Scene, values: Mapping[str, Array]) -> Iterator[tuple[Array, Array]]:
+    """Yield the corners (n, 3) of each convex piece of the links of robots, and its pose (4, 4)."""
     for name, q in values.items():
         robot = scene.robots[name]
         poses = robot.T_world_base @ robot.model.forward(q)
         for link, pose in zip(robot.model.link_names, poses, strict=True):
-            for hull in robot.model.hulls(link):
-                low, high = hull.min(axis=0), hull.max(axis=0)
-                boxes.append(((high - low) / 2, pose @ translation((low + high) / 2)))
-    return boxes
+            yield from ((hull, pose) for hull in robot.model.hulls(link))
 
 
 def hides(box: Box, points: Array, eye: Array) -> Array:

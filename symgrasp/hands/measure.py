@@ -23,7 +23,18 @@ from symgrasp.robot.assembly import Frame
 from symgrasp.robot.hand import Hand, JointTable
 from symgrasp.robot.model import RobotModel
 
-__all__ = ["hand_yaml", "measure_hand"]
+__all__ = ["LENGTHS", "hand_yaml", "measure_hand"]
+
+LENGTHS = (
+    "min_opening",
+    "max_opening",
+    "finger_depth",
+    "pad_width",
+    "palm_width",
+    "palm_depth",
+    "finger_width",
+)
+"""The lengths (m) of a `Hand` that are measured."""
 
 MOST_LISTED = 8
 """More names than this are counted, not listed."""
@@ -136,15 +147,7 @@ def hand_yaml(hand: Hand) -> str:
         "touch_links": list(hand.touch_links),
         "joints": {name: _table_content(table) for name, table in hand.joints.items()},
     }
-    for key in (
-        "min_opening",
-        "max_opening",
-        "finger_depth",
-        "pad_width",
-        "palm_width",
-        "palm_depth",
-        "finger_width",
-    ):
+    for key in LENGTHS:
         content[key] = getattr(hand, key)
     if hand.shift:
         content["shift"] = _table_content(hand.shift)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from symgrasp.cli.main import main
 from symgrasp.errors import UrdfError
-from symgrasp.hands.measure import hand_yaml, measure_hand
+from symgrasp.hands.measure import LENGTHS, hand_yaml, measure_hand
 from symgrasp.poses import from_rotation, inverse, rpy
 from symgrasp.references import resolve
 from symgrasp.robot.hand import HANDS, SIDED_HANDS, Hand
@@ -48,16 +48,7 @@ def model(reference: str) -> RobotModel:
 def test_the_shipped_hands_are_as_measured(name, reference, tool):
     measured, shipped = measure_hand(model(reference), tool), {**HANDS, **SIDED_HANDS}[name]
     assert (set(measured.links), set(measured.touch_links)) == (set(shipped.links), set(shipped.touch_links))
-    fields = (
-        "min_opening",
-        "max_opening",
-        "finger_depth",
-        "pad_width",
-        "palm_width",
-        "palm_depth",
-        "finger_width",
-    )
-    for field in fields:
+    for field in LENGTHS:
         assert getattr(measured, field) == pytest.approx(getattr(shipped, field), abs=5e-4), field
     assert measured.tool is not None
     assert shipped.tool is not None
