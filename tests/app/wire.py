@@ -103,6 +103,12 @@ class Wire:
         self.widgets[uuid]["value"] = value  # what the page sends for an instant before, it sends no more
         self.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
 
+    def uuid(self, label: str) -> str:
+        """The uuid of the widget of that label, once it is there: the last may come after the first map."""
+        while not (found := [uuid for uuid, w in self.widgets.items() if w.get("label") == label]):
+            self._read()
+        return found[0]
+
     def look_from(self, x: float, y: float, z: float) -> None:
         """Move the camera."""
         self.send({**CAMERA, "position": (x, y, z)})

@@ -97,7 +97,7 @@ def read_on(browser: Wire) -> None:
 
 
 def slide(browser: Wire, label: str) -> list[bytes]:
-    uuid = next(uuid for uuid, w in browser.widgets.items() if w.get("label") == label)
+    uuid = browser.uuid(label)
     return [
         msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": float(value)}})
         for value in range(1000)
@@ -190,11 +190,10 @@ def test_a_file_that_is_too_large_is_refused_when_it_is_announced(port):
         browser.wait_for(ready)
         scenes = {"Open a scene (YAML or ZIP)": 50, "Upload a robot": 50}
         for label, limit in {"Upload a mesh": 20, "Open a plan": 5, **scenes}.items():
-            uuid = next(uuid for uuid, w in browser.widgets.items() if w.get("label") == label)
             browser.send(
                 {
-                    "type": "FileTransferStartUpload", "source_component_uuid": uuid, "transfer_uuid": label,
-                    "filename": f"large {limit}", "mime_type": "", "part_count": 1000,
+                    "type": "FileTransferStartUpload", "source_component_uuid": browser.uuid(label),
+                    "transfer_uuid": label, "filename": f"large {limit}", "mime_type": "", "part_count": 1000,
                     "size_bytes": 1_000_000 * limit + 1,
                 }
             )  # fmt: skip

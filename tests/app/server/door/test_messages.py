@@ -41,10 +41,6 @@ def arrived(server) -> list[str]:
 class Presser(Wire):
     """A browser that presses the button after what else it sends, and waits until that has arrived."""
 
-    def uuid(self, label: str) -> str:
-        self.wait_for(lambda _: any(w.get("label") == label for w in self.widgets.values()))
-        return next(uuid for uuid, w in self.widgets.items() if w.get("label") == label)
-
     def press_after(self, *messages: bytes, presses: int = 1) -> None:
         for message in messages:
             self.socket.send(message)

@@ -18,7 +18,7 @@ from app.compute.warm_up import compute_first_map
 from app.server.door.front_door import MAP
 from app.server.door.lobby import open_lobby
 from app.server.door.viser_server import any_port
-from tests.app.server.session.served import picture, ready
+from tests.app.server.session.served import entered, picture, ready
 from tests.app.shown_map import ShownMap
 from tests.app.wire import WAIT, Wire
 
@@ -47,15 +47,11 @@ def do(visitor: Wire, **command: object) -> None:
     visitor.map_socket.send(json.dumps(command))
 
 
-def slider(visitor: Wire) -> float:
-    return next(w["value"] for w in visitor.widgets.values() if w.get("label") == "Rotation (°)")
-
-
 def test_a_turn_of_the_map_turns_the_object_and_moves_the_slider(visitor):
     before = visitor.map.picture()
     assert before is not None
     do(visitor, do="turn", delta=np.deg2rad(30.0))
-    visitor.wait_for(lambda _: slider(visitor) == 30.0 and visitor.map.look["delta"] != 0)
+    visitor.wait_for(lambda _: entered(visitor, "Rotation (°)") == [30.0] and visitor.map.look["delta"] != 0)
     assert np.array_equal(visitor.map.picture(), np.roll(before, -120, axis=1))
 
 

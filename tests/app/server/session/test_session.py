@@ -22,12 +22,7 @@ from app.server.door.viser_server import any_port
 from app.server.session.session import Session
 from symgrasp.world import BulletWorld
 from tests.app import failures
-from tests.app.server.session.served import (
-    picture,
-    processes,
-    ready,
-    start_server,
-)
+from tests.app.server.session.served import entered, picture, processes, ready, start_server
 from tests.app.wire import Wire
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -113,8 +108,7 @@ def test_nobody_sees_the_drags_of_others(server):
         seen = other.wait_for(lambda html: picture(html) != picture(can) and ready(html))
         assert "soda_can" in seen
         assert "soda_can" not in turned
-        rotations = [w["value"] for w in other.widgets.values() if w.get("label") == "Rotation (°)"]
-        assert rotations == [0.0]
+        assert entered(other, "Rotation (°)") == [0.0]
 
 
 def test_a_change_looks_a_map_up_once_and_computes_it_only_if_it_is_not_known(server, monkeypatch):
