@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from itertools import islice
 from numbers import Integral, Real
+from pathlib import Path
 
 __all__ = [
     "LONGEST",
@@ -30,6 +32,7 @@ __all__ = [
     "as_written",
     "one_of",
     "printable",
+    "referred_to",
     "shortened",
 ]
 
@@ -78,6 +81,21 @@ class InputError(SymgraspError, ValueError):
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arguments, because the default would pickle only the text."""
         return type(self), (self.source, self.field, self.value, self.expected)
+
+
+@contextmanager
+def referred_to(source: object, field: str) -> Iterator[None]:
+    """Say of input errors of a file also where another file refers to it.
+
+    Args:
+        source: the file that refers to it.
+        field: where in that.
+    """
+    try:
+        yield
+    except InputError as error:
+        where = f"{field}: {Path(error.source).name}: {error.field}"
+        raise type(error)(source, where, error.value, error.expected) from error
 
 
 class ProfileError(InputError):

@@ -80,9 +80,9 @@ def read_visuals(scene: Scene, progress: Progress | None = None) -> Visuals:
     models = [robot.model for robot in scene.robots.values()]
     models += [o.model for o in scene.obstacles if o.model is not None]
     for o in scene.obstacles:
-        for _, shape in o.shapes():
+        for link, shape in o.shapes():
             if shape.kind == "mesh":
-                shape.mesh(f"obstacle {o.name}")
+                o.mesh(link, shape)
     return {
         model.urdf: link_visuals(model.urdf, part_of(progress, k, len(models)))
         for k, model in enumerate(models)

@@ -17,7 +17,7 @@ from symgrasp.engine.search_types import Balance
 from symgrasp.meshes.flat_faces import convex_faces, fills_hull
 from symgrasp.object.profile import COLLISION_FACETS
 from symgrasp.poses import Array, inverse
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, at_start
 from symgrasp.robot.joint import Joint
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
@@ -114,8 +114,9 @@ def arm_geometry(
         world: the world; its other robots are at home.
         arm: the arm.
         openings: (rows,) opening (m) of the hand at each row of the grid.
-        progress: called with the finished share of the pieces; may raise `Cancelled`.
+        progress: called with the finished share of the pieces, and with 0 before; may raise `Cancelled`.
     """
+    tell = at_start(progress) or (lambda _: None)
     scene, model = world.scene, arm.robot.model
     shapes = world.shapes(arm.robot.name)
     joints = [next(j for j in model.joints if j.name == name) for name in arm.joint_names]
@@ -137,20 +138,24 @@ def arm_geometry(
         PlacedPiece(BodyName(arm.robot.name, k), link_piece(s), at_zero[model.link_index(k)])
         for k, s in order
     ]
+    tell(0.0)
     name = BodyName(scene.file.object.name, "")
     objects = [PlacedPiece(name, object_piece(v), np.eye(4)) for v in scene.profile.convex_pieces()]
     others = [*obstacle_pieces(scene), *_other_robots(world, arm)]
     placed = [*own, *objects, *others]
+    tell(0.0)
 
     moving_links = links[:moving_count]
     into_frames = inverse(np.array([frames[last_joint[link]] for link in moving_links]).reshape(-1, 4, 4))
     local = _poses(arm, moving_links, into_frames, [None])[0]
     of_rows = _poses(arm, moving_links, into_frames, openings.tolist() if arm.pitched else [])
+    tell(0.0)
     origins, axes = [frames[0], *(inverse(a) @ b for a, b in pairwise(frames))], [j.axis for j in joints]
     if arm.pitched:
         origins, axes = [*origins, np.eye(4)], [*axes, np.array([0.0, 0.0, 1.0])]
     pieces = pack([p.piece for p in placed], progress)
     pose = pose_rows(np.array([p.pose for p in placed]))
+    tell(0.0)
     tree, hulls = _tree(placed, pieces, pose, len(own) + len(objects))
     pieces = joined(pieces, pack(hulls))
     pose = np.concatenate([pose, pose_rows(np.tile(np.eye(4), (len(hulls), 1, 1)))])
@@ -300,7 +305,7 @@ def obstacle_pieces(scene: Scene) -> Iterator[PlacedPiece]:
         for k, (link, shape) in enumerate(o.shapes()):
             name, pose = BodyName(o.name, link), o.T_world_obstacle @ shape.pose
             if shape.kind == "mesh":
-                mesh = shape.mesh(f"obstacle {name}")
+                mesh = o.mesh(link, shape)
                 faces = (name, k, fills_hull(mesh))
                 yield from (PlacedPiece(name, Piece(face), pose, faces) for face in convex_faces(mesh))
             else:

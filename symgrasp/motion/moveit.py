@@ -11,7 +11,7 @@ import numpy as np
 from symgrasp.errors import PlanError
 from symgrasp.plan.plan import Plan
 from symgrasp.poses import Array, inverse, quat_wxyz, wxyz_to_xyzw
-from symgrasp.robot.link_shapes import CollisionShape
+from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 from symgrasp.world import own_pairs
 
@@ -33,8 +33,7 @@ def to_planning_scene(plan: Plan) -> str:
     T_frame_world = inverse(bases[0]) if len(bases) == 1 else np.eye(4)
     lines = [" ".join(scene.name.split())]
     for obstacle in scene.obstacles:
-        shapes = [shape for _, shape in obstacle.shapes()]
-        lines += _object_lines(obstacle.name, T_frame_world @ obstacle.T_world_obstacle, shapes)
+        lines += _object_lines(obstacle, T_frame_world @ obstacle.T_world_obstacle)
     mesh = scene.profile.mesh()
     T_object = T_frame_world @ plan.tasks[0].object_pose_turned.array()
     lines += ["* " + scene.file.object.name, *_pose_lines(T_object), "1"]
@@ -42,11 +41,12 @@ def to_planning_scene(plan: Plan) -> str:
     return "\n".join([*lines, "."]) + "\n"
 
 
-def _object_lines(name: str, pose: Array, shapes: Sequence[CollisionShape]) -> list[str]:
-    lines = ["* " + name, *_pose_lines(pose), str(len(shapes))]
-    for shape in shapes:
+def _object_lines(obstacle: Obstacle, pose: Array) -> list[str]:
+    shapes = obstacle.shapes()
+    lines = ["* " + obstacle.name, *_pose_lines(pose), str(len(shapes))]
+    for link, shape in shapes:
         if shape.kind == "mesh":
-            mesh = shape.mesh(f"obstacle {name}")
+            mesh = obstacle.mesh(link, shape)
             lines += _mesh_lines(mesh.vertices, mesh.faces)
         else:
             lines += [shape.kind, _numbers(shape.size)]

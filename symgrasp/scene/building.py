@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from symgrasp.errors import MeshError, SceneError, one_of
+from symgrasp.errors import SceneError, one_of, referred_to
 from symgrasp.files import file_sha256
 from symgrasp.object.library import library_objects, load_object
 from symgrasp.object.manifold import ROLLS, Manifold
@@ -96,7 +96,7 @@ class SceneBuilder:
             robots,
             arms,
             profile,
-            tuple(self._obstacle(o) for o in file.obstacles),
+            tuple(self._obstacle(i, o) for i, o in enumerate(file.obstacles)),
             {t.name: self._task(i, t, arms) for i, t in enumerate(file.tasks)},
             tuple(notes),
         )
@@ -120,7 +120,8 @@ class SceneBuilder:
                 raise SceneError(self.source, "object.library", entry.library, expected)
             return load_object(entry.library)[1]
         path = self._path(self._reference("object.mesh", entry.mesh or "", "mesh"))
-        return Profile.from_mesh(path, entry.scale, tolerance=entry.tolerance, flip=bool(entry.flip))
+        with referred_to(self.source, "object.mesh"):
+            return Profile.from_mesh(path, entry.scale, tolerance=entry.tolerance, flip=bool(entry.flip))
 
     def _absolute(self, profile: Profile) -> SceneFile:
         """Return the file with absolute references and the profile's knots, valid from any folder.
@@ -172,7 +173,7 @@ class SceneBuilder:
         assert path is not None  # checked by _reference
         return path
 
-    def _obstacle(self, o: ObstacleFile) -> Obstacle:
+    def _obstacle(self, i: int, o: ObstacleFile) -> Obstacle:
         kind = next(k for k in SHAPES if getattr(o, k) is not None)
         size: tuple[float, ...] = ()
         path = model = None
@@ -193,8 +194,10 @@ class SceneBuilder:
             try:
                 digest = file_sha256(path)
             except OSError as error:
-                raise MeshError(path, f"obstacle {o.name}", str(error), "a readable mesh file") from error
-        return Obstacle(o.name, kind, size, path, o.pose.matrix(), model, digest)
+                where = f"obstacles[{i}].mesh"
+                raise SceneError(self.source, where, error.strerror, "a readable mesh file") from error
+        reference = self.source, f"obstacles[{i}].{kind}"
+        return Obstacle(o.name, kind, size, path, o.pose.matrix(), model, digest, reference)
 
     def _task(self, i: int, t: TaskFile, arms: Mapping[str, Arm]) -> Task:
         names = t.arms or (next(iter(arms)),)

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from symgrasp.errors import referred_to
 from symgrasp.object.profile import Profile
 from symgrasp.poses import Array
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.format import SceneFile
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["Obstacle", "SceneParts", "Task"]
 
@@ -32,6 +36,7 @@ class Obstacle:
         model: the links of a URDF, otherwise None.
         file_sha256: SHA-256 of the mesh file, or of the URDF and its collision meshes; empty where the
             body has no file.
+        reference: the scene file, and where in that the body is, for error messages.
     """
 
     name: str
@@ -41,6 +46,20 @@ class Obstacle:
     T_world_obstacle: Array
     model: RobotModel | None = None
     file_sha256: str = ""
+    reference: tuple[str, str] = ("", "obstacle")
+
+    def mesh(self, link: str, shape: CollisionShape) -> trimesh.Trimesh:
+        """Read the mesh of one of its shapes that is one, in the shape's own frame.
+
+        Args:
+            link: of the shape, see `shapes`.
+            shape: the shape.
+
+        Raises:
+            MeshError: it cannot be read, or is too large or too small to be meant in metres.
+        """
+        with referred_to(*self.reference):
+            return shape.mesh(f"link {link}" if link else "mesh")
 
     def shapes(self) -> list[tuple[str, CollisionShape]]:
         """Return all shapes, posed in the obstacle's frame, each with the name of its link.

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from symgrasp.errors import MeshError, SymgraspError
+from symgrasp.errors import MeshError, SymgraspError, referred_to
 from symgrasp.meshes.flat_faces import few_triangles
 from symgrasp.poses import Array
 from symgrasp.progress import Progress
 from symgrasp.robot.link_shapes import CollisionShape
 from symgrasp.robot.model import RobotModel
+from symgrasp.scene.parts import Obstacle
 from symgrasp.scene.scene import Scene
 from symgrasp.world.client import link_names, load_urdf, pybullet, xyzw
 from symgrasp.world.collision import BodyName
@@ -79,9 +80,7 @@ class SceneBodies:
         self.joints = {name: self._movable_joints(name, robot.model) for name, robot in scene.robots.items()}
         self.closed_meshes: list[tuple[BodyName, trimesh.Trimesh]] = []
         self.obstacles = [
-            self._load_shape(BodyName(o.name, link), shape, o.T_world_obstacle @ shape.pose)
-            for o in scene.obstacles
-            for link, shape in o.shapes()
+            self._load_shape(o, link, shape) for o in scene.obstacles for link, shape in o.shapes()
         ]
         self.object = self._load_object(scene)
 
@@ -119,9 +118,9 @@ class SceneBodies:
             if j.source >= 0 and model.link_names[j.child] in index
         ]
 
-    def _load_shape(self, name: BodyName, shape: CollisionShape, pose: Array) -> int:
-        """Load a shape of an obstacle as a body of its own, at a pose (4, 4) in the world."""
-        client = self.client
+    def _load_shape(self, o: Obstacle, link: str, shape: CollisionShape) -> int:
+        """Load a shape of an obstacle as a body of its own."""
+        client, pose = self.client, o.T_world_obstacle @ shape.pose
         if shape.kind == "box":
             half = [0.5 * s for s in shape.size]
             made = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
@@ -135,10 +134,10 @@ class SceneBodies:
                 pybullet.GEOM_SPHERE, radius=shape.size[0], physicsClientId=client
             )
         else:
-            made = self._mesh_shape(name, shape, pose)
-        return self._create_body(made, name, pose)
+            made = self._mesh_shape(o, link, shape, pose)
+        return self._create_body(made, BodyName(o.name, link), pose)
 
-    def _mesh_shape(self, name: BodyName, shape: CollisionShape, pose: Array) -> int:
+    def _mesh_shape(self, o: Obstacle, link: str, shape: CollisionShape, pose: Array) -> int:
         """Create the collision shape of a mesh from its surface, not its convex hull: hollows stay hollow.
 
         PyBullet takes longer the more triangles there are, so flat parts have as few as they need.
@@ -147,15 +146,15 @@ class SceneBodies:
         matter, because its links form a chain from its base outwards, and one of them crosses the surface.
         For the object it does, so closed meshes are kept in `closed_meshes`.
         """
-        field = f"obstacle {name}"
-        mesh = shape.mesh(field)
+        mesh = o.mesh(link, shape)
         mesh.merge_vertices()  # STL repeats every corner
         if len(mesh.faces) > MOST_TRIANGLES or len(mesh.vertices) > MOST_VERTICES:
             value = f"{len(mesh.faces)} triangles between {len(mesh.vertices)} vertices"
             expected = f"at most {MOST_TRIANGLES} between {MOST_VERTICES}; simplify the mesh"
-            raise MeshError(shape.path, field, value, expected)
+            with referred_to(*o.reference):
+                raise MeshError(shape.path, f"link {link}" if link else "mesh", value, expected)
         if mesh.is_watertight:
-            self.closed_meshes.append((name, mesh.copy().apply_transform(pose)))
+            self.closed_meshes.append((BodyName(o.name, link), mesh.copy().apply_transform(pose)))
         vertices, triangles = few_triangles(mesh)
         return pybullet.createCollisionShape(
             pybullet.GEOM_MESH,

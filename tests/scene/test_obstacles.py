@@ -12,6 +12,7 @@ import trimesh
 from symgrasp.errors import MeshError, SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.poses import from_position_rpy
+from symgrasp.scene import building
 from symgrasp.scene.format import PoseFile
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, BulletWorld
@@ -133,8 +134,47 @@ def test_obstacles_of_implausible_sizes_are_refused(small, tmp_path, factor):
     crate().apply_scale(factor).export(tmp_path / "crate.stl")
     small["obstacles"] = [{"name": "thing", "mesh": "crate.stl"}]
     scene = Scene.load(write_scene(tmp_path, small))
-    with pytest.raises(MeshError, match=rf"obstacle thing.*scale {1 / factor:g} would make it 0\.3 m"):
+    said = r"scene\.yaml: obstacles\[0\]\.mesh: crate\.stl: mesh: .*"
+    with pytest.raises(MeshError, match=said + rf"scale {1 / factor:g} would make it 0\.3 m"):
         BulletWorld(scene)
+
+
+def shelf(mesh_name: str) -> str:
+    """A URDF with one board."""
+    return f"<robot name='shelf'>{link('board', mesh(mesh_name))}</robot>"
+
+
+@pytest.mark.parametrize(
+    ("entry", "where"),
+    [
+        ({"mesh": "bad.stl"}, r"obstacles\[1\]\.mesh: bad\.stl: mesh: .*expected a complete STL file"),
+        (
+            {"urdf": "shelf.urdf"},
+            r"obstacles\[1\]\.urdf: bad\.stl: link board: .*expected a complete STL file",
+        ),
+        ({"mesh": "fine.stl"}, r"obstacles\[1\]\.mesh: fine\.stl: mesh: .*expected at most \d+ between"),
+    ],
+)
+def test_an_unusable_mesh_names_the_scene_and_its_field(small, tmp_path, entry, where):
+    (tmp_path / "bad.stl").write_text("no mesh")
+    (tmp_path / "shelf.urdf").write_text(shelf("bad.stl"))
+    trimesh.creation.icosphere(subdivisions=6).export(tmp_path / "fine.stl")
+    box = {"name": "box", "box": [0.1, 0.1, 0.1], "pose": {"position": [2, 2, 0]}}
+    small["obstacles"] = [box, {"name": "thing", **entry}]
+    scene = Scene.load(write_scene(tmp_path, small))
+    with pytest.raises(MeshError, match=rf"scene\.yaml: {where}"):
+        BulletWorld(scene)
+
+
+def test_a_mesh_that_cannot_be_read_names_the_scene_and_its_field(small, tmp_path, monkeypatch):
+    def refuse(_: Path) -> str:
+        raise PermissionError(13, "Permission denied")
+
+    crate().export(tmp_path / "crate.stl")
+    small["obstacles"] = [{"name": "thing", "mesh": "crate.stl"}]
+    monkeypatch.setattr(building, "file_sha256", refuse)
+    with pytest.raises(SceneError, match=r"scene\.yaml: obstacles\[0\]\.mesh: 'Permission denied'"):
+        Scene.load(write_scene(tmp_path, small))
 
 
 def test_a_scale_belongs_to_a_mesh(small, tmp_path):

@@ -302,7 +302,9 @@ def test_a_mesh_takes_a_tolerance_and_its_other_end(content, tmp_path):
     oval.vertices[:, 0] *= 1.2
     oval.export(tmp_path / "oval.stl")
     content["object"] = {"name": "bottle", "mesh": "oval.stl"}
-    with pytest.raises(MeshError, match=r"oval\.stl: symmetry: .* tolerance: 0\.00\d+ in a scene"):
+    with pytest.raises(
+        MeshError, match=r"scene\.yaml: object\.mesh: oval\.stl: symmetry: .* tolerance: 0\.00\d+ in a scene"
+    ):
         Scene.load(write_scene(tmp_path, content))
     content["object"]["tolerance"] = 0.01
     upright = Scene.load(write_scene(tmp_path, content)).profile
