@@ -12,9 +12,9 @@ from ..render.drawn_poses import drawn_joint_values, drawn_object_pose
 from ..state.page_link import Camera
 from ..state.state import State
 from .flat_map import FlatMap
-from .viewpoint import FIELD_OF_VIEW, Box, box_of, hides, link_boxes, link_points, surface_points
+from .viewpoint import FIELD_OF_VIEW, Box, box_of, corners, hides, link_boxes, link_points, surface_points
 
-__all__ = ["followed", "hidden_points", "objects_of_plan", "points_to_follow", "unhidden"]
+__all__ = ["followed", "hidden_points", "objects_of_plan", "points_to_follow", "unhidden", "with_flat_map"]
 
 KEPT = 0.88
 """Share of the view, from its middle, in which everything is kept that is followed."""
@@ -73,6 +73,17 @@ def followed(camera: Camera, points: Array, aspect: float) -> Camera:
     return tuple(float(v) for v in (*(eye + moved - back * forward), *(look_at + moved)))
 
 
+def with_flat_map(points: Array, flat_map: FlatMap | None, camera: Camera) -> Array:
+    """Return points (n, 3) that have to be seen, and the corners of the flat map if there is one.
+
+    Args:
+        points: the points.
+        flat_map: the flat map, where it is shown.
+        camera: from where it is seen.
+    """
+    return points if flat_map is None else np.concatenate([points, corners(flat_map.box(camera))])
+
+
 def objects_of_plan(state: State) -> list[Array]:
     """Return points (n, 3) of the object's surface: as it is drawn, then in every task of the plan."""
     tasks = state.plan.plan.tasks if state.plan else []
@@ -96,7 +107,7 @@ def unhidden(camera: Camera, state: State, aspect: float, flat_map: FlatMap | No
         camera: where it is.
         state: the state, with a plan.
         aspect: ratio of width to height of the view.
-        flat_map: which may hide the object as well, where it is shown.
+        flat_map: which is followed, too, and may hide the object, where it is shown.
     """
     points, objects = points_to_follow(state), objects_of_plan(state)
     obstacles = [box for o in state.scene.obstacles if (box := box_of(o))]
@@ -105,7 +116,10 @@ def unhidden(camera: Camera, state: State, aspect: float, flat_map: FlatMap | No
         boxes = [*obstacles, flat_map.box(camera)] if flat_map else obstacles
         return [hidden_points(camera, points, boxes) for points in objects]
 
-    after = followed(camera, points, aspect)
+    def follow(camera: Camera) -> Camera:
+        return followed(camera, with_flat_map(points, flat_map, camera), aspect)
+
+    after = follow(camera)
     if not hidden(after)[0]:
         return after
 
@@ -116,7 +130,7 @@ def unhidden(camera: Camera, state: State, aspect: float, flat_map: FlatMap | No
         return now, hidden_points(camera, objects[0], links), sum(later)
 
     middle = objects[0].mean(axis=0)
-    turned = (followed(_turned(camera, middle, turn), points, aspect) for turn in TURNS)
+    turned = (follow(_turned(camera, middle, turn)) for turn in TURNS)
     return min(turned, key=cost)
 
 

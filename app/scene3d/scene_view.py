@@ -17,7 +17,7 @@ from ..state.page_link import Camera
 from ..state.state import State
 from .backdrop import add_floor, add_lights, add_obstacle
 from .flat_map import FlatMap
-from .following import followed, points_to_follow, unhidden
+from .following import followed, points_to_follow, unhidden, with_flat_map
 from .ghost_view import GhostView
 from .glide import Glide
 from .nodes import set_pose
@@ -219,10 +219,10 @@ class SceneView:
         camera = self.client.camera
         now = tuple(float(v) for v in (*camera.position, *camera.look_at))
         aspect = camera.image_width / max(camera.image_height, 1)
+        flat_map = self.flat_map if state.display.flat_map else None
         if self._followed[:-1] == before[:-1]:  # it is being played: to be turned around would confuse
-            after = followed(now, points_to_follow(state), aspect)
+            after = followed(now, with_flat_map(points_to_follow(state), flat_map, now), aspect)
         else:
-            flat_map = self.flat_map if state.display.flat_map else None
             after = unhidden(now, state, aspect, flat_map)
         if after != now:
             self._look_from(after)

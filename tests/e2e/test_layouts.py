@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from contextlib import closing
 
 import pytest
 from playwright.sync_api import expect
+
+from tests.e2e.page import GraspPage
 
 WORDS = ("#title", "#turn", "#map", "#legend li", "#legend li span", "#legend li small", "#counted")
 """What stands in the pane of the map."""
@@ -87,3 +90,23 @@ def test_map_view_and_panels_do_not_cover_each_other(open_page, size):
         box = tab.bounding_box()
         assert box["x"] + box["width"] <= width
     assert page.complaints == []
+
+
+DRAWN_BY_THE_PROCESSOR = """for (const context of [WebGLRenderingContext, WebGL2RenderingContext]) {
+    const ask = context.prototype.getParameter;
+    context.prototype.getParameter = function (name) {
+        return name === 0x9246 ? "llvmpipe" : ask.call(this, name); // UNMASKED_RENDERER_WEBGL
+    };
+}"""
+"""Lets WebGL say that it has no graphics card, whatever it has."""
+
+
+@pytest.mark.parametrize("size", SIZES, ids=[str(width) for width, _ in SIZES])
+def test_the_notice_of_slow_drawing_does_not_stay_before_the_view(browser, start_server, size):
+    width, height = size
+    with closing(browser.new_context(viewport={"width": width, "height": height})) as context:
+        context.add_init_script(DRAWN_BY_THE_PROCESSOR)
+        page = GraspPage(context.new_page(), start_server("bottle_on_table"))
+        notice = page.frame.locator(".mantine-Notification-root", has_text="Software WebGL")
+        expect(notice).to_have_count(1)
+        expect(notice).to_be_hidden(timeout=30_000)

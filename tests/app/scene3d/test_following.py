@@ -16,12 +16,14 @@ from hypothesis import strategies as st
 from app.render.drawn_poses import drawn_joint_values
 from app.scene3d.following import KEPT, followed, points_to_follow
 from app.scene3d.scene_view import SceneView
+from app.scene3d.viewpoint import FLAT_SIZE
 from app.server.door.viser_server import quiet_server
 from app.state.changes import switched
 from app.state.first_grasp import with_first_grasp
 from app.state.page_link import Camera
 from app.state.plans.plan_changes import show_position, show_step
 from app.state.state import State
+from symgrasp.poses import from_position_quat
 from tests.app.scene3d.seen import in_view, link_corners
 from tests.app.state.states import opened, with_plan
 
@@ -158,6 +160,33 @@ def test_what_plays_turns_no_camera_around(view, camera):
     after = pose(camera)
     ahead, later = (np.array(c[3:]) - c[:3] for c in (before, after))
     assert np.cross(ahead, later) == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def flat_corners(view: SceneView) -> np.ndarray:
+    """The corners (4, 3) of the flat map where it is drawn."""
+    assert view.flat_map
+    frame, (width, height) = view.flat_map.frame, FLAT_SIZE
+    signs = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) / 2
+    pose = from_position_quat(frame.position, frame.wxyz)
+    return signs * [width, height] @ pose[:3, :2].T + pose[:3, 3]
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_the_flat_map_is_in_view_while_a_plan_plays(view, camera, shown):
+    state = switched(with_plan("pick_pour_place", "sequential"), flat_map=shown)
+    view.show(state, move_gizmo=True)
+    moved = []
+    for position in np.linspace(0.0, 2.0, 9):
+        arm, object_pose = points_to_follow(state)[0], state.T_world_object[:3, 3]
+        view.camera_moved(pose(camera))
+        flat = flat_corners(view)
+        camera.position = object_pose + np.array([0.9, 0.3, 0.4])
+        camera.look_at = (arm + object_pose) / 2
+        state = show_position(state, float(position))
+        view.show(state, move_gizmo=True)
+        seen = in_view(pose(camera), flat, SIZE[0] / SIZE[1])
+        moved.append(bool((np.abs(seen) <= KEPT + 1e-6).all()))
+    assert all(moved) if shown else not all(moved)
 
 
 def test_a_camera_moves_while_its_scene_is_replaced(view, camera):
