@@ -351,6 +351,7 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
             scene, request.name, maps, "hill_climb", request.seed, progress=first, trace=steps
         )
         seconds = time.perf_counter() - begun
+        progress(0.5)
         climbed = plan_result(plan, scene)
     except NoPlanError as error:
         seconds, refusal = time.perf_counter() - begun, Refusal(str(error))

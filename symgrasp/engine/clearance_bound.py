@@ -25,6 +25,7 @@ from symgrasp.collision.pieces import PackedPieces, Piece, pack, pose_rows
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.kinematics import MovingPieces, compose, rotate
 from symgrasp.poses import Array, axis_frame, from_rotation, inverse
+from symgrasp.progress import Progress
 
 __all__ = ["clearance_bound", "core"]
 
@@ -44,7 +45,12 @@ class _Part(NamedTuple):
 
 
 def clearance_bound(
-    moving: MovingPieces, pieces: PackedPieces, pose: Array, limits: Array, most: float
+    moving: MovingPieces,
+    pieces: PackedPieces,
+    pose: Array,
+    limits: Array,
+    most: float,
+    progress: Progress | None = None,
 ) -> float:
     """Return a distance (m) that the clearance of an arm's configurations never exceeds, at most ``most``.
 
@@ -54,6 +60,7 @@ def clearance_bound(
         pose: (P, 12) poses of all pieces; those of moving ones do not matter.
         limits: (2, n) lower and upper limits (rad) of the arm's joints, infinite where there are none.
         most: distance (m) above which nothing matters.
+        progress: called with the finished share; may raise `Cancelled`.
     """
     pairs = _pairs(moving, pieces, pose)
     of_arm = (moving.joint_origin, moving.joint_axis, limits)
@@ -65,7 +72,9 @@ def clearance_bound(
 
     def compute() -> tuple[Array]:
         found = most
-        for near, first, far, last in pairs:
+        for k, (near, first, far, last) in enumerate(pairs):
+            if progress:
+                progress(k / len(pairs))
             found = _furthest(moving, limits, near, first, far, last, found)
         return (np.array(found),)
 

@@ -1,6 +1,6 @@
 """Inverse kinematics: all configurations of a pose at sampled redundancy values."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -29,7 +29,11 @@ __all__ = [
 
 
 def solver_for(
-    arm: Arm, samples: int, torso: Sequence[int] | None = None, more: Sequence[float] = ()
+    arm: Arm,
+    samples: int,
+    torso: Sequence[int] | None = None,
+    more: Sequence[float] = (),
+    trying: Callable[[], None] = lambda: None,
 ) -> Solver:
     """Return the solver of an arm.
 
@@ -38,6 +42,7 @@ def solver_for(
         samples: number of redundancy samples; a 6-joint arm always has one.
         torso: the samples of the robot's torso to try; all of them if None.
         more: values of the redundancy (rad) that are tried after the samples; none of a pitched arm.
+        trying: called before the solver of every sample of the torso is made; may raise `Cancelled`.
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
@@ -46,6 +51,7 @@ def solver_for(
         return PitchedIK(arm, samples, _compiled)
 
     def alone(own: Arm) -> CompiledIK:
+        trying()
         ik = CompiledIK(own, samples)
         return ik.at(np.append(ik.phi, more)) if len(more) else ik
 

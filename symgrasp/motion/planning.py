@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -86,7 +87,7 @@ class MotionPlanner:
     def grip(self, holds: Sequence[Hold], progress: Progress | None = None) -> Grip:
         """Return the grasp by which an arm holds the object in one or several tasks of a plan.
 
-        The progress is told between the solvers that are made for it.
+        The progress is told between the solvers that are made for it, on a torso one for each of its samples.
         """
         hold, arm = holds[0], self.scene.arm(holds[0].arm)
         more: tuple[float, ...] = ()
@@ -99,8 +100,8 @@ class MotionPlanner:
             fine = samples * (2 * int(np.ceil((LEAST_SAMPLES / samples - 1) / 2)) + 1)
             solvers: list[Solver] = []
             for count in (samples, max(samples, fine)):
-                if progress:
-                    progress(0.0)  # on a torso there is one for each of its values
-                solvers.append(solver_for(arm, count, more=more))
+                solvers.append(
+                    solver_for(arm, count, more=more, trying=partial(progress or (lambda _: None), 0.0))
+                )
             self._solvers[arm.name, more] = solvers[0], solvers[1]
         return Grip.of(hold, arm, *self._solvers[arm.name, more], self.scene.profile)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from symgrasp.plan.check_holds import tool_of
 from symgrasp.plan.plan import Hold, PlanTask
 from symgrasp.plan.report import Report
 from symgrasp.poses import Array, inverse
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, at_start, part_of
 from symgrasp.reason import Reason
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
@@ -57,11 +58,11 @@ def check_margins(
         own = arm
         if arm.pitched:
             own = arm.at_pitch(g.pitch).grasping_at(scene.profile, h, int(g.roll > 1.0), 0.5 * grid.dtheta)
-        ik = solver_for(own, scene.settings.samples, torso)
+        ik = solver_for(own, scene.settings.samples, torso, trying=partial(progress or (lambda _: None), 0.0))
         return CandidateChecker(world, own, ik, scene.settings.approach, holders=holders)
 
     proven = hold.margins == "proven"
-    if proven and not _check_proof(hold, task, who, maker, torso, report):
+    if proven and not _check_proof(hold, task, who, maker, torso, report, at_start(progress)):
         return
     checker = checker_at(g.h)
     for name in scene.robots:
@@ -92,13 +93,12 @@ def check_margins(
     for text, steps, dh, dtheta in sides:
         near: Array | None = q
         for k in steps:
-            if progress:
-                progress(done / total)
+            tell = part_of(progress, done, total)
             done += 1
             if near is None:
                 continue
             own = checker_at(g.h + k * dh) if arm.pitched else checker
-            near = _feasible(own, grasps, g.h + k * dh, theta + k * dtheta, near)
+            near = _feasible(own, grasps, g.h + k * dh, theta + k * dtheta, near, tell)
             away = f"{1e3 * k * dh:+.1f} mm" if dh else f"{np.rad2deg(k * dtheta):+.1f}°"
             report.expect(near is not None, f"{who}: {text} is overstated: {away} away is infeasible")
 
@@ -149,7 +149,13 @@ def _within(margin: float, step: float) -> range:
 
 
 def _check_proof(
-    hold: Hold, task: PlanTask, who: str, maker: MapMaker, torso: Sequence[int] | None, report: Report
+    hold: Hold,
+    task: PlanTask,
+    who: str,
+    maker: MapMaker,
+    torso: Sequence[int] | None,
+    report: Report,
+    progress: Progress | None,
 ) -> bool:
     """Check that margins are no larger than what is proven of the cells in line with that of the grasp.
 
@@ -160,6 +166,7 @@ def _check_proof(
         maker: computes maps of the scene.
         torso: the samples of the torso that the arm shares with others, None where it shares none.
         report: where what is found is noted.
+        progress: called now and then; may raise `Cancelled`.
     """
     grid, g = maker.scene.manifold, hold.grasp
     row, column = grid.cell(g.h, g.theta + task.delta)
@@ -172,9 +179,9 @@ def _check_proof(
     only[cell.roll, :, cell.column] = only[cell.roll, cell.row] = True
     posed = Task(task.name, tuple(other.arm for other in task.holds), task.object_pose.array())
     if torso is None:
-        m = maker.map(hold.arm, posed, certify=True, only=only)
+        m = maker.map(hold.arm, posed, certify=True, only=only, progress=progress)
     else:
-        maps = maker.maps_by_torso(hold.arm, posed, certify=True, only=only)
+        maps = maker.maps_by_torso(hold.arm, posed, certify=True, only=only, progress=progress)
         m = merged([maps[t] for t in torso])
     text = f"{who}: no margins are proven of arms with five joints, or with a retreat"
     if not report.expect(m.margins_proven, text):
@@ -213,7 +220,12 @@ def _check_retreat(hold: Hold, checker: CandidateChecker, T: Array, who: str, re
 
 
 def _feasible(
-    checker: CandidateChecker, grasps: _Grasps, h: float, theta: float, near: Array
+    checker: CandidateChecker,
+    grasps: _Grasps,
+    h: float,
+    theta: float,
+    near: Array,
+    progress: Progress | None,
 ) -> Array | None:
     """Return a configuration (n,) that holds a grasp, None where there is none: nearest ones are tried first.
 
@@ -223,6 +235,7 @@ def _feasible(
         h: height (m) of this one.
         theta: its angle (rad).
         near: (n,) a configuration that holds the grasp beside it.
+        progress: called now and then; may raise `Cancelled`.
     """
     arm, world, n = checker.arm, checker.world, len(near)
     profile, hand = world.scene.profile, arm.hand
@@ -237,16 +250,23 @@ def _feasible(
     found = checker.ik.solve(tool)
     for k in np.argsort(np.abs(found.q[:, :n] - near).max(axis=1, initial=0.0), kind="stable"):
         if found.inside[k]:
+            if progress:
+                progress(0.0)
             result = checker.check(tool, found.q[k], int(found.sample[k]), hand.opening(radius))
             if result.reason == Reason.FEASIBLE:
                 return found.q[k, :n]
     if world.scene.settings.redundancy != "auto" or arm.pitched:
         return None
-    return _feasible_between(checker, grasps, h, theta, tool)
+    return _feasible_between(checker, grasps, h, theta, tool, progress)
 
 
 def _feasible_between(
-    checker: CandidateChecker, grasps: _Grasps, h: float, theta: float, T_base_tool: Array
+    checker: CandidateChecker,
+    grasps: _Grasps,
+    h: float,
+    theta: float,
+    T_base_tool: Array,
+    progress: Progress | None,
 ) -> Array | None:
     """Return a configuration (n,) that holds a grasp at a value of the redundancy that is no sample, if any.
 
@@ -261,7 +281,8 @@ def _feasible_between(
     cell = Cell(int(grasps.roll > 1.0), row, 0)
     only = np.zeros((len(ROLLS), fine.heights, 1), dtype=bool)
     only[cell] = True
-    witness = grasps.maker.map(arm.name, task, manifold=column, certify=False, only=only).witness(cell)
+    m = grasps.maker.map(arm.name, task, manifold=column, progress=progress, certify=False, only=only)
+    witness = m.witness(cell)
     if witness is None:
         return None
     for name in world.scene.robots:

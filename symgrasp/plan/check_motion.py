@@ -14,7 +14,7 @@ from symgrasp.plan.check_motion_states import MOST_STATES, RIGID, SegmentStates,
 from symgrasp.plan.motion_record import MotionRecord, SegmentRecord
 from symgrasp.plan.plan import Hold, Plan
 from symgrasp.poses import Array, inverse, pose_error
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, part_of
 from symgrasp.world import BulletWorld
 
 __all__ = ["check_motion"]
@@ -57,9 +57,8 @@ def check_motion(
     expect(abs(total - motion.duration) <= TOLERANCE, text)
     walk = _Walk(plan, world, expect, strict)
     for k, segment in enumerate(motion.segments):
-        if progress:
-            progress(k / len(motion.segments))
-        if not walk.follow(segment, f"motion.segments[{k}] ({segment.kind})"):
+        tell = part_of(progress, k, len(motion.segments))
+        if not walk.follow(segment, f"motion.segments[{k}] ({segment.kind})", tell):
             return
     walk.check_end(motion.segments[-1])
 
@@ -90,8 +89,10 @@ class _Walk:
                 grasp = inverse(task.object_pose_turned.array()) @ hold.tool_pose.array()
                 self._grasps.setdefault(hold.arm, []).append(grasp)
 
-    def follow(self, segment: SegmentRecord, where: str) -> bool:
+    def follow(self, segment: SegmentRecord, where: str, progress: Progress | None) -> bool:
         """Check a segment and move to its end; return whether the next one can be checked."""
+        if progress:
+            progress(0.0)
         released = [name for name in segment.gripper if self._in_hand.pop(name, None) is not None]
         if not self._check_start(segment, where):
             return False
@@ -100,7 +101,8 @@ class _Walk:
         states = SegmentStates(
             self._scene, segment, self._values, self._T, self._in_hand, self._grasps, self._strict
         )
-        self._states += check_free(states, self._world, MOST_STATES - self._states, where, self._expect)
+        most = MOST_STATES - self._states
+        self._states += check_free(states, self._world, most, where, self._expect, progress)
         last = states.values(states.rows[-1:])
         self._T = states.objects(last)[0][0]
         self._values = {name: rows[0] for name, rows in last.items()}

@@ -10,6 +10,7 @@ import numpy as np
 from symgrasp.plan.check_motion_rows import Expect
 from symgrasp.plan.motion_record import SegmentRecord
 from symgrasp.poses import Array, inverse, pose_error
+from symgrasp.progress import Progress
 from symgrasp.scene.balance import load_of_hand, support_margin
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BodyName, BulletWorld, Collision, near_links
@@ -159,7 +160,14 @@ def tool_pose(scene: Scene, name: str, values: Mapping[str, Array]) -> Array:
     return arm.robot.T_world_base @ links[..., arm.robot.model.link_index(arm.tool), :, :]
 
 
-def check_free(states: SegmentStates, world: BulletWorld, most: int, where: str, expect: Expect) -> int:
+def check_free(
+    states: SegmentStates,
+    world: BulletWorld,
+    most: int,
+    where: str,
+    expect: Expect,
+    progress: Progress | None = None,
+) -> int:
     """Check that all bodies keep the clearance of a segment, at steps that are shorter than it.
 
     Args:
@@ -168,6 +176,7 @@ def check_free(states: SegmentStates, world: BulletWorld, most: int, where: str,
         most: most states that may be checked.
         where: what it is called in failures.
         expect: notes a statement, and what is wrong where it does not hold.
+        progress: called with the share of the states that are checked; may raise `Cancelled`.
 
     Returns:
         How many states were checked.
@@ -192,6 +201,8 @@ def check_free(states: SegmentStates, world: BulletWorld, most: int, where: str,
         return len(at)
     near = _NearBodies(states, world, fine, poses)
     for k, pose in enumerate(poses):
+        if progress:
+            progress(k / len(poses))
         for name, values in fine.items():
             world.set_robot(name, values[k])
         world.set_object(pose)

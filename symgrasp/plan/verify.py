@@ -52,6 +52,8 @@ def verify(
     report = Report(strict)
     check_planner(plan, report)
     own = check_scene(plan, scene, report)
+    if progress:
+        progress(0.0)
     if own is None:
         return report
     check_order(plan, own, report)
@@ -62,7 +64,7 @@ def verify(
             check_grasps_stay(plan, world, report)
             check_support(plan, world, report)
         holds = [(k, task, hold) for k, task in enumerate(plan.tasks) for hold in task.holds]
-        parts = len(plan.tasks) + len(holds)
+        parts = len(plan.tasks) + len(holds) + (plan.motion is not None)
         for k, task in enumerate(plan.tasks):
             if progress:
                 progress(k / parts)
@@ -73,7 +75,8 @@ def verify(
             for done, (k, task, hold) in enumerate(holds, start=len(plan.tasks)):
                 check_margins(hold, task, places[k], maker, report, part_of(progress, done, parts))
         if plan.motion is not None and not report.failures:
-            check_motion(plan, plan.motion, world, report.expect, strict=strict)
+            tell = part_of(progress, parts - 1, parts)
+            check_motion(plan, plan.motion, world, report.expect, tell, strict=strict)
     if progress:
         progress(1.0)
     return report

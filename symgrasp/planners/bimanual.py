@@ -112,10 +112,10 @@ def hill_climb(
     rng = np.random.default_rng(seed)
     iterations = body_checks = 0
     for restart in range(limits.restarts):
-        if progress:
-            progress(restart / limits.restarts)
         cells = [Cell(*map(int, rng.choice(choices))) for choices in starts]
         for _ in range(limits.iterations):
+            if progress:
+                progress(restart / limits.restarts)
             collisions = search.count(cells)
             if trace is not None:
                 trace.append(ClimbStep(restart, tuple(cells), collisions))

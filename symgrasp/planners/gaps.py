@@ -13,6 +13,7 @@ from symgrasp.compiling import njit
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.planners.passing import Hands
 from symgrasp.poses import Array
+from symgrasp.progress import Progress, at_start
 from symgrasp.robot.handprint import Handprint
 from symgrasp.robot.robot import Arm
 
@@ -54,12 +55,17 @@ class PrintGaps:
         grid: the grid of the maps.
         pitches: of every arm the pitches (rad) that its maps have; see `FeasibilityMap.pitches`. Prints are
             those of a hand in the middle of its cell.
+        progress: called with 0 between the lines of cells of which gaps are computed; may raise `Cancelled`.
     """
 
     def __init__(
-        self, arms: Sequence[Arm], grid: Manifold, pitches: Sequence[Sequence[float]] | None = None
+        self,
+        arms: Sequence[Arm],
+        grid: Manifold,
+        pitches: Sequence[Sequence[float]] | None = None,
+        progress: Progress | None = None,
     ) -> None:
-        self.arms, self.grid = arms, grid
+        self.arms, self.grid, self._tell = arms, grid, at_start(progress)
         self._pitches = [own or (0.0,) for own in pitches or ((),) * len(arms)]
         self._kind = cache(self._kind_of)
         self._lines = cache(self._lines_of)
@@ -94,6 +100,8 @@ class PrintGaps:
             radius = float(self.grid.profile.radius(self.grid.h[row]))
             key = (roll, pitch, radius)
             if key not in known:
+                if self._tell:
+                    self._tell(0.0)
                 known[key] = len(kinds)
                 p = self.arms[a].handprint(self.grid, row, roll, pitch)
                 kinds.append(_Line(roll, pitch, radius, p.first_row - row, p.cells))
@@ -116,6 +124,8 @@ class PrintGaps:
         low = min(line.first for line in lines_b) - self.grid.heights
         high = max(line.first + len(line.cells) for line in lines_b) + self.grid.heights
         for kind, line in enumerate(lines_a):
+            if self._tell:
+                self._tell(0.0)
             bottom, top = min(low, line.first), max(high, line.first + len(line.cells))
             around = np.zeros((top - bottom, self.grid.angles), np.bool_)
             around[line.first - bottom : line.first - bottom + len(line.cells)] = line.cells
@@ -133,6 +143,8 @@ class PrintGaps:
         for t, (kind_a, kind_b, apart) in enumerate(pairs.tolist()):
             overlap = gaps[t] == OVERLAP
             if overlap.any():
+                if self._tell:
+                    self._tell(0.0)
                 line_a, line_b = self._lines(a)[1][kind_a], self._lines(b)[1][kind_b]
                 tools = self._tool(a, line_a, 0.0), self._tool(b, line_b, apart * self.grid.dh)
                 meet = hands(line_a.radius, line_b.radius).meet(*tools, overlap)

@@ -124,9 +124,9 @@ def regrasp_plans(
     """
     name, tasks = _tasks_alone(scene, arm)
     with open_world(scene, progress) as world:
-        visits = _visits(world, tasks, maps, progress)
+        visits = _visits(world, tasks, maps, part_of(progress, 0, 2))
         scene = _with_supports(world, tasks)
-        for entries in with_regrasps(world, visits, name):
+        for entries in with_regrasps(world, visits, name, part_of(progress, 1, 2)):
             yield write_plan(scene, "sequential", Planner(algorithm="regrasp"), entries)
 
 
@@ -346,6 +346,8 @@ def _visits(
         torsos: dict[str, dict[str, list[FeasibilityMap]]] = {name: {} for name in shared}
         for arm, body in zip(task.arms, bodies, strict=True):
             step = part_of(progress, done, total)
+            if step:
+                step(0.0)  # also where maps are given
             given = (known or {}).get((task.name, arm))
             if body.name in shared:
                 by_torso = [_rated(world, m) for m in _by_torso(maker, arm, task, given, step)]

@@ -23,7 +23,7 @@ from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.holding import HoldingSearch, hold_runs, turn_groups
 from symgrasp.planners.sequential import first_common_grasp
 from symgrasp.planners.stations import SharedTorso
-from symgrasp.progress import Progress, part_of
+from symgrasp.progress import Progress, part_of, rising
 from symgrasp.scene.parts import Task
 from symgrasp.world import BulletWorld
 
@@ -79,7 +79,9 @@ def _azimuth(held: Held) -> float:
     return held.configuration.arm.pitch_and_azimuth(held.configuration.q, roll)[1]
 
 
-def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> Iterator[list[PlanTask]]:
+def with_regrasps(
+    world: BulletWorld, visits: Sequence[TaskVisit], arm: str, progress: Progress | None = None
+) -> Iterator[list[PlanTask]]:
     """Yield the fewest grasps for a sequence of one arm, first each the best for its tasks.
 
     A regrasp visits the task where the object is set down twice: at the end with the old grasp,
@@ -90,6 +92,7 @@ def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> 
         world: a world of the scene.
         visits: every task once, in order.
         arm: the arm.
+        progress: called with a share that rises with what was tried; may raise `Cancelled`.
 
     Yields:
         The tasks as a plan states them, visits for a regrasp included.
@@ -111,7 +114,7 @@ def with_regrasps(world: BulletWorld, visits: Sequence[TaskVisit], arm: str) -> 
         entry = [] if down is None else [visits[down]]
         part += (v for v in entry if v is not own[-1])
         parts.append(part)
-    chains = _Chains(world, parts)
+    chains = _Chains(world, parts, progress and rising(progress))
     for total in count():
         alive = False
         for places in product(range(total + 1), repeat=len(parts)):
@@ -132,10 +135,13 @@ class _Chains:
     Args:
         world: a world of the scene.
         parts: the visits of each part; the object is where the one before has left it.
+        progress: called with the share of the part that is searched; may raise `Cancelled`.
     """
 
-    def __init__(self, world: BulletWorld, parts: Sequence[Sequence[TaskVisit]]) -> None:
-        self._world, self._parts = world, parts
+    def __init__(
+        self, world: BulletWorld, parts: Sequence[Sequence[TaskVisit]], progress: Progress | None
+    ) -> None:
+        self._world, self._parts, self._progress = world, parts, progress
         self._further: dict[tuple[int, ...], Iterator[tuple[list[PlanTask], Planner]]] = {}
         self._known: dict[tuple[int, ...], list[PlanTask] | None] = {(): []}
 
@@ -154,7 +160,7 @@ class _Chains:
             if places[:-1] not in self._further:
                 turned = before[-1].delta if before else 0.0  # the object stays as it was set down
                 part = self._parts[len(places) - 1]
-                self._further[places[:-1]] = holdings(self._world, part, None, turned)
+                self._further[places[:-1]] = holdings(self._world, part, self._progress, turned)
             found = next(self._further[places[:-1]], None)
             self._known[places] = None if found is None else [*before, *found[0]]
         return self._known[places]
@@ -185,11 +191,12 @@ def holdings(
     Raises:
         NoPlanError: there are none; says why.
     """
+    progress = progress and rising(progress)
     scene, maps = world.scene, [visit.maps for visit in visits]
     grid = next(iter(maps[0].values())).manifold
     runs = hold_runs(maps)
     pitches = [maps[run.tasks[0]][run.arm].pitches for run in runs]
-    gaps = PrintGaps([scene.arm(run.arm) for run in runs], grid, pitches)
+    gaps = PrintGaps([scene.arm(run.arm) for run in runs], grid, pitches, progress)
     torsos = [SharedTorso(k, shared) for k, visit in enumerate(visits) for shared in visit.torsos]
     search = HoldingSearch(maps, gaps, torsos)
     finders = [_finder(world, visit) for visit in visits]
@@ -321,6 +328,8 @@ def _climb(
         return configurations.find(cells, every=False) is not None
 
     found = hill_climb(maps, arms, bodies_free, seed, limits, progress, trace=trace)
+    if progress:
+        progress(1.0)
     held = [
         Held(configuration, m, cell, cell)
         for configuration, m, cell in zip(witnesses(arms, maps, found.cells), maps, found.cells, strict=True)

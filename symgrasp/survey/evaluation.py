@@ -191,11 +191,9 @@ class Evaluator:
             scene = self.survey.scene_at(point)
             if tell:
                 tell(0.0)
-            scene = with_free_homes(scene)
-            if tell:
-                tell(0.0)
+            scene = with_free_homes(scene, tell)
             try:
-                check_homes(scene)
+                check_homes(scene, tell)
             except SceneError:
                 self._stage = _Stage(key, scene, None, None, {})
             else:

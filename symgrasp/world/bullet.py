@@ -78,8 +78,10 @@ class BulletWorld:
                 self._queries[arm.name] = arm_queries(self.bodies, scene, arm)
                 if progress:
                     progress(0.0)
+            tell = at_start(progress) or (lambda _: None)
             self._parked_queries = {name: parked_queries(self.bodies, name) for name in scene.robots}
             self._outer_queries = outer_queries(self.bodies, scene)
+            tell(0.0)
             self.set_object(scene.task().T_world_object)
             for name in scene.robots:
                 self.park(name)

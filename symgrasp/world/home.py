@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from symgrasp.errors import SceneError
 from symgrasp.poses import Array
+from symgrasp.progress import Progress
 from symgrasp.reason import Reason
 from symgrasp.robot.arm_joints import BRANCH, joints_outwards
 from symgrasp.robot.robot import Arm, Robot
@@ -39,18 +40,22 @@ DECIMALS = 4
 """Of the values (rad or m) of a home that is found, which a scene states."""
 
 
-def with_free_homes(scene: Scene) -> Scene:
+def with_free_homes(scene: Scene, progress: Progress | None = None) -> Scene:
     """Return a scene in which no robot collides at home, as far as its file leaves that open.
 
     The file of the returned scene states the values that were found, and its notes say so. A robot whose
     values are given, or for which none were found, stays as it is: see `check_homes`.
+
+    Args:
+        scene: the scene.
+        progress: called with 0 while its world is opened; may raise `Cancelled`.
 
     Raises:
         UrdfError, MeshError, SceneError: PyBullet cannot make a shape of the scene.
     """
     if not any(_open_joints(scene, robot) for robot in scene.robots.values()):
         return scene
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         return free_homes(world)
 
 
@@ -79,8 +84,12 @@ def free_homes(world: BulletWorld) -> Scene:
     return replace(Scene.from_content(content, scene.source), notes=(*scene.notes, *notes))
 
 
-def check_homes(scene: Scene) -> tuple[str, ...]:
+def check_homes(scene: Scene, progress: Progress | None = None) -> tuple[str, ...]:
     """Check that no arm of a scene is barred from every grasp by what collides at home.
+
+    Args:
+        scene: the scene.
+        progress: called with 0 while its world is opened; may raise `Cancelled`.
 
     Returns:
         In words, the collisions at home that bar no arm, because each moves away from them, and the links of
@@ -90,7 +99,7 @@ def check_homes(scene: Scene) -> tuple[str, ...]:
         SceneError: a pair of bodies collides whatever an arm does; the text names both, and what helps.
         UrdfError, MeshError: PyBullet cannot make a shape of the scene.
     """
-    with open_world(scene) as world:
+    with open_world(scene, progress) as world:
         return home_notes(world)
 
 

@@ -103,6 +103,7 @@ class ExactEngine:
     ) -> None:
         self.world, self.arm, self.manifold, self._levels = world, arm, manifold, levels
         self._settings = world.scene.settings
+        tell = at_start(progress) or (lambda _: None)
         self._solvers = self._new_solvers(manifold)
         if compiled_parts(self._solvers.at(0, 0)) is None or not supports(arm):
             raise NotImplementedError(f"arm {arm.name}: not of a kind that the exact engine knows")
@@ -111,17 +112,22 @@ class ExactEngine:
         self._misfit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
-        self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening, at_start(progress))
+        tell(0.0)
+        self._geometry: ArmGeometry = arm_geometry(world, arm, self._opening, tell)
+        tell(0.0)
         self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces.size, arm.dof)
         self._copies: list[Scratch] = []
         self._prover: CellProver | None = None
         # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
         self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
         pairs = world.pairs_within(arm, self._reach)
+        tell(0.0)
         geometry, limits = self._geometry, np.array([arm.lower, arm.upper])
         self._most = CLEARANCE_LIMIT
         if not arm.pitched:  # whose hand has other poses in every row
-            self._most = clearance_bound(geometry.moving, geometry.pieces, geometry.pose, limits, self._most)
+            self._most = clearance_bound(
+                geometry.moving, geometry.pieces, geometry.pose, limits, self._most, tell
+            )
         self._balance = self._geometry.balance
         self._open = OpenCandidates(world, arm, geometry, self._scratch, self._opening)
         self._redundancy = RedundancySearch(arm, geometry, self._open)

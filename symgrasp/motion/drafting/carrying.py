@@ -20,7 +20,7 @@ from symgrasp.motion.paths.search import NoMotionError, blockers, connect, prove
 from symgrasp.motion.segments import Kind
 from symgrasp.plan.plan import PlanTask
 from symgrasp.poses import Array, inverse
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, at_start
 from symgrasp.scene.scene import Scene
 
 __all__ = ["ROOM_TOGETHER", "Stretch", "TiltLimit", "carry_alone", "carry_together", "tilt_limit"]
@@ -200,7 +200,10 @@ def carry_together(
         if any(not np.array_equal(own, chosen[name]) for name, own in situations[0].by_arm(rows).items()):
             continue  # arms of one body need one torso
         paths = [rows[a : b + 1] for a, b in pairwise(ends)]
-        proofs = [prove(s, path[:-1], path[1:]) for s, path in zip(situations, paths, strict=True)]
+        tell = at_start(progress)
+        proofs = [
+            prove(s, path[:-1], path[1:], progress=tell) for s, path in zip(situations, paths, strict=True)
+        ]
         if all(proof.free.all() for proof in proofs):
             return [
                 Part(stretch.kind, situation, path)

@@ -16,6 +16,7 @@ from symgrasp.motion.paths.search import STATED, NoMotionError, Proof, blockers,
 from symgrasp.motion.segments import Kind, Opening, Segment
 from symgrasp.plan.writing import ERROR, rounded_down
 from symgrasp.poses import Array
+from symgrasp.progress import Progress, at_start
 from symgrasp.robot.robot import Arm
 
 __all__ = ["Course", "Part", "part_of", "prove_path"]
@@ -41,6 +42,7 @@ class Course:
     Args:
         bodies: the pieces of the scene.
         state: where everything is at the start.
+        progress: called now and then; may raise `Cancelled`.
 
     Attributes:
         bodies: the same.
@@ -50,8 +52,8 @@ class Course:
         segments: so far.
     """
 
-    def __init__(self, bodies: MotionScene, state: State) -> None:
-        self.bodies, self.state = bodies, state
+    def __init__(self, bodies: MotionScene, state: State, progress: Progress | None = None) -> None:
+        self.bodies, self.state, self._progress = bodies, state, progress
         self.held: dict[str, Grip] = {}
         self.undecided: set[str] = set()
         self.segments: list[Segment] = []
@@ -59,7 +61,7 @@ class Course:
 
     def copied(self) -> Course:
         """Return a course with the same segments, to which others can be added."""
-        course = Course(self.bodies, self.state)
+        course = Course(self.bodies, self.state, self._progress)
         course.held, course.undecided = dict(self.held), set(self.undecided)
         course.segments, course._opening = list(self.segments), dict(self._opening)
         return course
@@ -70,7 +72,7 @@ class Course:
 
     def add(self, kind: Kind, situation: Situation, path: Array, task: str) -> None:
         """Add a segment in a task in which the arms of a situation follow a path (n, J), and move there."""
-        self._append(kind, situation.by_arm(path), (task, task), prove_path(situation, path))
+        self._append(kind, situation.by_arm(path), (task, task), self._proof(situation, path))
 
     def carry(
         self, parts: Sequence[Part], tasks: tuple[str, str], end: Array, tilt: float, room: float
@@ -88,7 +90,7 @@ class Course:
         for kind, situation, path in parts:
             if len(path) < 2:
                 continue
-            proof = prove_path(situation, path)
+            proof = self._proof(situation, path)
             self._append(
                 kind,
                 situation.by_arm(path),
@@ -132,10 +134,13 @@ class Course:
         rows = np.array([situation.row(state) for state in states])
         verb = "closing" if kind == "close" else "opening"
         with part_of(f"{verb} the {'hand' if len(arms) == 1 else 'hands'} of {', '.join(arms)} in {task}"):
-            proof = prove_path(situation, rows)
+            proof = self._proof(situation, rows)
         still = {name: np.array([self.state.joints(arm)] * 2) for name, arm in arms.items()}
         self._append(kind, still, (task, task), proof, openings)
         self.state, self._opening = states[-1], {**self._opening, **ends}
+
+    def _proof(self, situation: Situation, path: Array) -> Proof:
+        return prove_path(situation, path, self._progress)
 
     def _append(
         self,
@@ -186,13 +191,18 @@ class Course:
         return found
 
 
-def prove_path(situation: Situation, path: Array) -> Proof:
+def prove_path(situation: Situation, path: Array, progress: Progress | None) -> Proof:
     """Return what is proven of the lines of a path (n, J).
+
+    Args:
+        situation: what moves and stands.
+        path: the path.
+        progress: called now and then with 0; may raise `Cancelled`.
 
     Raises:
         NoMotionError: one of them is not free; says what is in its way.
     """
-    proof = prove(situation, path[:-1], path[1:], STATED)
+    proof = prove(situation, path[:-1], path[1:], STATED, at_start(progress))
     if not proof.free.all():
         raise NoMotionError(blockers(situation, proof.hits[~proof.free]))
     return proof

@@ -76,7 +76,8 @@ class MotionDraft:
         self._bodies, self._scene, self._grips = bodies, bodies.scene, grips
         self._tasks, self._seed, self._told, self._share = plan.tasks, seed, progress, 0.0
         self._lifts = plan.kind == "bimanual"
-        self._course = Course(bodies, bodies.home().with_object(plan.tasks[0].object_pose_turned.array()))
+        home = bodies.home().with_object(plan.tasks[0].object_pose_turned.array())
+        self._course = Course(bodies, home, self._progress)
         self._trees: dict[str, LineTree] = {}  # of the arms of which is not decided how they take the object
         self._visits: list[dict[str, Array]] = [{} for _ in plan.tasks]
         self._k = 0  # the task that the object is in
@@ -177,7 +178,7 @@ class MotionDraft:
             both = {grip.arm.name: np.tile(end, (len(theirs), 1)), other.arm.name: theirs}
             rows = situation.stacked(both)
             rows = rows[(rows[:, situation.columns[grip.arm.name]] == end).all(axis=1)]
-            proof = prove(situation, rows, rows)
+            proof = prove(situation, rows, rows, progress=self._progress)
             free[k] = proof.free.any()
             hits.append(proof.hits)
         if not free.any():

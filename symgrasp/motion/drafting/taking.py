@@ -175,7 +175,7 @@ def _free_together(
         if any(not np.array_equal(own, way[name]) for name, own in situation.by_arm(rows).items()):
             continue  # arms of one body need one torso
         try:
-            prove_path(situation, rows)
+            prove_path(situation, rows, progress)
         except NoMotionError as error:
             why = error
         else:

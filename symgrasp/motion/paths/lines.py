@@ -18,7 +18,7 @@ from symgrasp.ik import Solver
 from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.search import NoMotionError, blockers, prove
 from symgrasp.poses import Array, inverse, pose_error
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, at_start, part_of
 from symgrasp.robot.limits import moved_onto_limits
 
 __all__ = ["CLEAR", "Leg", "LineTree", "configurations", "follow"]
@@ -111,14 +111,15 @@ def follow(
     steps = [(leg.situation, a, b) for leg in legs for a, b in pairwise(leg.poses)]
     situation, first = legs[0].situation, legs[0].poses[0]
     layer = configurations(solver, first) if start is None else start
-    proof = prove(situation, layer, layer, CLEAR)
+    proof = prove(situation, layer, layer, CLEAR, at_start(progress))
     if not proof.free.any():
         raise NoMotionError(f"its start is not free: {blockers(situation, proof.hits)}")
     layer, reached = layer[proof.free], proof.clearance[proof.free]
     layers, befores = [layer], []
     for k, (situation, before, pose) in enumerate(steps, start=1):
-        if progress:
-            progress(k / len(steps))
+        tell = part_of(progress, k - 1, len(steps))
+        if tell:
+            tell(0.0)
         last = k == len(steps)
         following = end if last and end is not None else configurations(solver, pose)
         new = _following_turns(layer, following, situation.linkage.limits)
@@ -126,7 +127,7 @@ def follow(
         middle = _middle(before, pose)
         straight = _deviation(solver, 0.5 * (layer[a] + new[a, b]), middle, distance) <= deviation
         a, b = a[straight], b[straight]
-        proof = prove(situation, layer[a], new[a, b], CLEAR)
+        proof = prove(situation, layer[a], new[a, b], CLEAR, tell)
         edge, ok = np.minimum(proof.clearance, reached[a]), proof.free
         if not ok.any():
             why = blockers(situation, proof.hits) if len(a) else "no joint values go on from there"

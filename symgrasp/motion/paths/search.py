@@ -10,9 +10,9 @@ import numpy as np
 from symgrasp.errors import NoPlanError
 from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.proof import FALLEN, TILTED, clearances
-from symgrasp.motion.paths.trees import Trees, grow, new_trees, shorten
+from symgrasp.motion.paths.trees import Trees, drop_points, grow, new_trees, shorten
 from symgrasp.poses import Array
-from symgrasp.progress import Progress
+from symgrasp.progress import Progress, at_start, between, portions
 
 __all__ = [
     "STATED",
@@ -32,9 +32,6 @@ STATED = 0.05
 ROOM = ((0.01, 1_000), (0.003, 2_000), (0.0, 60_000))
 """By how much more (m) than they must bodies keep apart in free motions, if such a motion is found in so many
 samples: the corners of the path are rounded later, and arms do not follow it exactly."""
-
-BATCH = 500
-"""Samples between two reports of progress, at which it may be cancelled."""
 
 TRIES = 150
 """Lines that are tried to shorten a path."""
@@ -64,7 +61,9 @@ class Proof(NamedTuple):
         return self.clearance >= 0
 
 
-def prove(situation: Situation, start: Array, end: Array, most: float = 0.0) -> Proof:
+def prove(
+    situation: Situation, start: Array, end: Array, most: float = 0.0, progress: Progress | None = None
+) -> Proof:
     """Prove that lines are free.
 
     Args:
@@ -72,11 +71,15 @@ def prove(situation: Situation, start: Array, end: Array, most: float = 0.0) -> 
         start: (E, J) joint values.
         end: (E, J) joint values.
         most: clearance (m) above which it need not be known.
+        progress: called with the finished share; may raise `Cancelled`.
     """
     s = situation
     found, hits = np.empty((len(start), 2)), np.full((len(start), 2), -1, dtype=np.int64)
     start, end = np.ascontiguousarray(start, dtype=float), np.ascontiguousarray(end, dtype=float)
-    clearances(s.linkage, s.pieces, s.tree, s.work, start, end, float(most), found, hits)
+    for some in portions(len(start), progress):
+        clearances(
+            s.linkage, s.pieces, s.tree, s.work, start[some], end[some], float(most), found[some], hits[some]
+        )
     return Proof(found[:, 0], found[:, 1], hits)
 
 
@@ -127,30 +130,31 @@ def connect(
     Raises:
         NoMotionError: none was found; says what is in the way most.
     """
-    return shortened(find(situation, starts, goals, seed, progress))
+    return shortened(find(situation, starts, goals, seed, progress), progress)
 
 
 def find(
     situation: Situation, starts: Array, goals: Array, seed: int = 0, progress: Progress | None = None
 ) -> FoundPath:
     """Find a free path from one of some configurations to one of others; see `connect`."""
-    s = situation
+    s, tell = situation, at_start(progress)
     for roots, what in ((starts, "start"), (goals, "end")):
-        proof = prove(s, roots, roots)
+        proof = prove(s, roots, roots, progress=tell)
         if not proof.free.any():
             raise NoMotionError(f"its {what} is in collision: {blockers(s, proof.hits)}")
     met, taken = np.zeros(len(s.names), dtype=np.int64), 0
     for room, samples in ROOM:
         wide = s.with_room(room)
-        first, second = (roots[prove(wide, roots, roots).free] for roots in (starts, goals))
+        first, second = (roots[prove(wide, roots, roots, progress=tell).free] for roots in (starts, goals))
         if not len(first) or not len(second):
             continue
         trees = new_trees(first, second, len(s.names), seed)
         low, high = _sampled(s, np.concatenate([first, second]))
-        for done in range(0, samples, BATCH):
-            if progress:
-                progress(done / samples)
-            if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, BATCH):
+        for some in portions(samples, progress):
+            count = some.stop - some.start
+            if grow(wide.linkage, s.pieces, s.tree, s.work, trees, low, high, count):
+                if progress:
+                    progress(some.stop / samples)
                 return FoundPath(wide, _joined(trees), trees.random)
         met, taken = trees.met[: len(s.names)], samples
     most = met.argsort()[::-1][:2]
@@ -159,12 +163,24 @@ def find(
     raise NoMotionError(f"{text}; mostly in the way: {names}" if names else text)
 
 
-def shortened(path: FoundPath) -> Array:
-    """Return a path (n, J) that is no longer than one that was found, all lines of it proven free."""
+def shortened(path: FoundPath, progress: Progress | None = None) -> Array:
+    """Return a path (n, J) that is no longer than one that was found, all lines of it proven free.
+
+    Args:
+        path: the path that was found.
+        progress: called with the finished share; may raise `Cancelled`.
+    """
     s = path.situation
     rows = np.empty((len(path.rows) + 2 * TRIES, path.rows.shape[1]))
     rows[: len(path.rows)] = path.rows
-    count = shorten(s.linkage, s.pieces, s.tree, s.work, rows, len(path.rows), path.random, TRIES)
+    count, idle = len(path.rows), 0
+    for some in portions(TRIES, between(progress, 0.0, 0.5)):
+        tries = some.stop - some.start
+        count, idle = shorten(s.linkage, s.pieces, s.tree, s.work, rows, count, path.random, tries, idle)
+    before = 0
+    for some in portions(count, between(progress, 0.5, 1.0)):
+        tries = some.stop - some.start
+        count, before = drop_points(s.linkage, s.pieces, s.tree, s.work, rows, count, before, tries)
     return rows[:count].copy()
 
 

@@ -17,7 +17,7 @@ from symgrasp.compiling import ENTRY, njit
 from symgrasp.motion.paths.proof import line_clearance, place, tilt_excess
 from symgrasp.poses import Array
 
-__all__ = ["Trees", "grow", "new_trees", "shorten"]
+__all__ = ["Trees", "drop_points", "grow", "new_trees", "shorten"]
 
 STEP = 0.9
 """Longest line (rad) that is added to a tree."""
@@ -209,8 +209,8 @@ def _about(frame, axis, x, y):
 
 
 @njit(**ENTRY)
-def shorten(linkage, pieces, tree, work, path, count, random, tries):
-    """Shorten a path by proven lines between random points of it; return how many points it has then.
+def shorten(linkage, pieces, tree, work, path, count, random, tries, idle):
+    """Shorten a path by proven lines between random points of it.
 
     Args:
         linkage: see `Linkage`.
@@ -221,9 +221,12 @@ def shorten(linkage, pieces, tree, work, path, count, random, tries):
         count: number of points that the path has.
         random: (1,) state of the random numbers.
         tries: how many lines to try.
+        idle: how many were tried in vain last, in calls before; after `IDLE` of them no more are.
+
+    Returns:
+        How many points the path has then, and how many lines were tried in vain last.
     """
     a, b = work.q[2], work.q[3]
-    idle = 0
     for _ in range(tries):
         if count < 3 or idle == IDLE:
             break
@@ -242,16 +245,33 @@ def shorten(linkage, pieces, tree, work, path, count, random, tries):
             continue
         idle = 0
         count = _replace(path, count, i, k, a, b)
-    i = 1
-    while i < count - 1:  # points that are not needed
+    return count, idle
+
+
+@njit(**ENTRY)
+def drop_points(linkage, pieces, tree, work, path, count, kept, tries):
+    """Drop points of a path between whose neighbours the line is proven free, from its start on.
+
+    Args:
+        linkage, pieces, tree, work, path, count: see `shorten`.
+        kept: number of points, after the first, of which is known that they stay.
+        tries: how many points to look at.
+
+    Returns:
+        How many points the path has then, and how many of them stay.
+    """
+    for _ in range(tries):
+        i = kept + 1
+        if i >= count - 1:
+            break
         if line_clearance(linkage, pieces, tree, work, path[i - 1], path[i + 1], 0.0, 0.5)[0] < 0.0:
-            i += 1
+            kept += 1
         else:
             for m in range(i, count - 1):
                 for j in range(path.shape[1]):
                     path[m, j] = path[m + 1, j]
             count -= 1
-    return count
+    return count, kept
 
 
 @njit(**FAST)
