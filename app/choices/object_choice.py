@@ -120,9 +120,9 @@ def from_mesh(name: str, content: bytes, scale: float, tolerance: float | None =
         except MeshError as error:
             expected = error.expected
             if error.field == "size":
-                expected = f"{SIZES[0]:g} to {SIZES[1]:g} m; choose the unit of the mesh and upload it again"
+                expected = f"{SIZES[0]:g} to {SIZES[1]:g} m; choose the unit of the mesh"
             elif error.field == "symmetry":
-                expected = expected.partition(" (")[0] + "; choose it and upload the mesh again"
+                expected = expected.partition(" (")[0] + "; choose it"
             raise MeshError(name, error.field, error.value, expected) from None
     measurement = replace(measurement, source=name)
     return ObjectChoice(f"{file.name} (upload)", file.stem[:100], Profile.measured(measurement), measurement)

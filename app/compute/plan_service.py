@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain, combinations, islice
 from pathlib import Path
 
@@ -233,7 +234,7 @@ class PlanService:
                 return _climb(request, scene, maps, progress)
             if request.method == "first":
                 plan = plan_sequential(scene, request.name, maps, "first", progress)
-                return PlanOutcome(request.kind, (plan_result(plan, scene),))
+                return PlanOutcome(request.kind, (plan_result(plan, scene, partial(progress, 1.0)),))
             self._progress, self._scene = progress, scene
             self._plans, self._listed = self._start_planner(request, scene, maps), 0
             plans, more = self._next_plans()
@@ -299,7 +300,9 @@ class PlanService:
         if scene is None:
             return OpenedPlan(report)
         read_visuals(scene, part_of(progress, 1, 2))
-        return OpenedPlan(report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene))
+        return OpenedPlan(
+            report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene, partial(progress, 1.0))
+        )
 
     def _start_planner(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:
         def report_progress(share: float) -> None:
@@ -351,13 +354,12 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
             scene, request.name, maps, "hill_climb", request.seed, progress=first, trace=steps
         )
         seconds = time.perf_counter() - begun
-        progress(0.5)
-        climbed = plan_result(plan, scene)
+        climbed = plan_result(plan, scene, partial(progress, 0.5))
     except NoPlanError as error:
         seconds, refusal = time.perf_counter() - begun, Refusal(str(error))
     try:
         exact_plan = plan_bimanual(scene, request.name, maps, progress=part_of(progress, 1, 2))
-        exact = plan_result(exact_plan, scene)
+        exact = plan_result(exact_plan, scene, partial(progress, 1.0))
     except NoPlanError as error:
         refusal = Refusal(str(error))
     arms = request.tasks[0].arms
@@ -369,11 +371,21 @@ def _climb(request: PlanRequest, scene: Scene, maps: FeasibilityMaps, progress: 
     return PlanOutcome(request.kind, refusal=refusal, climb=climb)
 
 
-def plan_result(plan: Plan, scene: Scene) -> PlanResult:
-    """Return a plan of a scene with the prints of its hands and the gaps between them."""
-    prints = tuple({h.arm: _print(scene, h) for h in task.holds} for task in plan.tasks)
-    gaps = tuple(_gap(scene, task) for task in plan.tasks)
-    return PlanResult(plan, prints, gaps, from_plan(plan, scene))
+def plan_result(plan: Plan, scene: Scene, trying: Callable[[], None] = lambda: None) -> PlanResult:
+    """Return a plan of a scene with the prints of its hands and the gaps between them.
+
+    Args:
+        plan: the plan.
+        scene: its scene.
+        trying: called before the prints of every task, and the gaps between them; may raise `Cancelled`.
+    """
+    prints, gaps = [], []
+    for task in plan.tasks:
+        trying()
+        prints.append({h.arm: _print(scene, h) for h in task.holds})
+        trying()
+        gaps.append(_gap(scene, task))
+    return PlanResult(plan, tuple(prints), tuple(gaps), from_plan(plan, scene))
 
 
 def _print(scene: Scene, hold: Hold) -> np.ndarray:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -57,12 +58,13 @@ def link_visuals(urdf: bytes, progress: Progress | None) -> dict[str, bytes]:
     named = {m.name: m.color.rgba for m in reversed(materials) if m is not None and m.color is not None}
     glbs = {}
     for k, link in enumerate(robot.links):
+        tell = partial(progress or (lambda _: None), k / len(robot.links))
         scene = trimesh.Scene()
         for visual in link.visuals:
-            if progress:
-                progress(k / len(robot.links))
-            _add_visual(scene, visual, link.name, named)
+            tell()
+            _add_visual(scene, visual, link.name, named, tell)
         if scene.geometry:
+            tell()
             glbs[link.name] = export_glb(scene, include_normals=True)
     return glbs
 
@@ -90,7 +92,11 @@ def read_visuals(scene: Scene, progress: Progress | None = None) -> Visuals:
 
 
 def _add_visual(
-    scene: trimesh.Scene, visual: yourdfpy.Visual, link: str, named: Mapping[str | None, np.ndarray]
+    scene: trimesh.Scene,
+    visual: yourdfpy.Visual,
+    link: str,
+    named: Mapping[str | None, np.ndarray],
+    tell: Callable[[], None],
 ) -> None:
     meshes = _shapes(visual, link)
     own = [_own_color(mesh) for mesh in meshes]
@@ -101,7 +107,9 @@ def _add_visual(
     origin = np.eye(4) if visual.origin is None else visual.origin
     share = MAX_TRIANGLES / sum(len(mesh.faces) for mesh in meshes)
     for mesh, color in zip(meshes, own, strict=True):
+        tell()  # also between the steps, as a mesh may be large
         mesh = _simplified(mesh, share)
+        tell()
         if given is not None and not painted:
             color = tuple(round(255 * c) for c in given)
         paint = np.minimum(

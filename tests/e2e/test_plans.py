@@ -255,3 +255,19 @@ def test_a_motion_is_found_scrubbed_played_and_downloaded(open_page, tmp_path):
     plan = Plan.load(path)
     assert plan.motion
     assert verify(plan).holds
+
+
+@pytest.mark.parametrize("size", [(390, 844), (1280, 800)], ids=["390", "1280"])
+def test_a_refusal_is_seen_from_the_end_of_a_tab(open_page, tmp_path, size):
+    page = open_page(size=size)
+    page.tab("Sequence")
+    button = page.button("Open a plan")
+    button.scroll_into_view_if_needed()
+    bad = tmp_path / "bad.json"
+    bad.write_text("no plan")
+    with page.page.expect_file_chooser() as chooser:
+        button.click()
+    chooser.value.set_files(bad)
+    expect(page.alerts).to_contain_text("bad.json")
+    expect(button).to_be_in_viewport()  # it was not scrolled away
+    expect(page.alerts).to_be_in_viewport(ratio=0.9)

@@ -136,7 +136,10 @@ class PlanActions:
         def send(state: State) -> None:
             if state.plan:
                 if state.assets.folders and format_name == "JSON":
-                    expected = "robots of the server; save the scene, unpack it and run `symgrasp plan`"
+                    expected = (
+                        "a robot of the list, for the file names those of the robot; choose another format, "
+                        "or save the scene (Files), unpack it and run `symgrasp plan`"
+                    )
                     raise InputError("plan file", "robots", "an upload", expected)
                 plan = state.plan.plan
                 ending, write = FORMATS[format_name]

@@ -6,10 +6,12 @@ from contextlib import closing
 
 import pytest
 
+from app.compute import plan_service
 from app.compute.map_service import MapService
 from app.compute.plan_service import PLANS_PER_BATCH, PlanRequest, PlanService
 from app.state.plans.plan_results import PlanKind
 from symgrasp.errors import Cancelled
+from symgrasp.planners.planning import plan_sequential
 from tests.conftest import load_small
 
 CASES: list[tuple[str, PlanKind, str, str]] = [
@@ -80,3 +82,15 @@ def test_listing_ends_where_it_is_cancelled_between_two_plans(listed):
     ):
         service.plan(request, {}, progress)
     assert max(again) == again[-1] == share
+
+
+def test_one_may_cancel_between_the_prints_of_tasks_and_their_gaps(monkeypatch):
+    scene = load_small("pick_pour_place", 16, 24, 8)
+    events: list[str] = []
+    for name in ("_print", "_gap"):
+        step = getattr(plan_service, name)
+        monkeypatch.setattr(
+            plan_service, name, lambda *given, step=step: (events.append("step"), step(*given))[1]
+        )
+    plan_service.plan_result(plan_sequential(scene), scene, lambda: events.append("told"))
+    assert events == ["told", "step"] * 2 * 3  # a print and a gap for each of three tasks

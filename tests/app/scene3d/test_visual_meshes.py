@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from app.scene3d import visual_meshes
 from app.scene3d.visual_meshes import MAX_TRIANGLES, link_visuals
 from symgrasp.errors import SymgraspError
 from symgrasp.robot.model import RobotModel
@@ -96,3 +99,21 @@ def test_a_fine_mesh_is_shown_with_fewer_triangles_in_the_same_place(tmp_path):
     points = trimesh.sample.sample_surface(fine, 2000, seed=1)[0]
     _, distance, _ = trimesh.proximity.closest_point(seen, points + np.array([0.0, 0.0, 0.5]))
     assert distance.max() < 0.001
+
+
+def test_one_may_cancel_between_the_steps_of_every_mesh(tmp_path, monkeypatch):
+    trimesh.creation.icosphere(subdivisions=5).export(tmp_path / "ball.stl")
+    events: list[str] = []
+    for name in ("_shapes", "_simplified", "export_glb"):
+        step = getattr(visual_meshes, name)
+
+        def noting(
+            *arguments: object, name: str = name, step: Callable[..., object] = step, **options: object
+        ) -> object:
+            events.append(name)
+            return step(*arguments, **options)
+
+        monkeypatch.setattr(visual_meshes, name, noting)
+    link_visuals(urdf(tmp_path, '<mesh filename="ball.stl"/>'), lambda _: events.append("told"))
+    assert [event for event in events if event != "told"] == ["_shapes", "_simplified", "export_glb"]
+    assert all("told" in pair for pair in pairwise(events))
