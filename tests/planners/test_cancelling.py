@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from symgrasp.errors import Cancelled
 from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.exact import engine
 from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
 from symgrasp.planners.planning import bimanual_plans, plan_bimanual
@@ -93,6 +95,20 @@ def test_windows_that_pybullet_settles_may_be_cancelled_before_every_question(mo
     assert "aa" not in questions
     assert told == sorted(told)
     assert told[-1] == 1.0
+
+
+def test_one_may_cancel_between_the_heights_at_which_a_hand_fits(events, monkeypatch):
+    asked = engine.fit
+
+    def noting(*arguments: Any) -> Any:
+        events.append("fit")
+        return asked(*arguments)
+
+    monkeypatch.setattr(engine, "fit", noting)
+    with open_world(load_small("bottle_on_table", 9)) as world:
+        MapMaker(world).map(progress=lambda _: events.append("told"))
+    assert events.count("fit") == 9
+    assert ("fit", "fit") not in pairwise(events)
 
 
 def test_probabilities_may_be_cancelled_in_the_map_of_the_pose_that_is_expected(events):

@@ -109,7 +109,11 @@ class ExactEngine:
             raise NotImplementedError(f"arm {arm.name}: not of a kind that the exact engine knows")
         radii = manifold.profile.radius(manifold.h)
         self._opening = np.array([arm.hand.opening(float(r)) for r in radii])
-        self._misfit = [fit(arm.hand, manifold.profile, float(h)) for h in manifold.h]
+        tell(0.0)
+        self._misfit: list[Reason | None] = []
+        for h in manifold.h:
+            self._misfit.append(fit(arm.hand, manifold.profile, float(h)))
+            tell(0.0)  # margins are tried on grids of hundreds of rows
         self._T_world_base = np.ascontiguousarray(arm.robot.T_world_base)
         world.set_arms([(arm, arm.home, float(self._opening[0]))])
         tell(0.0)
