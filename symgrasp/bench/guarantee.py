@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 from time import process_time
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from symgrasp.bench.random_scenes import KINDS, random_scene, scene_of_kind
 from symgrasp.engine.checks import HIT_BAND
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.cell import Cell
@@ -32,7 +35,7 @@ from symgrasp.world import open_world
 __all__ = ["Guarantee", "run", "summary"]
 
 RANDOM_GRID = {"heights": 8, "angles": 16}
-"""Grid of the scenes whose objects are at random places."""
+"""Grid of random scenes."""
 
 SHIFT, TURN = 0.1, 0.4
 """Standard deviation of those places (m), and of the turn of the object about each axis (rad), every other
@@ -66,7 +69,7 @@ class Guarantee:
         refuted_proven: the same of cells that it says to be proven infeasible: each is a fault.
         tried_proven: number of those for which those were asked.
         ratio: processor time of the map, divided by that of one at 32 samples.
-        random: whether the object is at a random place, not where a shipped scene has it.
+        random: whether the scene is drawn at random, or the object at a random place of a shipped scene.
     """
 
     scene: str
@@ -103,30 +106,25 @@ class Guarantee:
 
 
 def run(random: int) -> Iterator[Guarantee]:
-    """Measure the shipped scenes at their own grids, then as many with objects at random places.
+    """Measure the shipped scenes at their own grids, then random scenes.
 
     Args:
-        random: number of maps with objects at random places.
+        random: number of random scenes, of which one arm is measured: objects at random places of shipped
+            scenes in turns with scenes of each kind of `symgrasp.bench.random_scenes`.
     """
     scenes = [Scene.load(name) for name, path in shipped_scenes().items() if missing_extra(path) is None]
     arms = [(scene, task, name) for scene in scenes for task, name in _arms(scene)]
     for scene, task, name in arms:
         yield _measured(scene, task, name)
-    rng = np.random.default_rng(0)
-    for k in range(random):
-        scene, task, name = arms[k % len(arms)]
-        T = task.T_world_object.copy()
-        T[:3, 3] += rng.normal(0.0, SHIFT, 3)
-        if k % 2:
-            T[:3, :3] = T[:3, :3] @ _turn(rng.normal(0.0, TURN, 3))
-        small = scene.with_settings(**RANDOM_GRID)
-        found = _measured(small, Task(f"random {k}", task.arms, T), name)
-        yield replace(found, random=True)
+    with TemporaryDirectory() as folder:
+        for scene, task, name in _random(random, arms, Path(folder)):
+            found = _measured(scene.with_settings(**RANDOM_GRID), task, name)
+            yield replace(found, random=True)
 
 
 def summary(rows: Sequence[Guarantee]) -> Iterator[str]:
-    """Yield what all rows say together, as a line of text for shipped scenes and one for random places."""
-    for random, where in ((False, "shipped scenes"), (True, "random places")):
+    """Yield what all rows say together, as a line of text for shipped scenes and one for random ones."""
+    for random, where in ((False, "shipped scenes"), (True, "random scenes")):
         own = [row for row in rows if row.random == random]
         if not own:
             continue
@@ -143,6 +141,27 @@ def summary(rows: Sequence[Guarantee]) -> Iterator[str]:
             f"{sum(r.missed_proven for r in own)} by samples; "
             f"median time × {median(r.ratio for r in own):.2f}"
         )
+
+
+def _random(
+    count: int, arms: Sequence[tuple[Scene, Task, str]], folder: Path
+) -> Iterator[tuple[Scene, Task, str]]:
+    """Yield random scenes, each with a task and an arm; objects are moved in tasks of the given arms."""
+    rng, kinds = np.random.default_rng(0), ["", "", *KINDS]
+    for k in range(count):
+        number, turn = divmod(k, len(kinds))
+        if turn == 0:
+            scene, task, name = arms[number % len(arms)]
+            T = task.T_world_object.copy()
+            T[:3, 3] += rng.normal(0.0, SHIFT, 3)
+            if number % 2:
+                T[:3, :3] = T[:3, :3] @ _turn(rng.normal(0.0, TURN, 3))
+            yield scene, Task(f"random {k}", task.arms, T), name
+        else:
+            kind = kinds[turn]
+            scene = Scene.from_content(scene_of_kind(kind, k, folder) if kind else random_scene(k))
+            own = list(_arms(scene))
+            yield scene, *own[k % len(own)]
 
 
 def _arms(scene: Scene) -> Iterator[tuple[Task, str]]:

@@ -22,7 +22,7 @@ otherwise."""
 
 
 RANDOM_MAPS = 100
-"""Maps of ``bench guarantee`` with objects at random places, unless told otherwise."""
+"""Random scenes of ``bench guarantee``, unless told otherwise."""
 
 
 def add_parser(commands: Commands) -> None:
@@ -40,7 +40,7 @@ def add_parser(commands: Commands) -> None:
     command.add_argument("--quick", action="store_true", help=text)
     text = "random configurations that `bench ik`, `robots` and `singular` look for (default: %(default)s)"
     command.add_argument("--poses", metavar="N", type=whole(1), default=POSES, help=text)
-    text = "maps of `bench guarantee` with objects at random places (default: %(default)s)"
+    text = "random scenes of `bench guarantee` (default: %(default)s)"
     command.add_argument("--random", metavar="N", type=whole(0), default=RANDOM_MAPS, help=text)
     add_out(command, "write the figures as JSON")
     text = "a run that `symgrasp bench --out` kept: say what became slower since, with exit status 1"

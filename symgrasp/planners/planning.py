@@ -28,7 +28,7 @@ from symgrasp.progress import Progress, part_of
 from symgrasp.robot.posture import ease
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld, open_world
+from symgrasp.world import BulletWorld, check_task, open_world
 
 __all__ = [
     "MapsByKey",
@@ -79,7 +79,7 @@ def plan_sequential(
 
     Raises:
         ConflictError: no grasp serves all tasks; says which exclude each other.
-        SceneError: no task is done by that arm alone.
+        SceneError: no task is done by that arm alone, or the object is inside another body in one.
     """
     if method != "first":
         plans = sequential_plans if method == "best" else regrasp_plans
@@ -173,7 +173,7 @@ def plan_bimanual(
 
     Raises:
         NoPlanError: no placement exists, or the hill climbing found none.
-        SceneError: no task needs several arms.
+        SceneError: no task needs several arms, or the object is inside another body there.
     """
     if method == "exact":
         return _best(bimanual_plans(scene, task, maps, progress), progress)
@@ -224,7 +224,8 @@ def plan_handover(
 
     Raises:
         NoPlanError: no grasps exist on this grid.
-        SceneError: the object moves between two tasks that share no arm, or there is one task or arm only.
+        SceneError: the object moves between two tasks that share no arm, or is inside another body in one;
+            or there is one task or arm only.
     """
     return _best(handover_plans(scene, maps, progress), progress)
 
@@ -333,6 +334,8 @@ def _visits(
 ) -> list[TaskVisit]:
     """Visit every task once, with the maps of all its arms; those that are not known are computed."""
     _check_azimuths(world.scene, tasks)
+    for task in tasks:
+        check_task(world, task)
     total = sum(len(task.arms) for task in tasks)
     pitched = {name for task in tasks for name in task.arms if world.scene.arm(name).pitched}
     total += sum(name in pitched for task in tasks for name in task.arms)

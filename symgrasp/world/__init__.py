@@ -14,10 +14,10 @@ from symgrasp.world.opening import open_world
 from symgrasp.world.placing import placed, stands_free
 from symgrasp.world.self_pairs import checked_self_pairs
 from symgrasp.world.shapes import Shape
-from symgrasp.world.tasks import RESTING_DEPTH, check_tasks, object_contact, prepared
+from symgrasp.world.tasks import RESTING_DEPTH, check_task, check_tasks, object_contact, prepared
 
 __all__ = [
     "RESTING_DEPTH", "BodyName", "BulletWorld", "Collision", "NearBodies", "Shape", "check_homes",
-    "check_tasks", "checked_self_pairs", "near_links", "object_contact", "open_world", "own_pairs", "placed",
-    "prepared", "stands_free", "with_free_homes",
+    "check_task", "check_tasks", "checked_self_pairs", "near_links", "object_contact", "open_world",
+    "own_pairs", "placed", "prepared", "stands_free", "with_free_homes",
 ]  # fmt: skip

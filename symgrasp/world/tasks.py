@@ -13,7 +13,7 @@ from symgrasp.world.collision import Collision
 from symgrasp.world.home import free_homes, home_notes
 from symgrasp.world.opening import open_world
 
-__all__ = ["RESTING_DEPTH", "check_tasks", "object_contact", "prepared"]
+__all__ = ["RESTING_DEPTH", "check_task", "check_tasks", "object_contact", "prepared"]
 
 RESTING_DEPTH = 1e-3
 """How deep (m) the object may be inside another body and still count as resting on it."""
@@ -67,14 +67,22 @@ def object_contact(world: BulletWorld, task: Task) -> Collision | None:
     return deepest if deepest and deepest.depth > RESTING_DEPTH else None
 
 
+def check_task(world: BulletWorld, task: Task) -> None:
+    """Check one task as `check_tasks` does all; the object stays at its pose.
+
+    Raises:
+        SceneError: see `check_tasks`.
+    """
+    if c := object_contact(world, task):
+        raise SceneError(
+            world.scene.source,
+            f"tasks[{list(world.scene.tasks).index(task.name)}].pose",
+            task.name,
+            f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
+        )
+
+
 def _check_tasks(world: BulletWorld) -> None:
-    scene = world.scene
-    for i, task in enumerate(scene.tasks.values()):
-        if c := object_contact(world, task):
-            raise SceneError(
-                scene.source,
-                f"tasks[{i}].pose",
-                task.name,
-                f"a pose outside of every other body; {c.a} is {1e3 * c.depth:.1f} mm inside {c.b}",
-            )
-    world.set_object(scene.task().T_world_object)
+    for task in world.scene.tasks.values():
+        check_task(world, task)
+    world.set_object(world.scene.task().T_world_object)

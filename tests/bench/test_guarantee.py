@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symgrasp.bench.guarantee import REFUTED, _measured, _refuted, summary
+from symgrasp.bench.guarantee import REFUTED, _arms, _measured, _random, _refuted, summary
+from symgrasp.bench.random_scenes import KINDS
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.create import create_map
 from symgrasp.ik import solver_for
@@ -33,6 +34,17 @@ def test_a_map_of_all_of_the_redundancy_misses_nothing():
     assert "auto misses 6;" in random
     assert "median time × 3.50" in random
     assert not others
+
+
+def test_random_scenes_are_of_every_kind_with_arms_of_seven_joints(tmp_path):
+    scene = small()
+    found = list(_random(2 * (len(KINDS) + 2), [(scene, *own) for own in _arms(scene)], tmp_path))
+    names = [own.name.split("_")[0] for own, _, _ in found]
+    assert names == [scene.name.split("_")[0], "random", *KINDS] * 2
+    assert {task.name for own, task, _ in found if own is scene} == {"random 0", f"random {len(KINDS) + 2}"}
+    for own, task, name in found:
+        assert name in task.arms
+        assert len(own.arm(name).joint_names) == 7
 
 
 def test_cells_that_are_falsely_infeasible_are_refuted():

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
-from symgrasp.files import SCENES_DIR
-from symgrasp.robot.hand import HANDS
-
-BASES = ("bottle_on_table", "soda_can", "log_iiwa_and_panda", "handover_between_robots", "log_four_robots")
-"""Shipped scenes whose robots are used."""
-
-MOUNTABLE = tuple(name for name, hand in HANDS.items() if hand.urdf)
-
+from symgrasp.bench import random_scenes
 
 ARMS = {
     "three_parallel": [0.0, -1.2, -1.5, -0.4, 1.5, 0.0],
@@ -29,42 +20,17 @@ ARMS = {
 
 
 def random_scene(seed: int, arm: str = "") -> dict[str, Any]:
-    """Return a scene with a small grid; robots reach the object mostly, and things are in the way.
+    """Return a scene as `symgrasp.bench.random_scenes` draws them.
 
     Args:
         seed: of everything in it.
         arm: one of `ARMS`, to be its only robot; by default the robots are those of a shipped scene.
     """
-    rng = np.random.default_rng(seed)
-    content = yaml.safe_load((SCENES_DIR / f"{rng.choice(BASES[:1] if arm else BASES)}.yaml").read_text())
-    if arm:
-        urdf = Path(__file__).parent.parent / "data" / f"{arm}.urdf"
-        robot = {"urdf": str(urdf), "mount": {"link": "flange"}, "hand": "wsg50", "home": ARMS[arm]}
-        content["robots"] = [{"name": content["robots"][0]["name"], **robot}]
-    content["name"], content["description"] = f"random_{seed}", "Drawn at random"
-    for robot in content["robots"]:
-        base = robot.setdefault("base", {"position": [0, 0, 0]})
-        base["position"] = (np.array(base["position"]) + rng.normal(0, 0.08, 3)).round(4).tolist()
-        turn = np.array(base.pop("rpy_deg", [0, 0, 0])) + rng.normal(0, 12, 3) * rng.choice([0, 1])
-        base["rpy_deg"] = turn.round(3).tolist()
-        if "mount" in robot:
-            robot["hand"] = str(rng.choice(MOUNTABLE))
-    content["object"] = {"name": "thing", "profile": _profile(rng)}
-    for task in content["tasks"]:
-        pose = task["pose"]
-        pose["position"] = (np.array(pose["position"]) + rng.normal(0, 0.1, 3)).round(4).tolist()
-        turn = np.array(pose.pop("rpy_deg", [0, 0, 0])) + rng.normal(0, 40, 3) * rng.choice([0, 1])
-        pose["rpy_deg"] = turn.round(3).tolist()
-    centre = np.array(content["tasks"][0]["pose"]["position"])
-    content["obstacles"] = [_obstacle(rng, k, centre) for k in range(rng.integers(0, 7))]
-    content["map"] = {
-        "heights": int(rng.integers(2, 6)),
-        "angles": int(rng.integers(4, 9)),
-        "redundancy": int(rng.integers(2, 8)),
-        "margin": float(rng.choice([0.0, 0.0, 0.005, 0.02])),
-        "approach": float(rng.choice([0.0, 0.0, 0.03, 0.1])),
-    }
-    return content
+    if not arm:
+        return random_scenes.random_scene(seed)
+    urdf = Path(__file__).parent.parent / "data" / f"{arm}.urdf"
+    robot = {"urdf": str(urdf), "mount": {"link": "flange"}, "hand": "wsg50", "home": ARMS[arm]}
+    return random_scenes.random_scene(seed, [robot])
 
 
 def random_pitched_scene(seed: int) -> dict[str, Any]:
@@ -125,27 +91,3 @@ def random_torso_scene(seed: int, *, falls: bool = False) -> dict[str, Any]:
         content["object"]["mass"] = float(rng.uniform(0, 15))
         task["arms"] = [["left"], ["right", "left"]][rng.integers(2)]
     return content
-
-
-def _profile(rng: np.random.Generator) -> list[list[float]]:
-    heights = np.linspace(0, rng.uniform(0.08, 0.5), rng.integers(2, 6))
-    radii = rng.uniform(0.012, 0.045, len(heights))
-    return np.column_stack([heights, radii]).round(4).tolist()
-
-
-def _obstacle(rng: np.random.Generator, k: int, centre: np.ndarray) -> dict[str, Any]:
-    shapes: list[Callable[[], dict[str, Any]]] = [
-        lambda: {"box": rng.uniform(0.02, 0.5, 3).round(4).tolist()},
-        lambda: {
-            "cylinder": {
-                "radius": round(rng.uniform(0.01, 0.15), 4),
-                "height": round(rng.uniform(0.05, 0.6), 4),
-            }
-        },
-        lambda: {"sphere": {"radius": round(rng.uniform(0.02, 0.15), 4)}},
-    ]
-    pose = {
-        "position": (centre + rng.normal(0, 0.25, 3)).round(4).tolist(),
-        "rpy_deg": rng.uniform(-180, 180, 3).round(3).tolist(),
-    }
-    return {"name": f"obstacle{k}", **shapes[rng.integers(len(shapes))](), "pose": pose}

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from trimesh.creation import annulus, box, icosphere
 
+from symgrasp.bench.random_scenes import KINDS, scene_of_kind
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.poses import translation
@@ -127,6 +128,13 @@ def test_among_meshes_the_maps_are_the_same(tmp_path):
         blocked += counts[Reason.SCENE_COLLISION]
     assert feasible > 50
     assert blocked > 50
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scenes_of_other_kinds_have_the_same_maps(kind, tmp_path):
+    """Obstacles of meshes; objects with a cusp, or longer, wider or flatter than any hand is."""
+    feasible = sum(check(scene_of_kind(kind, seed, tmp_path)) for seed in range(8))
+    assert feasible > 0
 
 
 def check(content, counts=None):

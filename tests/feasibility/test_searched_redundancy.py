@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symgrasp.bench.random_scenes import KINDS, scene_of_kind
 from symgrasp.errors import Cancelled, SceneError
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
@@ -22,15 +23,18 @@ from symgrasp.world import open_world
 from tests.conftest import load_small
 from tests.engine.random_scenes import random_scene, random_torso_scene
 
-DENSE = 256
 
-
-def covered(scene: Scene, samples: int = DENSE) -> tuple[FeasibilityMap, FeasibilityMap]:
-    """The map of the first task for which all of the redundancy is searched, and that at many samples."""
+def covered(scene: Scene) -> tuple[FeasibilityMap, FeasibilityMap]:
+    """The map of the first task for which all of the redundancy is searched, and that at the most samples."""
     with open_world(scene.with_settings(redundancy="auto")) as world:
         auto = MapMaker(world).map()
-    with open_world(scene.with_settings(redundancy=samples)) as world:
+    with open_world(scene.with_settings(redundancy=MOST_SAMPLES)) as world:
         return auto, MapMaker(world).map()
+
+
+def assert_none_missed(auto: FeasibilityMap, dense: FeasibilityMap) -> None:
+    assert not (dense.feasible & ~auto.feasible).any()
+    assert not (auto.proven & dense.feasible).any()
 
 
 @settings(max_examples=8)
@@ -73,8 +77,17 @@ def assert_witnesses(scene: Scene, m: FeasibilityMap) -> None:
 def test_no_cell_is_missed_that_a_sample_shows_feasible(seed):
     scene = Scene.from_content(random_scene(seed))
     auto, dense = covered(scene)
-    assert not (dense.feasible & ~auto.feasible).any()
-    assert not (auto.proven & dense.feasible).any()
+    assert_none_missed(auto, dense)
+    assert_witnesses(scene.with_settings(redundancy="auto"), auto)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=4)
+@given(seed=st.integers(0, 10_000))
+def test_no_cell_of_scenes_of_other_kinds_is_missed(kind, tmp_path_factory, seed):
+    scene = Scene.from_content(scene_of_kind(kind, seed, tmp_path_factory.mktemp(kind)))
+    auto, dense = covered(scene)
+    assert_none_missed(auto, dense)
     assert_witnesses(scene.with_settings(redundancy="auto"), auto)
 
 
@@ -82,10 +95,9 @@ def test_no_cell_is_missed_that_a_sample_shows_feasible(seed):
 def test_narrow_windows_are_found(seed):
     # Free between two branches that end in the same root, far from both (516), and between two values at
     # which the retreat is blocked (524).
-    auto, dense = covered(Scene.from_content(random_scene(seed)), MOST_SAMPLES)
+    auto, dense = covered(Scene.from_content(random_scene(seed)))
     assert dense.feasible.any()
-    assert not (dense.feasible & ~auto.feasible).any()
-    assert not (auto.proven & dense.feasible).any()
+    assert_none_missed(auto, dense)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symgrasp.bench.random_scenes import KINDS, scene_of_kind
 from symgrasp.engine.reach import arm_reach
 from symgrasp.errors import Cancelled, MapError, SceneError
 from symgrasp.feasibility.create import MapMaker, create_map
@@ -52,8 +53,22 @@ def test_no_point_of_an_object_at_a_random_place_contradicts_a_certificate(seed)
     _compare(scene, Task("moved", task.arms, T), 0, 1)
 
 
-def _compare(scene, task, whole, none):
-    """Compare a map with a finer one: at least so many feasible and infeasible cells must be certified."""
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_point_of_scenes_of_other_kinds_contradicts_a_certificate(kind, tmp_path):
+    scenes = [Scene.from_content(scene_of_kind(kind, seed, tmp_path)) for seed in range(3)]
+    found = [_compared(scene.with_settings(approach=0.0), scene.task()) for scene in scenes]
+    assert sum(none for _, none in found) > 0
+
+
+def _compare(scene, task, least_whole, least_none):
+    """At least so many feasible and infeasible cells must be certified; none may be wrong."""
+    whole, none = _compared(scene, task)
+    assert whole >= least_whole
+    assert none >= least_none
+
+
+def _compared(scene, task):
+    """Compare a map with a finer one; return how many feasible and infeasible cells are certified."""
     grid = scene.manifold
     fine = Manifold(grid.profile, grid.heights * SAMPLES, grid.angles * SAMPLES)
     with open_world(scene) as world:
@@ -63,8 +78,7 @@ def _compare(scene, task, whole, none):
     cells = points.reshape(2, grid.heights, SAMPLES, grid.angles, SAMPLES).transpose(0, 1, 3, 2, 4)
     assert cells[m.certified & m.feasible].all()
     assert not cells[m.certified & ~m.feasible].any()
-    assert (m.certified & m.feasible).sum() >= whole
-    assert (m.certified & ~m.feasible).sum() >= none
+    return (m.certified & m.feasible).sum(), (m.certified & ~m.feasible).sum()
 
 
 def test_no_point_contradicts_the_parts_of_cells_nor_margins():

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from symgrasp.errors import SymgraspError
+from symgrasp.bench.random_scenes import KINDS, scene_of_kind
+from symgrasp.errors import SceneError
 from symgrasp.motion.bodies.motion_scene import MotionScene
 from symgrasp.motion.bodies.situation import Situation
 from symgrasp.motion.paths.proof import CLOSEST
@@ -55,9 +57,19 @@ def random_lines(situation: Situation, arm, rng: np.random.Generator, count: int
 @settings(max_examples=6)
 def test_no_false_free(seed, torso):
     try:
-        scene = Scene.from_content(random_torso_scene(seed) if torso else random_scene(seed))
-    except SymgraspError:
+        assert_free(random_torso_scene(seed) if torso else random_scene(seed), seed, 3)
+    except SceneError:
         assume(False)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_false_free_in_scenes_of_other_kinds(kind, tmp_path):
+    assert_free(scene_of_kind(kind, 1, tmp_path), 1, 1)
+
+
+def assert_free(content: dict[str, Any], seed: int, count: int) -> None:
+    """Look all along those random lines which are proven with the least clearance, so many of them."""
+    scene = Scene.from_content(content)
     rng = np.random.default_rng(seed)
     with open_world(scene) as world:
         bodies = MotionScene(scene, world)
@@ -65,7 +77,7 @@ def test_no_false_free(seed, torso):
         situation = bodies.situation(bodies.home(), [arm])
         start, end, clearance = random_lines(situation, arm, rng, 200)
         free = np.flatnonzero(clearance >= 0)
-        for k in free[np.argsort(clearance[free])][:3]:  # the closest ones
+        for k in free[np.argsort(clearance[free])][:count]:
             for q in points_between(start[k], end[k]):
                 assert distance_in_bullet(world, arm, q) >= 0.0
 
