@@ -18,7 +18,7 @@ from symgrasp.scene.scene import Scene
 
 __all__ = ["handprints"]
 
-SEED = 439
+SEED = 20327
 """A start with both hands at one height, one across the other."""
 
 CLOSE = 34
