@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from symgrasp.errors import PlanError
-from symgrasp.feasibility.create import create_map
+from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
 from symgrasp.poses import from_position_quat, pose_error
+from symgrasp.robot.robot import Arm
 from symgrasp.scene.scene import Scene
-from symgrasp.world import BulletWorld, check_tasks
+from symgrasp.world import BulletWorld, check_tasks, open_world
 
 STEP = 1e-3
 """By how much (m, rad) numbers are changed: a hundred times the largest tolerance."""
@@ -142,6 +144,21 @@ def _poses(plan: Plan) -> Iterator[np.ndarray]:
             yield from_position_quat(pose.position, pose.quat_wxyz)
 
 
+def map_of(scene: Scene, arm: Arm, task: str, pitch: float) -> FeasibilityMap:
+    """Return the map of an arm in a task: of one with five joints, with its hand at a pitch (rad)."""
+    with open_world(scene) as world:
+        maker = MapMaker(world)
+        return maker.maps_at_pitches(arm.name, task, [pitch]) if arm.pitched else maker.map(arm.name, task)
+
+
+def tool_in_world(arm: Arm, joints: dict[str, float]) -> np.ndarray:
+    """Return the pose (4, 4) of an arm's tool by its URDF and joint values alone."""
+    model, values = arm.robot.model, arm.robot.home.copy()
+    for joint, value in joints.items():
+        values[model.joint_names.index(joint)] = value
+    return arm.robot.T_world_base @ model.forward(values)[model.link_index(arm.tool)]
+
+
 def is_true(plan: Plan) -> bool:
     """Whether a plan is true of the scene in it: by the maps of that scene, and by its bodies."""
     scene = Scene.from_content(plan.scene.content)
@@ -158,10 +175,10 @@ def is_true(plan: Plan) -> bool:
             if world.collisions(arms):
                 return False
             for arm, hold in zip(arms, task.holds, strict=True):
-                m = create_map(scene, arm=arm.name, task=task.name).shift(task.delta)
+                m = map_of(scene, arm, task.name, hold.grasp.pitch).shift(task.delta)
                 cell = m.manifold.cell(hold.grasp.h, hold.grasp.theta)
                 at = (0 if hold.grasp.roll == 0 else 1, *cell)
-                reached = arm.world_tool_pose([hold.joints[name] for name in arm.joint_names])
+                reached = tool_in_world(arm, hold.joints)
                 margin = m.margin(at)
                 if (
                     max(pose_error(reached, hold.tool_pose.array())) > 1e-6

@@ -23,6 +23,7 @@ from symgrasp.robot.pitch import SAME_PITCH
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 from tests.feasibility.test_pitched import so101
+from tests.plan.tampering import tool_in_world
 
 UPRIGHT = {"position": [0.28, 0.05, 0.0]}
 BESIDE = {"position": [0.25, -0.1, 0.0]}
@@ -41,18 +42,13 @@ def scene_of(*poses: dict, heights: int = 8) -> Scene:
 
 def hands_in_object(plan: Plan, arm_name: str) -> list[np.ndarray]:
     """Return the poses (4, 4) of an arm's tool in the object, task by task, by its URDF and joint values."""
-    scene = Scene.from_content(plan.scene.content)
-    arm = scene.arm(arm_name)
-    model, found = arm.robot.model, []
-    for task in plan.tasks:
-        for hold in task.holds:
-            if hold.arm == arm_name:
-                values = arm.robot.home.copy()
-                for joint, value in hold.joints.items():
-                    values[model.joint_names.index(joint)] = value
-                tool = arm.robot.T_world_base @ model.forward(values)[model.link_index(arm.tool)]
-                found.append(inverse(task.object_pose_turned.array()) @ tool)
-    return found
+    arm = Scene.from_content(plan.scene.content).arm(arm_name)
+    return [
+        inverse(task.object_pose_turned.array()) @ tool_in_world(arm, hold.joints)
+        for task in plan.tasks
+        for hold in task.holds
+        if hold.arm == arm_name
+    ]
 
 
 def assert_rigid(hands: list[np.ndarray]) -> None:
