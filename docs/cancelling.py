@@ -224,8 +224,8 @@ def _plans(scene: Scene) -> Iterator[tuple[str, Work]]:
                     saved[f"{words}, opened with its motion"] = outcome.plan
 
                 yield f"{words}, motion", move
-        for opened, plan in saved.items():
-            text = plan.to_json().encode()
+        for opened, own in saved.items():
+            text = own.to_json().encode()
             folders = (Path(scene.source).parent,)
             with closing(MapService()) as maps, closing(PlanService(maps, folders)) as plans:
                 yield (
