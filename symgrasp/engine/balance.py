@@ -12,7 +12,7 @@ from symgrasp.robot.joint import Joint
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import Load, support_edges
 
-__all__ = ["balance_of", "loaded", "stands"]
+__all__ = ["balance_of", "falls", "loaded", "stands"]
 
 
 def balance_of(arm: Arm, joints: list[Joint], openings: Array) -> Balance:
@@ -72,7 +72,15 @@ def _weight(mass: Array, points: Array) -> Array:
 
 @njit(**FAST)
 def stands(balance, frames, T_world_base, T, row, holds):
-    """Whether the centre of mass is inside the support, or there is none.
+    """Whether the centre of mass is inside the support, or there is none; see `falls`."""
+    return falls(balance, frames, T_world_base, T, row, holds)[0] < 0
+
+
+@njit(**FAST)
+def falls(balance, frames, T_world_base, T, row, holds):
+    """Return the edge of the support that the centre of mass is furthest beyond, and by how much (m).
+
+    The edge is -1 where it is inside, or where there is no support.
 
     Args:
         balance: see `Balance`.
@@ -99,8 +107,12 @@ def stands(balance, frames, T_world_base, T, row, holds):
         y += T_world_base[1, i] * moment
     x += T_world_base[0, 3] * hand[0]
     y += T_world_base[1, 3] * hand[0]
+    edge, furthest = -1, 0.0
     for k in range(len(balance.edges)):
         normal_x, normal_y, offset = balance.edges[k, 0], balance.edges[k, 1], balance.edges[k, 2]
-        if normal_x * x + normal_y * y > offset * mass:
-            return False
-    return True
+        moment = normal_x * x + normal_y * y
+        if moment > offset * mass:
+            beyond = (moment - offset * mass) / mass
+            if edge < 0 or beyond > furthest:
+                edge, furthest = k, beyond
+    return edge, furthest

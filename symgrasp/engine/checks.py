@@ -20,7 +20,7 @@ from symgrasp.collision.simplex import FAST
 from symgrasp.collision.walk import next_near
 from symgrasp.compiling import njit
 
-__all__ = ["FREE_BAND", "HIT_BAND", "UNDECIDED", "check_arm", "check_hand", "check_row"]
+__all__ = ["FREE_BAND", "HIT_BAND", "OVERLAP", "UNDECIDED", "check_arm", "check_hand", "check_row"]
 
 FREE_BAND = 1e-5
 """A gap that exceeds the margin by this (m) is free for PyBullet too: its distances are those of two
@@ -30,6 +30,10 @@ by the tool pose, from which the joint values may deviate by 1e-6 m and rad."""
 HIT_BAND = 5e-4
 """A gap that is below the margin by this (m) is a collision for PyBullet too, although it may stop
 before it has found the nearest points: the worst of 100,000 pairs near contact was off by 0.2 mm."""
+
+OVERLAP = 2e-5
+"""By how much (m) pieces overlap, or are closer than their margin, that collide whatever PyBullet says, whose
+distances may be too large near contact: more than pieces and poses are rounded by."""
 
 SAME_POSE = 1e-9
 """Poses whose entries differ by less than this (m, or dimensionless) have the same certified collisions:

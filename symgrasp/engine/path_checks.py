@@ -20,8 +20,9 @@ from symgrasp.collision.walk import next_near
 from symgrasp.compiling import njit
 from symgrasp.engine.checks import FREE_BAND, HIT_BAND, UNDECIDED
 from symgrasp.engine.kinematics import compose, place_pieces
+from symgrasp.engine.search_types import HIT
 
-__all__ = ["check_path_of_arm", "check_path_of_hand", "write_tool"]
+__all__ = ["check_path_of_arm", "check_path_of_hand", "place_at_step", "write_tool"]
 
 
 @njit(**FAST)
@@ -142,29 +143,31 @@ def _pair(moving, pieces, scratch, path, row, a, b, margin):
     bar = margin - HIT_BAND - slack
     begin = v0, v1, v2, -1, -1
     lower, upper, begin = distance_bounds_from(pieces, pose, a, b, reach, sure, bar, scratch.simplex, begin)
-    gap = 0.0 if lower >= sure else UNDECIDED
+    gap, at = 0.0 if lower >= sure else UNDECIDED, middle
     if upper >= bar and lower < reach:
         for s in range(len(path.frames)):
             if s != middle:
-                _place(moving, scratch, path, row, a, s)
-                _place(moving, scratch, path, row, b, s)
+                place_at_step(moving, scratch, path, row, a, s)
+                place_at_step(moving, scratch, path, row, b, s)
                 lower, upper, begin = distance_bounds_from(
                     pieces, pose, a, b, sure, sure, bar, scratch.simplex, begin
                 )
                 if upper < bar:
+                    at = s
                     break
                 if lower < sure:
                     gap = UNDECIDED
-        _place(moving, scratch, path, row, a, middle)
-        _place(moving, scratch, path, row, b, middle)
+        place_at_step(moving, scratch, path, row, a, middle)
+        place_at_step(moving, scratch, path, row, b, middle)
     if upper < bar:
         scratch.hit[0], scratch.hit[1], scratch.depth[0] = a, b, margin - upper - slack
+        path.blocked[0], path.blocked[1] = at + 1, HIT
         return -math.inf
     return gap
 
 
 @njit(**FAST)
-def _place(moving, scratch, path, row, k, s):
+def place_at_step(moving, scratch, path, row, k, s):
     """Write the pose of piece k, if it moves, at step s."""
     if k < moving.hand.shape[1]:
         compose(path.tool[s], moving.hand[row, k], scratch.pose[k])

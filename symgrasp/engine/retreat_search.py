@@ -15,7 +15,7 @@ from symgrasp.engine.balance import stands
 from symgrasp.engine.checks import UNDECIDED, check_hand
 from symgrasp.engine.kinematics import place_frames, place_hand
 from symgrasp.engine.path_checks import check_path_of_arm, check_path_of_hand, write_tool
-from symgrasp.engine.search_types import BLOCKED, FEASIBLE, RETREAT_UNDECIDED
+from symgrasp.engine.search_types import BLOCKED, FEASIBLE, LIMITS, RETREAT_UNDECIDED, UNBALANCED
 from symgrasp.ik.branches import branches_near
 from symgrasp.ik.joints import within
 from symgrasp.ik.retreat import RETREAT_TURN
@@ -85,7 +85,8 @@ def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, balance
         tool: what `tool_retreats` returned for the cell.
 
     Returns:
-        FEASIBLE, BLOCKED, or RETREAT_UNDECIDED. The pair that blocks it, if one does, is in ``scratch.hit``.
+        FEASIBLE, BLOCKED, or RETREAT_UNDECIDED. The pair that blocks it, if one does, is in ``scratch.hit``;
+        where and why it is blocked is in the path.
     """
     if tool == BLOCKED:
         return BLOCKED
@@ -94,14 +95,18 @@ def arm_retreats(chain, moving, pieces, tree, scratch, branches, inputs, balance
     scratch.hit[0] = -1
     copy_row(branches.q[0][b], at)
     if falls and not stands(balance, scratch.frames, inputs.T_world_base, T, row, False):
+        path.blocked[0], path.blocked[1] = 0, UNBALANCED
         return BLOCKED
     for s in range(len(inputs.retreat)):
         moved_along(T, inputs.retreat[s], moved)
         branches_near(chain, k, moved, at, RETREAT_TURN, q, exists, inside, branches.memory)
         if not _follow(chain.limits, inputs.turns, q, inside, at):
+            path.blocked[0], path.blocked[1] = 1 + s, LIMITS
             return BLOCKED
+        copy_row(at, path.q[s])
         place_frames(moving, at, path.frames[s])
         if falls and not stands(balance, path.frames[s], inputs.T_world_base, moved, row, False):
+            path.blocked[0], path.blocked[1] = 1 + s, UNBALANCED
             return BLOCKED
     moved_along(T, inputs.retreat[len(inputs.retreat) // 2], moved)
     place_hand(moving, pieces, scratch, inputs.T_world_base, moved, row)

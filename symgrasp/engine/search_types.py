@@ -140,11 +140,16 @@ class Path(NamedTuple):
         frames: (s, n, 12) joint frames in the world, but the last.
         tool: (s, 12) tool poses in the world.
         motion: (M,) how far (m) any point of a piece is from where it is at the middle step, at most.
+        q: (s, n) joint values.
+        blocked: (2,) where and why the last candidate was blocked: the step from 1, or 0 at the grasp; then
+            HIT, UNBALANCED, or LIMITS where no branch leads on.
     """
 
     frames: Array
     tool: Array
     motion: Array
+    q: Array
+    blocked: np.ndarray
 
 
 class BranchScratch(NamedTuple):
@@ -185,6 +190,12 @@ def new_branches(chain: Chain, joints: int, steps: int, moving: int) -> BranchSc
         inside=np.empty((2, count), dtype=bool),
         at=np.empty(joints),
         T=np.empty((4, 4)),
-        path=Path(np.empty((steps, joints, 12)), np.empty((steps, 12)), np.empty(moving)),
+        path=Path(
+            frames=np.empty((steps, joints, 12)),
+            tool=np.empty((steps, 12)),
+            motion=np.empty(moving),
+            q=np.empty((steps, joints)),
+            blocked=np.zeros(2, dtype=np.int64),
+        ),
         memory=new_memory(joints),
     )

@@ -73,7 +73,13 @@ def compare(scene: Scene, arm: Arm, geometry: ArmGeometry, q: np.ndarray, seen: 
     moving, pieces, margin = geometry.moving, geometry.pieces, scene.settings.margin
     base, middle, tools = arm.robot.T_world_base, len(q) // 2, np.array([arm.tool_pose(row) for row in q])
     scratch = new_scratch(geometry.pose, pieces.size, arm.dof)
-    path = Path(np.empty((len(q), arm.dof, 12)), np.empty((len(q), 12)), np.zeros(len(moving.frame)))
+    path = Path(
+        frames=np.empty((len(q), arm.dof, 12)),
+        tool=np.empty((len(q), 12)),
+        motion=np.zeros(len(moving.frame)),
+        q=q.copy(),
+        blocked=np.zeros(2, dtype=np.int64),
+    )
     poses = [placed(geometry, scratch, base, T, row) for T, row in zip(tools, q, strict=True)]
     corners = [corners_at(geometry, pose) for pose in poses]
     motion = [max(np.linalg.norm(c[k] - corners[middle][k], axis=1).max() for c in corners)

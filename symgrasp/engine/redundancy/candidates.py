@@ -5,12 +5,23 @@ from __future__ import annotations
 import math
 
 from symgrasp.compiling import njit
-from symgrasp.engine.balance import stands
-from symgrasp.engine.checks import HIT_BAND, UNDECIDED, check_arm
+from symgrasp.engine.balance import falls
+from symgrasp.engine.checks import HIT_BAND, OVERLAP, UNDECIDED, check_arm
 from symgrasp.engine.kinematics import place_arm, place_hand
-from symgrasp.engine.redundancy.exclusion import FALLS, GONE, HITS, OUTSIDE, SKIPPED, STUCK, copy_pose
-from symgrasp.engine.retreat_search import arm_retreats, copy_row
-from symgrasp.engine.search_types import BLOCKED, RETREAT_UNDECIDED
+from symgrasp.engine.path_checks import place_at_step
+from symgrasp.engine.redundancy.cover_types import (
+    FALLS,
+    GONE,
+    HITS,
+    OUTSIDE,
+    SKIPPED,
+    STOPS,
+    TOUCHES,
+    UNSURE,
+)
+from symgrasp.engine.redundancy.vectors import copy_pose
+from symgrasp.engine.retreat_search import arm_retreats, copy_row, moved_along
+from symgrasp.engine.search_types import BLOCKED, HIT, RETREAT_UNDECIDED, UNBALANCED
 from symgrasp.ik.at_phi import geometry_at
 from symgrasp.ik.branches import branches_at
 from symgrasp.ik.spans import FINEST, HALVES, find_spans, span_over
@@ -58,10 +69,9 @@ def _sort_in(values, count, value):
 
 
 @njit(**STRICT)
-def find_branches(nodes, branches, locked, T, at, phi):
-    """Find the branches that reach a pose (4, 4) at a value of φ (rad), and begin slot ``at`` with them."""
-    nodes.phi[at] = phi
-    geometry_at(locked, phi, nodes.chain.geometry[0])
+def find_branches(nodes, branches, locked, T, at):
+    """Find the branches that reach a pose (4, 4) at the value of φ of slot ``at``, and begin it with them."""
+    geometry_at(locked, nodes.phi[at], nodes.chain.geometry[0])
     branches_at(
         nodes.chain, 0, T, False, branches.q[0], branches.exists[0], branches.inside[0], branches.memory
     )
@@ -72,7 +82,7 @@ def find_branches(nodes, branches, locked, T, at, phi):
 @njit(**STRICT)
 def is_to_check(nodes, branches, at, b):
     """Whether a branch is neither gone nor excluded; its joint values are written down if it is there."""
-    nodes.state[at, b] = GONE
+    nodes.state[at, b], nodes.step[at, b] = GONE, 0
     if not branches.exists[0][b]:
         return False
     # Of excluded ones, too: they may be where another's curve ends.
@@ -85,24 +95,45 @@ def is_to_check(nodes, branches, at, b):
 def arm_gap(nodes, scratch, branches, moving, pieces, tree, inputs, balance, T, row, most, at, b):
     """Place an arm and return its clearance (m), at most ``most``.
 
-    `UNDECIDED` where only PyBullet can tell; -inf where it is not free, and the slot says why.
+    `UNDECIDED` where only PyBullet can tell, and -inf where it is not free; the slot says why.
     """
     nodes.state[at, b] = OUTSIDE
     if not branches.inside[0][b]:
         return -math.inf
     place_arm(moving, pieces, scratch, branches.q[0][b])
-    if len(balance.edges) > 0 and not stands(balance, scratch.frames, inputs.T_world_base, T, row, True):
-        nodes.state[at, b] = FALLS
-        return -math.inf
+    if len(balance.edges) > 0:
+        edge, beyond = falls(balance, scratch.frames, inputs.T_world_base, T, row, True)
+        if edge >= 0:
+            _note_fall(nodes, at, b, edge, beyond, True)
+            return -math.inf
     gap = check_arm(moving, pieces, tree, scratch, inputs.margin, most, -math.inf, HIT_BAND)
     if gap == -math.inf:
-        nodes.state[at, b] = HITS
-        for side in range(2):
-            piece = scratch.hit[side]
-            nodes.pair[at, b, side] = piece
-            copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
-        nodes.depth[at, b], nodes.level[at, b] = -1.0, 0
+        _note_pair(nodes, scratch, at, b, HITS)
+    elif gap == UNDECIDED:
+        nodes.state[at, b] = UNSURE
+        scratch.hit[2] = -1
+        if check_arm(moving, pieces, tree, scratch, inputs.margin, most, -math.inf, OVERLAP) == -math.inf:
+            _note_pair(nodes, scratch, at, b, TOUCHES)
+        scratch.hit[2] = -1  # what is remembered has to collide for PyBullet, too
     return gap
+
+
+@njit(**STRICT)
+def _note_fall(nodes, at, b, edge, beyond, loaded):
+    """Write into a slot over which edge the robot falls, by how much (m), and whether it bears the load."""
+    nodes.state[at, b], nodes.depth[at, b] = FALLS, beyond
+    nodes.pair[at, b, 0], nodes.pair[at, b, 1] = edge, loaded
+
+
+@njit(**STRICT)
+def _note_pair(nodes, scratch, at, b, state):
+    """Write into a slot which pair collides, where its pieces are placed."""
+    nodes.state[at, b] = state
+    for side in range(2):
+        piece = scratch.hit[side]
+        nodes.pair[at, b, side] = piece
+        copy_pose(scratch.pose[piece], nodes.pose[at, b, side])
+    nodes.depth[at, b], nodes.level[at, b] = -1.0, 0
 
 
 @njit(**STRICT)
@@ -116,15 +147,46 @@ def retreat_gap(
         T, row: its tool pose (4, 4) and row.
         tool: what `tool_retreats` says of the retreat of its hand.
         gap: the clearance before, or `UNDECIDED`, which it stays.
-        at, b: the slot and the branch.
+        at, b: the slot, which says why it is not free, and the branch.
     """
     if gap == UNDECIDED or len(inputs.retreat) == 0:
         return gap
     furthest = arm_retreats(
         nodes.chain, moving, pieces, tree, scratch, branches, inputs, balance, run, T, 0, b, tool
     )
+    if furthest == BLOCKED:
+        _note_block(nodes, scratch, branches, moving, inputs, balance, T, row, at, b)
     place_hand(moving, pieces, scratch, inputs.T_world_base, T, row)
     if furthest == BLOCKED:
-        nodes.state[at, b] = STUCK
         return -math.inf
-    return UNDECIDED if furthest == RETREAT_UNDECIDED else gap
+    if furthest == RETREAT_UNDECIDED:
+        nodes.state[at, b] = UNSURE
+        return UNDECIDED
+    return gap
+
+
+@njit(**STRICT)
+def _note_block(nodes, scratch, branches, moving, inputs, balance, T, row, at, b):
+    """Write into a slot where and why a candidate is blocked on its retreat, as `arm_retreats` found."""
+    path, step = branches.path, branches.path.blocked[0]
+    nodes.step[at, b] = step
+    if path.blocked[1] == HIT:
+        for side in range(2):
+            place_at_step(moving, scratch, path, row, scratch.hit[side], step - 1)
+        _note_pair(nodes, scratch, at, b, HITS)
+        copy_row(path.q[step - 1], nodes.there[at, b])
+        return
+    if path.blocked[1] == UNBALANCED:
+        frames = path.frames[step - 1] if step else scratch.frames
+        edge, beyond = falls(balance, frames, inputs.T_world_base, branches.T if step else T, row, False)
+        _note_fall(nodes, at, b, edge, beyond, False)
+        copy_row(branches.at, nodes.there[at, b])
+        return
+    nodes.state[at, b] = STOPS
+    copy_row(branches.at, nodes.there[at, b])
+    moved_along(T, inputs.retreat[step - 1], branches.T)
+    q, exists, inside = branches.q[1], branches.exists[1], branches.inside[1]
+    branches_at(nodes.chain, 0, branches.T, False, q, exists, inside, branches.memory)
+    for k in range(len(exists)):
+        nodes.absent[at, b, k], nodes.lacking[at, b, k] = not exists[k], branches.memory.missing[k]
+        copy_row(q[k], nodes.onward[at, b, k])

@@ -19,7 +19,7 @@ import numpy as np
 from symgrasp.collision.pieces import PackedPieces
 from symgrasp.collision.tree import Tree
 from symgrasp.compiling import ENTRY, is_compiled, njit
-from symgrasp.engine.checks import FREE_BAND, UNDECIDED, check_arm
+from symgrasp.engine.checks import FREE_BAND, UNDECIDED
 from symgrasp.engine.kinematics import MovingPieces, Scratch, place_hand
 from symgrasp.engine.redundancy.candidates import (
     arm_gap,
@@ -28,14 +28,15 @@ from symgrasp.engine.redundancy.candidates import (
     plan_values,
     retreat_gap,
 )
-from symgrasp.engine.redundancy.cover_types import OPEN_KEPT, CoverInput, CoverResult, Nodes, new_nodes
-from symgrasp.engine.redundancy.exclusion import (
-    EXCLUDED,
-    FIRM,
-    SOFT,
-    UNSURE,
-    what_is_known,
+from symgrasp.engine.redundancy.cover_types import (
+    OPEN_KEPT,
+    TOUCHES,
+    CoverInput,
+    CoverResult,
+    Nodes,
+    new_nodes,
 )
+from symgrasp.engine.redundancy.exclusion import EXCLUDED, TOUCHING, what_is_known
 from symgrasp.engine.retreat_search import copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
@@ -57,15 +58,9 @@ __all__ = ["COARSE", "FINEST", "cover", "is_cover_compiled"]
 FINEST = 1e-4
 """Width (rad) of a part of the range of φ that is not halved any more."""
 
-MEDIUM = 1e-3
-"""The same where the robot falls or the retreat is blocked at both ends, of which no measure is known."""
-
 COARSE = 3e-3
-"""The same where pieces all but touch at both ends, so that PyBullet decides there."""
-
-OVERLAP = 2e-5
-"""By how much (m) pieces overlap, or are closer than their margin, that collide whatever PyBullet says, whose
-distances may be too large near contact: more than pieces and poses are rounded by."""
+"""The same where a pair of pieces is excluded all along the part, but overlaps by so little that PyBullet may
+call it free: PyBullet is not asked more often."""
 
 MOST_VISITED = 20_000
 """Values of φ of a cell after which the search gives up."""
@@ -154,103 +149,95 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
     scratch.hit[2] = -1
     nodes.used[:] = False
     planned = plan_values(nodes, covered, T)
-    left = _slot(nodes)
-    nodes.excluded[left] = False
+    left = _slot(nodes, nodes.planned[0])
     those = i, T, inputs.row[run], hand, tool
     free = _visit(
         nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, left,
-        nodes.planned[0],
+        math.inf,
     )  # fmt: skip
     for k in range(1, planned):
         if free:
             return
-        nodes.stack[0] = _slot(nodes)
-        nodes.excluded[nodes.stack[0]] = False
+        nodes.stack[0] = _slot(nodes, nodes.planned[k])
         count = 1
         free = _visit(
             nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those,
-            nodes.stack[0], nodes.planned[k],
+            nodes.stack[0], math.inf,
         )  # fmt: skip
         while count > 0 and not free:
             right = nodes.stack[count - 1]
             width = nodes.phi[right] - nodes.phi[left]
             known = what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, width)
             if known != EXCLUDED:
-                ends = width <= (COARSE if known == SOFT else MEDIUM if known == FIRM else FINEST)
+                ends = width <= (COARSE if known == TOUCHING else FINEST)
                 if not ends and result.visited[i] < MOST_VISITED:
-                    middle = _slot(nodes)
+                    middle = _slot(nodes, 0.5 * (nodes.phi[left] + nodes.phi[right]))
                     nodes.stack[count] = middle
                     copy_row(nodes.excluded[right], nodes.excluded[middle])
                     count += 1
                     free = _visit(
                         nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run,
-                        those, middle, 0.5 * (nodes.phi[left] + nodes.phi[right]),
+                        those, middle, width,
                     )  # fmt: skip
                     continue
-                result.left[i] = max(result.left[i], width)
+                if not ends or known != TOUCHING:
+                    result.left[i] = max(result.left[i], width)
             nodes.used[left] = False
             left = right
             count -= 1
 
 
 @njit(**STRICT)
-def _slot(nodes):
-    """Take a free slot and return it."""
+def _slot(nodes, phi):
+    """Take a free slot for a value of φ (rad) and return it; nothing is known of the part that ends there."""
     k = 0
     while nodes.used[k]:
         k += 1
-    nodes.used[k] = True
+    nodes.used[k], nodes.excluded[k], nodes.phi[k] = True, False, phi
     return k
 
 
 @njit(**STRICT)
 def _visit(
-    nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, at, phi
+    nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, at, width
 ):
-    """Check all candidates of a cell at a value of φ, and write them into slot ``at``.
+    """Check all candidates of a cell at the value of φ of slot ``at``, and write them there.
 
     Args:
         run: index of the cell's run.
         those: what is known of the cell: its index, tool pose (4, 4) and row, the clearance (m) of the
             pieces that are fixed to the tool, and what `tool_retreats` says of their retreat.
+        width: width (rad) of the part that is halved there.
 
     Returns:
         Whether one is free; it is then in the result.
     """
     i, T, row, hand, tool = those
     result.visited[i] += 1
-    find_branches(nodes, branches, covered.locked, T, at, phi)
+    find_branches(nodes, branches, covered.locked, T, at)
     for b in range(len(branches.exists[0])):
         if not is_to_check(nodes, branches, at, b):
             continue
         gap = arm_gap(nodes, scratch, branches, moving, pieces, tree, inputs, balance, T, row, hand, at, b)
         if gap == -math.inf:
             continue
-        overlaps = gap == UNDECIDED and _overlaps(moving, pieces, tree, scratch, inputs, hand)
         gap = retreat_gap(
             nodes, scratch, branches, moving, pieces, tree, inputs, balance, run, T, row, tool, gap, at, b
         )
         if gap == -math.inf:
             continue
         if gap == UNDECIDED:
-            nodes.state[at, b] = UNSURE
+            touches = nodes.state[at, b] == TOUCHES
+            if touches and width <= COARSE:
+                continue
             kept = result.undecided_count[i]
             result.undecided_count[i] += 1
             if kept < OPEN_KEPT:
-                result.undecided_phi[i, kept], result.undecided_branch[i, kept] = phi, b
-                result.overlaps[i, kept] = overlaps
+                result.undecided_phi[i, kept], result.undecided_branch[i, kept] = nodes.phi[at], b
+                result.overlaps[i, kept] = touches
             continue
-        result.found[i], result.phi[i], result.branch[i] = True, phi, b
+        result.found[i], result.phi[i], result.branch[i] = True, nodes.phi[at], b
         result.clearance[i] = max(0.0, gap - FREE_BAND)
         copy_row(branches.q[0][b], result.q[i])
         return True
     return False
-
-
-@njit(**STRICT)
-def _overlaps(moving, pieces, tree, scratch, inputs, hand):
-    """Whether a candidate that is placed collides, by less than PyBullet may be off."""
-    scratch.hit[2] = -1
-    gap = check_arm(moving, pieces, tree, scratch, inputs.margin, hand, -math.inf, OVERLAP)
-    scratch.hit[2] = -1  # what is remembered has to collide for PyBullet, too
-    return gap == -math.inf

@@ -12,7 +12,27 @@ from symgrasp.ik.chain import Chain
 from symgrasp.ik.spans import HALVES, MOST_SPANS, Spans, new_spans
 from symgrasp.poses import Array
 
-__all__ = ["OPEN_KEPT", "SLOTS", "CoverInput", "CoverResult", "Nodes", "new_nodes"]
+__all__ = [
+    "FALLS",
+    "GONE",
+    "HITS",
+    "OPEN_KEPT",
+    "OUTSIDE",
+    "SKIPPED",
+    "SLOTS",
+    "STOPS",
+    "TOUCHES",
+    "UNSURE",
+    "CoverInput",
+    "CoverResult",
+    "Nodes",
+    "new_nodes",
+]
+
+GONE, OUTSIDE, HITS, FALLS, STOPS, TOUCHES, UNSURE, SKIPPED = range(8)
+"""States of a branch at a value of φ: it does not exist, is outside the limits, collides, the robot falls, no
+branch leads on along the retreat, pieces overlap by less than PyBullet may be off, only PyBullet can decide
+for another reason, or it is excluded all around there."""
 
 OPEN_KEPT = 512
 """Largest number of undecided candidates of a cell that are listed."""
@@ -50,7 +70,8 @@ class CoverResult(NamedTuple):
         branch: (c,) its branch.
         clearance: (c,) lower bound of its clearance (m).
         proven: (c,) whether it is proven that there is none.
-        left: (c,) width (rad) of the widest part of the range that was neither excluded nor halved.
+        left: (c,) width (rad) of the widest part of the range that was neither excluded nor halved; pieces
+            that overlap all along a part exclude it, whatever PyBullet says.
         visited: (c,) number of values of the redundancy at which candidates were checked.
         undecided_count: (c,) number of undecided candidates.
         undecided_phi: (c, OPEN_KEPT) redundancy (rad) of the first of them.
@@ -79,11 +100,19 @@ class Nodes(NamedTuple):
         chain: the arm, with a geometry (1, m) that is overwritten.
         phi: (SLOTS,) the values (rad).
         q: (SLOTS, B, n) joint values.
-        state: (SLOTS, B) what is the matter with a branch, see `symgrasp.engine.redundancy.cover`.
+        state: (SLOTS, B) what is the matter with a branch.
+        step: (SLOTS, B) where: 0 at the grasp, then the steps of the retreat from 1.
         missing: (SLOTS, B) see `symgrasp.ik.branches.Memory`.
-        pair: (SLOTS, B, 2) the pieces of which the first hits the second.
-        pose: (SLOTS, B, 2, 12) their poses.
-        depth: (SLOTS, B) how deep (m) they collide at least, as far as it is known.
+        there: (SLOTS, B, n) joint values at that step, if it is not the grasp; where no branch leads on,
+            those at the step before.
+        onward: (SLOTS, B, B, n) joint values of all branches at the step to which none leads on.
+        absent: (SLOTS, B, B) which of them do not exist.
+        lacking: (SLOTS, B, B) what is missing of them, see `symgrasp.ik.branches.Memory`.
+        pair: (SLOTS, B, 2) the pieces of which the first hits the second; or the edge of the support over
+            which the robot falls, and whether it bears the load.
+        pose: (SLOTS, B, 2, 12) poses of the pieces.
+        depth: (SLOTS, B) how deep (m) they collide at least, as far as it is known; or how far (m) the
+            centre of mass is beyond the edge.
         level: (SLOTS, B) number of the bodies inside the pieces from which it is known.
         excluded: (SLOTS, B) which branches are excluded on the part that ends at a slot.
         stack: (SLOTS,) slots of the ends of parts.
@@ -91,6 +120,7 @@ class Nodes(NamedTuple):
         spans: where branches reach the pose.
         planned: (PLANNED,) values of φ (rad) with which the search begins.
         end: (2, 12) poses of a pair of pieces at the other end of a part.
+        placed: (2, 12) where the pieces of a pair were before it was looked at.
         half: (n,) joint values half way.
         middle: (12,) pose of a piece there.
     """
@@ -99,6 +129,11 @@ class Nodes(NamedTuple):
     phi: Array
     q: Array
     state: np.ndarray
+    step: np.ndarray
+    there: Array
+    onward: Array
+    absent: np.ndarray
+    lacking: Array
     missing: Array
     pair: np.ndarray
     pose: Array
@@ -110,6 +145,7 @@ class Nodes(NamedTuple):
     spans: Spans
     planned: Array
     end: Array
+    placed: Array
     half: Array
     middle: Array
 
@@ -121,6 +157,11 @@ def new_nodes(chain: Chain, locked: Locked, branches: int, joints: int) -> Nodes
         phi=np.empty(SLOTS),
         q=np.empty((SLOTS, branches, joints)),
         state=np.empty((SLOTS, branches), dtype=np.int8),
+        step=np.zeros((SLOTS, branches), dtype=np.int64),
+        there=np.empty((SLOTS, branches, joints)),
+        onward=np.empty((SLOTS, branches, branches, joints)),
+        absent=np.empty((SLOTS, branches, branches), dtype=bool),
+        lacking=np.empty((SLOTS, branches, branches)),
         missing=np.empty((SLOTS, branches)),
         pair=np.empty((SLOTS, branches, 2), dtype=np.int64),
         pose=np.empty((SLOTS, branches, 2, 12)),
@@ -132,6 +173,7 @@ def new_nodes(chain: Chain, locked: Locked, branches: int, joints: int) -> Nodes
         spans=new_spans(locked),
         planned=np.empty(PLANNED),
         end=np.empty((2, 12)),
+        placed=np.empty((2, 12)),
         half=np.empty(joints),
         middle=np.empty(12),
     )

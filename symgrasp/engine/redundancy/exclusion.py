@@ -3,11 +3,9 @@
 A branch is excluded on a part by what is the matter with it at both ends:
 
 * the same joint is outside its limits by more than joints deviate from a straight line in between;
-* the same pair of pieces collides, deeper than their motion deviates from a straight line (see
-  `symgrasp.collision.inner_pieces` for how deep). Between two ends, the distance of two convex bodies along a
-  fixed direction is at most the larger one, but for how much their points leave straight lines, and for a
-  quarter of the way that the turn of each body moves its far end: other points may be nearest at the
-  other end;
+* the same pair of pieces collides (see `symgrasp.engine.redundancy.pair_exclusion`);
+* the robot falls over the same edge of its support, by more than points deviate from a straight line;
+* one of these is the matter at the same step of the retreat, or no branch leads on there;
 * the same root of the closed form has a negative radicand, by more than it bends in between, or the branch is
   known to reach the pose nowhere in between (see `symgrasp.ik.spans`).
 
@@ -21,55 +19,27 @@ from __future__ import annotations
 
 import math
 
-from symgrasp.collision.distance import distance_bounds
 from symgrasp.compiling import njit
-from symgrasp.engine.checks import HIT_BAND
-from symgrasp.engine.kinematics import compose, place_frames
+from symgrasp.engine.redundancy.cover_types import FALLS, GONE, HITS, STOPS, TOUCHES
+from symgrasp.engine.redundancy.pair_exclusion import SAGITTA, pair_excludes
+from symgrasp.engine.redundancy.vectors import SAME_CURVE, largest_turn, wrapped
+from symgrasp.ik.retreat import RETREAT_TURN
 from symgrasp.ik.spans import span_over
 from symgrasp.ik.vectors import STRICT
 from symgrasp.robot.limits import LIMIT_TOLERANCE
 
-__all__ = [
-    "EXCLUDED",
-    "FALLS",
-    "FIRM",
-    "GONE",
-    "HARD",
-    "HITS",
-    "OUTSIDE",
-    "SKIPPED",
-    "SOFT",
-    "STUCK",
-    "UNSURE",
-    "copy_pose",
-    "what_is_known",
-]
+__all__ = ["BEND", "EXCLUDED", "HARD", "LEAST_BEND", "TOUCHING", "what_is_known"]
 
 UNKNOWN = 0.05
 """Width (rad) up to which a part is excluded on which a branch exists at neither end and no radicand is
 known."""
 
-GONE, OUTSIDE, HITS, FALLS, STUCK, UNSURE, SKIPPED = range(7)
-"""States of a branch at a value of φ: it does not exist, is outside the limits, collides, the robot falls,
-the retreat is blocked, only PyBullet can decide, or it is excluded all around there."""
-
-SAME_CURVE = 0.7
-"""Largest difference (rad) of joints of two configurations that are taken for ends of one smooth curve."""
-
 BEND, LEAST_BEND = 0.5, 0.08
 """By how much joint values leave the range of their values at both ends of a curve: for the square of the
 largest difference of any joint (1/rad), and for that difference."""
 
-SAGITTA = 0.25
-"""By how much (m/rad²) points of the arm leave a straight line between their places at both ends of a
-curve, for the square of the sum of the differences of the joints that move them."""
-
-LEAST_SAGITTA = 0.04
-"""The same, at least, where a trial shows that they leave it by less."""
-
-TRIED = 3.0
-"""By how much more they may leave it than half way between the joint values at both ends: the curve itself is
-not straight either."""
+FAR = 0.3
+"""Largest difference (rad) of joints, at both ends of a part, on the retreat where no branch leads on."""
 
 DRIFT = 8.0
 """By how much (rad/rad) joints change with φ at most, apart from what two branches are apart that end in the
@@ -81,9 +51,9 @@ ARM = 0.5
 RADICAND_BEND = 1.0
 """The same (1/rad²) for radicands, for the square of the width of a part."""
 
-HARD, FIRM, SOFT, EXCLUDED = 0, 1, 2, 3
-"""What is known of a part of the range: nothing, that both ends fail in a way of which no measure is known
-(balance, the retreat), that pieces all but touch at both, or that nothing is free."""
+HARD, TOUCHING, EXCLUDED = range(3)
+"""What is known of a part of the range: nothing, that a pair of pieces overlaps all along it, by less than
+PyBullet may be off, or that nothing is free."""
 
 
 @njit(**STRICT)
@@ -116,28 +86,40 @@ def what_is_known(nodes, scratch, moving, pieces, inputs, covered, left, right, 
 @njit(**STRICT)
 def _stays_outside(nodes, left, right, b):
     """Whether a branch that is there at both ends of a part is outside its limits all along it."""
-    apart = _apart(nodes, left, b, right, b, SAME_CURVE)
-    bend = (BEND * apart + LEAST_BEND) * apart
-    return apart < SAME_CURVE and _limits_exclude(nodes, left, b, right, b, bend)
+    here, there = nodes.q[left, b], nodes.q[right, b]
+    apart = largest_turn(here, there, SAME_CURVE)
+    return apart < SAME_CURVE and _limits_exclude(nodes, here, there, _bend(apart))
+
+
+@njit(**STRICT)
+def _bend(apart):
+    """Return by how much (rad) joints leave straight lines whose ends are an angle (rad) apart."""
+    return (BEND * apart + LEAST_BEND) * apart
 
 
 @njit(**STRICT)
 def _none(nodes, left, right, b, width):
     """Return what is known of a branch that exists at neither end of a part, from what is missing there."""
     here, there = nodes.missing[left, b], nodes.missing[right, b]
-    if here == 0.0 or there == 0.0:
-        return EXCLUDED if width <= UNKNOWN else HARD
-    root, other = _root(here), _root(there)
     half = b // 4
-    if max(root, other) <= 2 and nodes.spans.number[half] >= 0:
+    if here != 0.0 and there != 0.0 and max(_root(here), _root(there)) <= 2 and nodes.spans.number[half] >= 0:
         return HARD if span_over(nodes.spans, half, nodes.phi[left], nodes.phi[right]) else EXCLUDED
+    return EXCLUDED if _radicand_is_negative(here, there, width) else HARD
+
+
+@njit(**STRICT)
+def _radicand_is_negative(here, there, width):
+    """Whether what is missing of a branch at both ends of a part is missing all along it."""
+    if here == 0.0 or there == 0.0:
+        return width <= UNKNOWN
+    root, other = _root(here), _root(there)
     first, second = -(here + 10.0 * root), -(there + 10.0 * other)
     if root == other:
         bend = RADICAND_BEND * width * width + 0.1 * abs(first - second)
-        return EXCLUDED if min(first, second) > bend else HARD
+        return min(first, second) > bend
     # Where an earlier root ends, later radicands change like the square root of φ.
     later = first if root > other else second
-    return EXCLUDED if later > 1.5 * math.sqrt(width) else HARD
+    return later > 1.5 * math.sqrt(width)
 
 
 @njit(**STRICT)
@@ -147,28 +129,9 @@ def _root(missing):
 
 
 @njit(**STRICT)
-def _apart(nodes, one, a, other, b, enough):
-    """Return the largest difference (rad) of the joints of two configurations, or one that is ``enough``."""
-    most = 0.0
-    for j in range(nodes.q.shape[2]):
-        most = max(most, abs(_turn(nodes.q[other, b, j] - nodes.q[one, a, j])))
-        if most >= enough:
-            break
-    return most
-
-
-@njit(**STRICT)
 def _is_near(nodes, one, a, other, b):
     """Whether two configurations are so near that they are taken for ends of one smooth curve."""
-    return _apart(nodes, one, a, other, b, SAME_CURVE) < SAME_CURVE
-
-
-@njit(**STRICT)
-def _turn(angle):
-    """Return an angle (rad) less full turns, from -π to π."""
-    if -math.pi <= angle < math.pi:  # the rule, and quicker
-        return angle
-    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+    return largest_turn(nodes.q[one, a], nodes.q[other, b], SAME_CURVE) < SAME_CURVE
 
 
 @njit(**STRICT)
@@ -188,11 +151,11 @@ def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a, width
         else:
             b = k
         if nodes.state[other, b] != GONE:
-            apart = _apart(nodes, one, a, other, b, least)
+            apart = largest_turn(nodes.q[one, a], nodes.q[other, b], least)
             if apart < least:
                 nearest, at, least = b, other, apart
         elif b != a and nodes.state[one, b] != GONE and nodes.state[other, a] == GONE:
-            apart = _apart(nodes, one, a, one, b, least)
+            apart = largest_turn(nodes.q[one, a], nodes.q[one, b], least)
             if apart < least:
                 nearest, at, least = b, one, apart
     if nearest < 0:
@@ -203,182 +166,128 @@ def _curve(nodes, scratch, moving, pieces, inputs, covered, one, other, a, width
 @njit(**STRICT)
 def _between(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b, width):
     """Return what is known of a curve between two configurations: slots and branches."""
-    apart = _apart(nodes, one, a, other, b, math.inf)
+    here, there = nodes.q[one, a], nodes.q[other, b]
     ahead = DRIFT * width if other == one else 0.0  # both ends are at one side, the root is anywhere
-    if _limits_exclude(nodes, one, a, other, b, (BEND * apart + LEAST_BEND) * apart + ahead):
+    if _limits_exclude(nodes, here, there, _bend(largest_turn(here, there, math.inf)) + ahead):
         return EXCLUDED
-    ahead *= ARM
     first, second = nodes.state[one, a], nodes.state[other, b]
-    if first == HITS and _pair_excludes(
-        nodes, scratch, moving, pieces, inputs, covered, one, a, other, b, ahead
-    ):
+    parts = nodes, scratch, moving, pieces, inputs, covered
+    if first == HITS and pair_excludes(*parts, one, a, other, b, ARM * ahead):
         return EXCLUDED
-    if second == HITS and _pair_excludes(
-        nodes, scratch, moving, pieces, inputs, covered, other, b, one, a, ahead
-    ):
+    if second == HITS and pair_excludes(*parts, other, b, one, a, ARM * ahead):
         return EXCLUDED
-    if first < FALLS or second < FALLS:
-        return HARD
-    return SOFT if first == UNSURE and second == UNSURE else FIRM
+    if first == FALLS and second == FALLS and _falls_between(nodes, one, a, other, b, ARM * ahead):
+        return EXCLUDED
+    if first == STOPS and second == STOPS:
+        spherical = covered.locked.spherical
+        if _stops_between(nodes, inputs, spherical, one, a, other, b, ahead, width):
+            return EXCLUDED
+    if first == TOUCHES and pair_excludes(*parts, one, a, other, b, ARM * ahead):
+        return TOUCHING
+    if second == TOUCHES and pair_excludes(*parts, other, b, one, a, ARM * ahead):
+        return TOUCHING
+    return HARD
 
 
 @njit(**STRICT)
-def _limits_exclude(nodes, one, a, other, b, bend):
-    """Whether one joint is outside of its limits all along a curve, which may bend by an angle (rad)."""
+def _limits_exclude(nodes, here, there, bend):
+    """Whether one joint is outside its limits all along a curve, which may bend by an angle (rad)."""
     limits = nodes.chain.limits
-    for j in range(nodes.q.shape[2]):
+    for j in range(len(here)):
         half = 0.5 * (limits[1, j] - limits[0, j])
         if not half < math.pi:
             continue
-        here = _turn(nodes.q[one, a, j] - limits[2, j])
-        there = _turn(nodes.q[other, b, j] - limits[2, j])
-        outside = min(abs(here), abs(there)) - half - LIMIT_TOLERANCE
-        aside = here * there > 0.0 or abs(here) + abs(there) >= math.pi  # not through the range
+        off, off_there = wrapped(here[j] - limits[2, j]), wrapped(there[j] - limits[2, j])
+        outside = min(abs(off), abs(off_there)) - half - LIMIT_TOLERANCE
+        aside = off * off_there > 0.0 or abs(off) + abs(off_there) >= math.pi  # not through the range
         if outside > bend and aside:
             return True
     return False
 
 
 @njit(**STRICT)
-def _pair_excludes(nodes, scratch, moving, pieces, inputs, covered, one, a, other, b, ahead):
-    """Whether the pair that collides at one end of a curve does so all along it.
+def _falls_between(nodes, one, a, other, b, ahead):
+    """Whether the robot, which falls at both ends of a curve, falls over the same edge all along it.
 
-    Args:
-        ahead: how far (m) the curve may lead away from both of its ends.
+    Its centre of mass bends no more than points of the arm do, of which each weighs a part of all.
     """
-    first, second = nodes.pair[one, a, 0], nodes.pair[one, a, 1]
-    last = -1
+    step = nodes.step[one, a]
     for side in range(2):
-        piece = nodes.pair[one, a, side]
-        if moving.hand.shape[1] <= piece < len(moving.frame):
-            last = max(last, moving.frame[piece])
+        if nodes.pair[one, a, side] != nodes.pair[other, b, side]:
+            return False
+    if nodes.step[other, b] != step:
+        return False
+    here, there = nodes.q[one, a], nodes.q[other, b]
+    if step > 0:
+        here, there = nodes.there[one, a], nodes.there[other, b]
     way = 0.0
-    for j in range(last + 1):
-        way += abs(_turn(nodes.q[other, b, j] - nodes.q[one, a, j]))
-    least = LEAST_SAGITTA * way * way + ahead
-    if not _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, least):
+    for j in range(len(here)):
+        way += abs(wrapped(there[j] - here[j]))
+    return min(nodes.depth[one, a], nodes.depth[other, b]) > SAGITTA * way * way + ahead
+
+
+@njit(**STRICT)
+def _stops_between(nodes, inputs, spherical, one, a, other, b, ahead, width):
+    """Whether the retreat, on which no branch leads on at both ends of a curve, stops all along it.
+
+    No branch exists there, it is too far away, or one of its joints is outside its limits or turns too far.
+    """
+    if nodes.step[one, a] != nodes.step[other, b]:
         return False
-    alike = (
-        nodes.state[other, b] == HITS
-        and nodes.pair[other, b, 0] == first
-        and nodes.pair[other, b, 1] == second
-    )
-    if alike and not _deeper(nodes, scratch, moving, pieces, inputs, covered, other, b, least):
+    before, before_there = nodes.there[one, a], nodes.there[other, b]
+    apart = largest_turn(before, before_there, FAR)
+    if apart >= FAR:
         return False
-    if alike:
-        for side in range(2):
-            copy_pose(nodes.pose[other, b, side], nodes.end[side])
-    else:
-        place_frames(moving, nodes.q[other, b], scratch.frames)
-        for side in range(2):
-            piece = nodes.pair[one, a, side]
-            if moving.hand.shape[1] <= piece < len(moving.frame):
-                compose(scratch.frames[moving.frame[piece]], moving.local[piece], nodes.end[side])
-            else:
-                copy_pose(scratch.pose[piece], nodes.end[side])
-    turned = 0.0
-    for side in range(2):
-        angle = _turned(nodes.pose[one, a, side], nodes.end[side])
-        turned += 0.25 * angle * _length(pieces.size, nodes.pair[one, a, side])
-    bend = SAGITTA * way * way + ahead
-    if nodes.depth[one, a] <= bend + turned or (alike and nodes.depth[other, b] <= bend + turned):
-        bend = min(bend, least + _bent(nodes, scratch, moving, pieces, one, a, other, b))
-    bend += turned
-    if not _deeper(nodes, scratch, moving, pieces, inputs, covered, one, a, bend):
-        return False
-    if alike:
-        return _deeper(nodes, scratch, moving, pieces, inputs, covered, other, b, bend)
-    for side in range(2):
-        copy_pose(nodes.end[side], scratch.pose[nodes.pair[one, a, side]])
-    for level in range(len(covered.inner)):
-        if _depth(scratch, moving, pieces, inputs, covered, first, second, level, bend) > bend:
+    slack = _bend(apart) + ahead
+    exist = 0
+    for k in range(nodes.absent.shape[2]):
+        if nodes.absent[one, a, k]:
+            if nodes.absent[other, b, k]:
+                if not _radicand_is_negative(nodes.lacking[one, a, k], nodes.lacking[other, b, k], width):
+                    return False
+            elif spherical:
+                return False
+            continue
+        here = nodes.onward[one, a, k]
+        m, least = _nearest_onward(nodes, here, other, b, k if spherical else -1)
+        if m < 0:
+            return False
+        exist += 1
+        there = nodes.onward[other, b, m]
+        away = min(largest_turn(before, here, math.inf), largest_turn(before_there, there, math.inf))
+        if away > RETREAT_TURN + 2.0 * FAR + ahead:
+            continue
+        bend = _bend(least) + ahead
+        if _limits_exclude(nodes, here, there, bend):
+            continue
+        if not _turns_too_far(inputs.turns, before, before_there, here, there, bend + slack):
+            return False
+    for k in range(nodes.absent.shape[2]):
+        exist -= not nodes.absent[other, b, k]
+    return exist == 0
+
+
+@njit(**STRICT)
+def _nearest_onward(nodes, q, at, b, only):
+    """Return which branch to which none leads on is nearest to a configuration (n,), and how near (rad).
+
+    It is -1 where none is near enough, and ``only`` is the one that it may be, if it is known.
+    """
+    nearest, least = -1, FAR
+    for k in range(nodes.absent.shape[2]):
+        if nodes.absent[at, b, k] or (only >= 0 and k != only):
+            continue
+        apart = largest_turn(q, nodes.onward[at, b, k], least)
+        if apart < least:
+            nearest, least = k, apart
+    return nearest, least
+
+
+@njit(**STRICT)
+def _turns_too_far(turns, before, before_there, here, there, bend):
+    """Whether a joint turns further than it may in one step of the retreat at both ends of a curve."""
+    for j in range(len(turns)):
+        turned, turned_there = wrapped(here[j] - before[j]), wrapped(there[j] - before_there[j])
+        if turned * turned_there > 0.0 and min(abs(turned), abs(turned_there)) > turns[j] + bend:
             return True
     return False
-
-
-@njit(**STRICT)
-def _bent(nodes, scratch, moving, pieces, one, a, other, b):
-    """Return by how much (m) the pieces of a pair leave straight lines, as far as a trial shows.
-
-    The poses of the pieces half way between the joint values at both ends are compared with the mean of those
-    at both ends, ``nodes.end`` at the other one.
-    """
-    for j in range(nodes.q.shape[2]):
-        nodes.half[j] = nodes.q[one, a, j] + 0.5 * _turn(nodes.q[other, b, j] - nodes.q[one, a, j])
-    place_frames(moving, nodes.half, scratch.frames)
-    total = 0.0
-    for side in range(2):
-        piece = nodes.pair[one, a, side]
-        if not moving.hand.shape[1] <= piece < len(moving.frame):
-            continue
-        pose, here, there = nodes.middle, nodes.pose[one, a, side], nodes.end[side]
-        compose(scratch.frames[moving.frame[piece]], moving.local[piece], pose)
-        for i in range(12):
-            pose[i] -= 0.5 * (here[i] + there[i])
-        turn = shift = 0.0
-        for i in range(3):
-            along = pose[9 + i]
-            for j in range(3):
-                turn += pose[3 * i + j] ** 2
-                along += pose[3 * i + j] * pieces.size[piece, 3 + j]
-            shift += along * along
-        total += math.sqrt(shift) + 0.5 * math.sqrt(turn) * _length(pieces.size, piece)
-    return TRIED * total
-
-
-@njit(**STRICT)
-def _deeper(nodes, scratch, moving, pieces, inputs, covered, at, b, depth):
-    """Whether the pair that a candidate hits collides deeper than ``depth`` (m)."""
-    first, second = nodes.pair[at, b, 0], nodes.pair[at, b, 1]
-    while nodes.depth[at, b] <= depth:
-        level = nodes.level[at, b]
-        if level == len(covered.inner):
-            return False
-        copy_pose(nodes.pose[at, b, 0], scratch.pose[first])
-        copy_pose(nodes.pose[at, b, 1], scratch.pose[second])
-        known = _depth(scratch, moving, pieces, inputs, covered, first, second, level, 0.0)
-        nodes.depth[at, b], nodes.level[at, b] = max(nodes.depth[at, b], known), level + 1
-    return True
-
-
-@njit(**STRICT)
-def copy_pose(pose, out):
-    """Copy a pose (12,)."""
-    for i in range(12):
-        out[i] = pose[i]
-
-
-@njit(**STRICT)
-def _turned(pose, other):
-    """Return an upper bound of the angle (rad) between two poses (12,), up to a right angle."""
-    total = 0.0
-    for i in range(9):
-        total += (pose[i] - other[i]) ** 2
-    return 1.12 * math.sqrt(0.5 * total)
-
-
-@njit(**STRICT)
-def _length(size, k):
-    """Return the largest distance (m) of two points of a piece."""
-    x, y, z = size[k, 6], size[k, 7], size[k, 8]
-    return 2.0 * (math.sqrt(x * x + y * y + z * z) + size[k, 0])
-
-
-@njit(**STRICT)
-def _depth(scratch, moving, pieces, inputs, covered, first, second, level, least):
-    """Return by how much (m) more than it takes two pieces are certain to collide.
-
-    Where they do by less than ``least`` (m), it may return anything less.
-
-    Args:
-        level: which of the bodies inside the pieces tell.
-    """
-    bar = -HIT_BAND - pieces.size[first, 1] - pieces.size[second, 1]
-    if second > moving.objects[-1]:
-        bar += inputs.margin
-    if bar == -math.inf:
-        return -1.0
-    _, upper = distance_bounds(
-        covered.inner[level], scratch.pose, first, second, bar - least, -math.inf, -math.inf, scratch.simplex
-    )
-    return bar - upper

@@ -31,22 +31,11 @@ from symgrasp.engine.redundancy.candidates import (
     plan_values,
     retreat_gap,
 )
-from symgrasp.engine.redundancy.cover import COARSE, FINEST, MEDIUM
-from symgrasp.engine.redundancy.cover_types import CoverInput, Nodes, new_nodes
-from symgrasp.engine.redundancy.exclusion import (
-    BEND,
-    EXCLUDED,
-    FIRM,
-    GONE,
-    LEAST_BEND,
-    SAGITTA,
-    SAME_CURVE,
-    SKIPPED,
-    SOFT,
-    UNSURE,
-    copy_pose,
-    what_is_known,
-)
+from symgrasp.engine.redundancy.cover import COARSE, FINEST
+from symgrasp.engine.redundancy.cover_types import GONE, SKIPPED, CoverInput, Nodes, new_nodes
+from symgrasp.engine.redundancy.exclusion import BEND, EXCLUDED, LEAST_BEND, TOUCHING, what_is_known
+from symgrasp.engine.redundancy.pair_exclusion import SAGITTA
+from symgrasp.engine.redundancy.vectors import SAME_CURVE, copy_pose, wrapped
 from symgrasp.engine.retreat_search import copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
@@ -214,17 +203,17 @@ def _find(nodes, free, scratch, branches, moving, pieces, tree, inputs, balance,
     locked = covered.locked
     those = i, T, inputs.row[run], tool
     planned = plan_values(nodes, covered, T)
-    left = _slot(nodes, free)
+    left = _slot(nodes, free, nodes.planned[0])
     _visit(
         nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those, left,
-        nodes.planned[0], locked,
+        locked,
     )  # fmt: skip
     for k in range(1, planned):
-        nodes.stack[0] = _slot(nodes, free)
+        nodes.stack[0] = _slot(nodes, free, nodes.planned[k])
         count = 1
         _visit(
             nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those,
-            nodes.stack[0], nodes.planned[k], locked,
+            nodes.stack[0], locked,
         )  # fmt: skip
         while count > 0:
             right = nodes.stack[count - 1]
@@ -234,27 +223,26 @@ def _find(nodes, free, scratch, branches, moving, pieces, tree, inputs, balance,
                 left = right
                 count -= 1
                 continue
-            middle = _slot(nodes, free)
+            middle = _slot(nodes, free, 0.5 * (nodes.phi[left] + nodes.phi[right]))
             nodes.stack[count] = middle
             copy_row(nodes.excluded[right], nodes.excluded[middle])
             copy_row(free.whole[right], free.whole[middle])
             count += 1
             _visit(
                 nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those,
-                middle, 0.5 * (nodes.phi[left] + nodes.phi[right]), locked,
+                middle, locked,
             )  # fmt: skip
     for b in range(len(free.begun)):
         _end(free, result, i, b)
 
 
 @njit(**STRICT)
-def _slot(nodes, free):
-    """Take a free slot and return it; nothing is known of the part that ends there."""
+def _slot(nodes, free, phi):
+    """Take a free slot for a value of φ (rad) and return it; nothing is known of the part that ends there."""
     k = 0
     while nodes.used[k]:
         k += 1
-    nodes.used[k] = True
-    nodes.excluded[k] = False
+    nodes.used[k], nodes.excluded[k], nodes.phi[k] = True, False, phi
     free.whole[k] = False
     return k
 
@@ -320,14 +308,14 @@ def _label(nodes, free, scratch, moving, pieces, inputs, balance, covered, left,
         nodes.excluded[right, b] &= free.label[b] == CLOSED
     if known == EXCLUDED:
         return True
-    return width <= (COARSE if known == SOFT else MEDIUM if known == FIRM else FINEST)
+    return width <= (COARSE if known == TOUCHING else FINEST)
 
 
 @njit(**STRICT)
 def _same(nodes, left, right, b):
     """Whether a branch is at both ends of a part on the same curve."""
     for j in range(nodes.q.shape[2]):
-        if abs(_turn(nodes.q[right, b, j] - nodes.q[left, b, j])) >= SAME_CURVE:
+        if abs(wrapped(nodes.q[right, b, j] - nodes.q[left, b, j])) >= SAME_CURVE:
             return False
     return True
 
@@ -340,14 +328,14 @@ def _free_between(nodes, free, inputs, pieces, left, right, b, width):
     limits, n = nodes.chain.limits, nodes.q.shape[2]
     apart = way = 0.0
     for j in range(n):
-        turn = abs(_turn(nodes.q[right, b, j] - nodes.q[left, b, j]))
+        turn = abs(wrapped(nodes.q[right, b, j] - nodes.q[left, b, j]))
         apart, way = max(apart, turn), way + turn
     bend = (BEND * apart + LEAST_BEND) * apart
     for j in range(n):
         half = 0.5 * (limits[1, j] - limits[0, j])
         if half < math.pi:
             for at in (left, right):
-                if half - abs(_turn(nodes.q[at, b, j] - limits[2, j])) < bend:
+                if half - abs(wrapped(nodes.q[at, b, j] - limits[2, j])) < bend:
                     return False
     for at in (left, right):  # another branch, with which it might end
         for other in range(nodes.state.shape[1]):
@@ -355,7 +343,7 @@ def _free_between(nodes, free, inputs, pieces, left, right, b, width):
                 continue
             most = 0.0
             for j in range(n):
-                most = max(most, abs(_turn(nodes.q[at, other, j] - nodes.q[at, b, j])))
+                most = max(most, abs(wrapped(nodes.q[at, other, j] - nodes.q[at, b, j])))
             if most < NEAR_ROOT * width:
                 return False
     slack = free.gap[left, b] + free.gap[right, b] - 2.0 * inputs.margin
@@ -385,18 +373,10 @@ def _chord(here, there, size, k):
 
 
 @njit(**STRICT)
-def _turn(angle):
-    """Return an angle (rad) less full turns, from -π to π."""
-    if -math.pi <= angle < math.pi:
-        return angle
-    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
-
-
-@njit(**STRICT)
 def _visit(
-    nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those, at, phi, locked
+    nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those, at, locked
 ):
-    """Check all candidates of a cell at a value of φ, and write them into slot ``at``.
+    """Check all candidates of a cell at the value of φ of slot ``at``, and write them there.
 
     Args:
         run: index of the cell's run.
@@ -404,7 +384,7 @@ def _visit(
             of the retreat of its hand.
     """
     i, T, row, tool = those
-    find_branches(nodes, branches, locked, T, at, phi)
+    find_branches(nodes, branches, locked, T, at)
     for b in range(len(branches.exists[0])):
         if not is_to_check(nodes, branches, at, b):
             continue
@@ -422,10 +402,9 @@ def _visit(
         if gap == -math.inf:
             continue
         if gap == UNDECIDED:
-            nodes.state[at, b] = UNSURE
             kept = result.open_count[i]
             result.open_count[i] += 1
             if kept < MOST_OPEN:
-                result.open_phi[i, kept], result.open_branch[i, kept] = phi, b
+                result.open_phi[i, kept], result.open_branch[i, kept] = nodes.phi[at], b
             continue
         nodes.state[at, b], free.gap[at, b] = FREE, gap
