@@ -18,7 +18,7 @@ from symgrasp.poses import Array
 
 __all__ = [
     "ARCS", "HALVINGS", "MORE", "NO_ZERO", "ONE_ZERO", "angle_in_arc", "bernstein", "double_zero",
-    "halve", "largest_of", "single_zero", "zeros_within",
+    "halve", "largest_of", "single_zero", "slope_at_zero", "zeros_within",
 ]  # fmt: skip
 
 DEGREE = 8
@@ -42,18 +42,26 @@ APART = 0.05
 STEPS, CLOSE = 30, 1e-9
 """Steps, and width (of the arc), at which the search for a single zero ends."""
 
+SECANT = 1e-3
+"""How far from a place (of the arc) a slope is taken."""
+
 
 def _from_values() -> Array:
-    """Return the matrix (ARCS, ARCS) from values, those of an arc's middle first, to its coefficients."""
-    n = ARCS - 1
-    y = np.cos((np.arange(ARCS) + 0.5) * np.pi / ARCS)
-    theta = 2.0 * np.arctan(TANGENT * y)
-    apart = (theta[:, None] - 2.0 * np.pi * np.arange(ARCS) / ARCS + np.pi) % (2.0 * np.pi) - np.pi
-    dirichlet = np.sinc(ARCS * apart / (2.0 * np.pi)) / np.sinc(apart / (2.0 * np.pi))
-    u = 0.5 * (1.0 + y)
-    basis = np.array([math.comb(n, k) * u**k * (1.0 - u) ** (n - k) for k in range(ARCS)]).T
-    weight = (1.0 + (TANGENT * y[:, None]) ** 2) ** DEGREE
-    return np.linalg.inv(basis).astype(np.float64) @ (weight * dirichlet)
+    """Return what each value (row), that of an arc's middle first, adds to each coefficient (column).
+
+    ``exp(ikθ) (1 + t² y²)^d = (1 + ity)^(d + k) (1 − ity)^(d − k)``, and 1 ± ity goes from 1 ∓ it to 1 ± it.
+    """
+    n, a = ARCS - 1, complex(1.0, -TANGENT)
+    choose = [math.comb(n, j) for j in range(ARCS)]
+    matrix = np.zeros((ARCS, ARCS))
+    for k in range(-DEGREE, DEGREE + 1):
+        first, last = (
+            np.array([math.comb(m, j) * x ** (m - j) * x.conjugate() ** j for j in range(m + 1)])
+            for x, m in ((a, DEGREE + k), (a.conjugate(), DEGREE - k))
+        )
+        turn = np.exp(-2j * np.pi * k * np.arange(ARCS) / ARCS)
+        matrix += np.real(np.outer(turn, np.convolve(first, last) / choose)) / ARCS
+    return matrix
 
 
 FROM_VALUES = _from_values()
@@ -63,10 +71,11 @@ FROM_VALUES = _from_values()
 def bernstein(values, arc, c):
     """Write the coefficients (ARCS,) of the polynomial on an arc into c, from all of its values (ARCS,)."""
     for j in range(ARCS):
-        total = 0.0
-        for i in range(ARCS):
-            total += FROM_VALUES[j, i] * values[(arc + i) % ARCS]
-        c[j] = total
+        c[j] = 0.0
+    for i in range(ARCS):
+        value = values[(arc + i) % ARCS]
+        for j in range(ARCS):  # several at once
+            c[j] += FROM_VALUES[i, j] * value
 
 
 @njit(**STRICT)
@@ -138,6 +147,13 @@ def single_zero(c):
             fb *= 0.5 if side < 0 else 1.0
             side = -1
     return u
+
+
+@njit(**STRICT)
+def slope_at_zero(c, u):
+    """Return the slope of the polynomial at a place from 0 to 1 where it is zero."""
+    step = SECANT if u < 0.5 else -SECANT
+    return _value(c, u + step) / step
 
 
 @njit(**STRICT)

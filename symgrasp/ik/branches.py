@@ -18,7 +18,9 @@ from symgrasp.ik.joints import misses, onto_limits, settle, within
 from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.ik.pair.polynomial import POLYNOMIAL_NUMBERS
-from symgrasp.ik.pair.solver import PAIR_BRANCHES, STARTS, VIEWS, pair_branches
+from symgrasp.ik.pair.solver import PAIR_BRANCHES, pair_branches
+from symgrasp.ik.pair.starts import STARTS
+from symgrasp.ik.pair.zeros import VIEWS
 from symgrasp.ik.parallel import parallel_branches
 from symgrasp.ik.self_motion import PULLS, into_limits
 from symgrasp.ik.spherical import spherical_branches
@@ -42,7 +44,8 @@ class Memory(NamedTuple):
         J: (n, 6) for `polish_in`.
         A: (n, n + 1) for `polish_in`.
         numbers: (POLYNOMIAL_NUMBERS,) complex numbers, for the polynomial of `pair_branches`.
-        values: (ARCS,) its values.
+        values: (2, ARCS + 2) its values all around, and on a part of a turn; then the size of the largest,
+            and of their error.
         coefficients: (HALVINGS + 2, ARCS) its coefficients on parts of an arc.
         spans: (HALVINGS + 2, 2) where these parts begin and end.
         views: (VIEWS, 2) centres (rad) and stretches of the parts of a turn from which it is computed.
@@ -84,7 +87,7 @@ def new_memory(joints: int) -> Memory:
         np.empty((joints, 6)),
         np.empty((joints, joints + 1)),
         np.empty(POLYNOMIAL_NUMBERS, dtype=np.complex128),
-        np.empty(ARCS),
+        np.empty((2, ARCS + 2)),
         np.empty((HALVINGS + 2, ARCS)),
         np.empty((HALVINGS + 2, 2)),
         np.empty((VIEWS, 2)),

@@ -16,10 +16,17 @@ import math
 
 from symgrasp.compiling import njit
 from symgrasp.ik.joints import onto_limits, settle
-from symgrasp.ik.newton import POLISHED, linearise, normal_equations, solve_normal
+from symgrasp.ik.newton import (
+    LEAST_DAMPING,
+    POLISHED,
+    linearise,
+    normal_equations,
+    polish_in,
+    solve_normal,
+)
 from symgrasp.ik.vectors import STRICT
 
-__all__ = ["PULLS", "into_limits"]
+__all__ = ["PULLS", "family_into_limits", "into_limits"]
 
 WEIGHT2 = 1e-6
 """Square of the weight w (m/rad, or none)."""
@@ -40,6 +47,12 @@ PULLS = 12
 CLOSE = 1e-7
 """Error (m and rad) of the tool that is small enough beside a singular pose, where the last digits of it
 depend on joints being outside."""
+
+MEMBERS = 16
+"""Members of a family, a turn of the joint that turns furthest in all, from which one inside is sought."""
+
+SINGULAR2 = 1e-8
+"""Square of the singular value (m/rad, or none) of J below which there is a family."""
 
 LEAST_GAIN, WAITS = 0.9, 3
 """Where the largest way back does not shrink to this share in a step, from this step on, there is none."""
@@ -90,3 +103,71 @@ def into_limits(chain, q, T, steps, J, A):
                 q[j] += A[k, free]
                 k += 1
     return False
+
+
+@njit(**STRICT)
+def family_into_limits(chain, q, T, rows, J, A):
+    """Look for a configuration inside the limits all along the family of one that is outside.
+
+    The limits may be reached from one of its members where there is no straight way from another: because a
+    joint has another full turn there, or the family is curved.
+
+    Args:
+        chain, T, J, A: see `into_limits`.
+        q: (n,) joint values (rad) at which the tool is at the pose; receives those inside the limits.
+        rows: (3 or more, n) memory.
+
+    Returns:
+        Whether there is one; False where J is not singular.
+    """
+    member, free_way = rows[0], rows[1]
+    for j in range(q.shape[0]):
+        member[j], free_way[j] = q[j], 1.0 + 0.1 * j
+    for _ in range(MEMBERS - 1):
+        if not _find_free_way(chain, member, T, free_way, J, A):
+            return False
+        for j in range(q.shape[0]):
+            member[j] += 2.0 * math.pi / MEMBERS * free_way[j]
+        if not polish_in(chain.forward, chain.fixed, member, T, J, A):
+            return False
+        trial = rows[2]
+        for j in range(q.shape[0]):
+            trial[j] = member[j]
+        if into_limits(chain, trial, T, PULLS, J, A):
+            for j in range(q.shape[0]):
+                q[j] = trial[j]
+            return True
+    return False
+
+
+@njit(**STRICT)
+def _find_free_way(chain, q, T, way, J, A):
+    """Turn a way (n,) in joint space into the one that moves the tool least, of largest part 1.
+
+    Returns:
+        Whether J is singular, so that it does not move it.
+    """
+    for _ in range(2):  # inverse iteration
+        free, _, _, twist = linearise(chain.forward, chain.fixed, q, T, J)
+        normal_equations(J, twist, free, LEAST_DAMPING, A)
+        before, k = 0.0, 0
+        for j in range(q.shape[0]):
+            if not chain.fixed[j]:
+                A[k, free] = way[j]
+                before = max(before, abs(way[j]))
+                k += 1
+        solve_normal(A, free)
+        most, turn, k = 0.0, 0.0, 0
+        for j in range(q.shape[0]):
+            part = 0.0
+            if not chain.fixed[j]:
+                part = A[k, free]
+                k += 1
+            turn += part * way[j]
+            way[j] = part
+            most = max(most, abs(part))
+        if not most * SINGULAR2 > before:
+            return False
+        for j in range(q.shape[0]):
+            way[j] = math.copysign(1.0 / most, turn) * way[j]
+    return True

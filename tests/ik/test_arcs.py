@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +15,7 @@ from symgrasp.poses import Array
 
 bernstein, halve, zeros_within = (njit(**ENTRY)(f) for f in (arcs.bernstein, arcs.halve, arcs.zeros_within))
 single_zero, double_zero = njit(**ENTRY)(arcs.single_zero), njit(**ENTRY)(arcs.double_zero)
+slope_at_zero = njit(**ENTRY)(arcs.slope_at_zero)
 
 
 def polynomial(roots: np.ndarray, angle: Array) -> Array:
@@ -93,3 +96,34 @@ def test_a_polynomial_on_an_arc():
         for u, end in ((0.0, c[0]), (1.0, c[-1])):
             expected = polynomial(roots, np.array(arcs.angle_in_arc(arc, u)))
             assert end == pytest.approx(expected / np.cos(np.pi / 34) ** 16, rel=1e-6, abs=1e-14)
+
+
+def test_coefficients_are_as_exact_as_numbers_are():
+    """The polynomial between its values is known up to their own rounding, not to that of a matrix."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        waves = rng.normal(size=17)
+        values, c = _series(waves, TURN), np.empty(arcs.ARCS)
+        size = np.abs(values).max()
+        for arc in range(arcs.ARCS):
+            bernstein(values, arc, c)
+            for u in np.linspace(0.0, 1.0, 21):
+                basis = [math.comb(16, j) * u**j * (1.0 - u) ** (16 - j) for j in range(17)]
+                y = (2.0 * u - 1.0) * np.tan(np.pi / 34)
+                expected = _series(waves, np.array(arcs.angle_in_arc(arc, u))) * (1.0 + y * y) ** 8
+                assert abs(c @ basis - expected) < 2e-14 * size
+
+
+def _series(waves: np.ndarray, angle: Array) -> Array:
+    """Return the sum of the waves 1, cos θ, sin θ, cos 2θ and so on at angles θ."""
+    k = np.arange(1, 9) * np.asarray(angle)[..., None]
+    return waves[0] + np.cos(k) @ waves[1:9] + np.sin(k) @ waves[9:]
+
+
+def test_the_slope_at_a_zero():
+    roots, c = np.linspace(-3.0, 3.0, 16) + 0.15, np.empty(arcs.ARCS)
+    bernstein(polynomial(roots, TURN), 0, c)
+    u = single_zero(c)
+    assert arcs.angle_in_arc(0, u) == pytest.approx(-0.05, abs=1e-9)
+    low, high = (polynomial(roots, np.array(arcs.angle_in_arc(0, u + step))) for step in (-1e-6, 1e-6))
+    assert slope_at_zero(c, u) == pytest.approx((high - low) / 2e-6, rel=0.1)
