@@ -53,9 +53,9 @@ LEAST_SKEW = 1e-7
 """Least determinant (m) of the equations of joint 5 where its axis and that of joint 6 do not meet:
 near parallel axes have a smaller one. The rounding of the equations is divided by it."""
 
-SLACK_RATIO = 30.0
+SLACK_RATIO = 100.0
 """Slack of the roots of a closed form (see `symgrasp.ik.joints.sine`) for each m or rad that axes are moved
-by. A root's radicand is the ratio of lengths, of which the shortest are some centimetres."""
+by. A root's radicand is the ratio of lengths, of which the shortest are a centimetre."""
 
 
 class _Joints(NamedTuple):

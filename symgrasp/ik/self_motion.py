@@ -114,11 +114,12 @@ def family_into_limits(chain, q, T, rows, J, A):
 
     Args:
         chain, T, J, A: see `into_limits`.
-        q: (n,) joint values (rad) at which the tool is at the pose; receives those inside the limits.
+        q: (n,) joint values (rad) at which the tool is within `CLOSE` of the pose, or there is none; receives
+            those inside the limits.
         rows: (3 or more, n) memory.
 
     Returns:
-        Whether there is one; False where J is not singular.
+        Whether there is one.
     """
     member, free_way = rows[0], rows[1]
     for j in range(q.shape[0]):
@@ -128,8 +129,7 @@ def family_into_limits(chain, q, T, rows, J, A):
             return False
         for j in range(q.shape[0]):
             member[j] += 2.0 * math.pi / MEMBERS * free_way[j]
-        if not polish_in(chain.forward, chain.fixed, member, T, J, A):
-            return False
+        polish_in(chain.forward, chain.fixed, member, T, J, A)
         trial = rows[2]
         for j in range(q.shape[0]):
             trial[j] = member[j]
@@ -145,10 +145,12 @@ def _find_free_way(chain, q, T, way, J, A):
     """Turn a way (n,) in joint space into the one that moves the tool least, of largest part 1.
 
     Returns:
-        Whether J is singular, so that it does not move it.
+        Whether the tool is within `CLOSE` of the pose, and J singular, so that it stays there.
     """
     for _ in range(2):  # inverse iteration
-        free, _, _, twist = linearise(chain.forward, chain.fixed, q, T, J)
+        free, move, turn, twist = linearise(chain.forward, chain.fixed, q, T, J)
+        if not max(move, turn) <= CLOSE:
+            return False
         normal_equations(J, twist, free, LEAST_DAMPING, A)
         before, k = 0.0, 0
         for j in range(q.shape[0]):
@@ -157,17 +159,17 @@ def _find_free_way(chain, q, T, way, J, A):
                 before = max(before, abs(way[j]))
                 k += 1
         solve_normal(A, free)
-        most, turn, k = 0.0, 0.0, 0
+        most, along, k = 0.0, 0.0, 0
         for j in range(q.shape[0]):
             part = 0.0
             if not chain.fixed[j]:
                 part = A[k, free]
                 k += 1
-            turn += part * way[j]
+            along += part * way[j]
             way[j] = part
             most = max(most, abs(part))
         if not most * SINGULAR2 > before:
             return False
         for j in range(q.shape[0]):
-            way[j] = math.copysign(1.0 / most, turn) * way[j]
+            way[j] *= math.copysign(1.0 / most, along)
     return True

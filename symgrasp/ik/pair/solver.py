@@ -121,8 +121,8 @@ def _add_branches(chain, T, q, exists, inside, memory, starts, found, singular):
                 reaches = fits = True
                 for j in range(row.shape[0]):
                     row[j] = memory.row[j]
-            elif reaches:
-                fits = family_into_limits(chain, row, T, memory.q, memory.J, memory.A)
+            elif family_into_limits(chain, row, T, memory.q, memory.J, memory.A):
+                reaches = fits = True
         if not reaches or misses(chain.forward, row, T) or _is_known(q, found):
             continue
         exists[found], inside[found] = True, fits
