@@ -14,7 +14,7 @@ from symgrasp.ik.vectors import STRICT, perpendicular, rotate, subproblem1, time
 
 __all__ = ["STARTS", "add_starts"]
 
-STARTS = 32
+STARTS = 128
 """Joint values inside the limits from which Newton's method starts, at most, and as many outside."""
 
 NEARLY_ZERO, NEARLY_REAL = 0.02, 0.05
