@@ -157,8 +157,7 @@ def test_an_opened_plan_takes_the_maps_that_the_server_has(server, sessions, vis
     kept: list[object] = []
     monkeypatch.setattr(SharedCache, "keep", lambda _, result: kept.append(result))
     actions.plans.open_file("plan.json", results.plan.plan.to_json().encode())
-    html = visitor.wait_for(lambda html: "plan.json" in html and ready(html))
-    assert "pick_pour_place" in title(html)
+    visitor.wait_for(lambda html: "plan.json" in html and "pick_pour_place" in title(html) and ready(html))
     assert kept == []
     state = sessions[-1].state
     assert state
