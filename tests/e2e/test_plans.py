@@ -103,6 +103,27 @@ def test_a_sequence_is_planned_played_changed_and_explained(open_page):
     expect(page.text("Ready.")).to_be_visible()
     page.button("One grasp for all tasks").click()
     expect(page.alerts.filter(has_text="'pick': expected a pose outside of every other body")).to_be_visible()
+    page.slide("z (cm)", 0)
+    page.slide("x (cm)", 86.5)  # so far away that only the cap is reached
+    expect(page.slider_box("x (cm)")).to_have_value("86.5")
+    page.expect_title("pick")
+    page.choose("Task", "pour")
+    expect(page.slider_box("z (cm)")).to_have_value("33")
+    page.slide("y (cm)", 48)  # upside down on the crate: the hand does not fit to the cap
+    expect(page.slider_box("y (cm)")).to_have_value("48")
+    page.expect_title("pour")
+    page.slide("Lean (°)", 180)
+    expect(page.slider_box("Lean (°)")).to_have_value("180")
+    page.expect_title("pour")
+    page.button("One grasp for all tasks").click()
+    expect(page.alerts).to_contain_text("pick and pour exclude each other: they are")
+    expect(shown(page, ".sg-guilty")).to_have_text(["pick", "pour"])
+    shoot(page, "conflict")
+    page.button("Plan with 1 regrasp").click()
+    expect(page.text("2 grasps, the object set down in between.")).to_be_visible()
+    expect(page.alerts.filter(has_text="exclude")).to_have_count(0)
+    expect(shown(page, ".sg-part")).to_have_count(2)
+    shoot(page, "regrasp")
     assert page.complaints == []
 
 
