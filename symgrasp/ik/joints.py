@@ -39,9 +39,10 @@ __all__ = [
     "write_branch",
 ]
 
-ROOT_TOLERANCE = 1e-12
-"""A radicand (dimensionless, or m²) above minus this counts as zero: at the limit of the reach two
-branches coincide, and rounding decides on which side of zero it falls."""
+ROOT_TOLERANCE = 1e-8
+"""A radicand (dimensionless, or m²) above minus this counts as zero: at the limit of the reach two branches
+coincide, and rounding decides on which side of zero it falls: of maps' tool poses by up to 1e-9 rad and m
+(see `symgrasp.object.manifold`). The tool pose that is then reached is checked."""
 
 ALIGNED = 1e-7
 """A vector whose part across an axis is shorter than this (m, or of a unit vector) is along the axis:

@@ -7,6 +7,9 @@ and the radicand of the pair is not negative (see `symgrasp.ik.spherical`), whic
 the whole closed form. Its signs are found at values of φ that are near enough to each other: by how much a
 radicand may rise between two of them is not proven, but measured on the poses of arms. Gaps may be missed: a
 span may hold values of φ at which no branch reaches the pose.
+
+With a straight elbow a radicand only touches zero, at a single φ. That one is computed, and is a span without
+width, also where rounding leaves the pose a little beyond the reach.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import numpy as np
 from symgrasp.compiling import njit
 from symgrasp.ik.at_phi import Locked, geometry_at
 from symgrasp.ik.chain import AXES, CENTRE_SEEN, MIDDLE, SLACK, WRIST_SEEN
+from symgrasp.ik.joints import ROOT_TOLERANCE
 from symgrasp.ik.spherical import reach
 from symgrasp.ik.vectors import STRICT, cross, dot, vec
 from symgrasp.poses import Array
@@ -45,6 +49,10 @@ FINEST = 1e-5
 CORNERS = 8
 """Values of φ, with both ends, at which the cosine that joint 4 needs may be ±1, or is largest or least."""
 
+TOUCHES = 0.5 * ROOT_TOLERANCE
+"""By how much a cosine may be beyond ±1, or a radicand below zero, where it is taken to touch it: the closed
+form, which takes twice that for rounding, has branches there."""
+
 DEEPEST = 32
 """Halvings of a part."""
 
@@ -55,6 +63,7 @@ class Spans(NamedTuple):
     Attributes:
         number: (HALVES,) their number for either value of joint 4; -1 where they are not known.
         ends: (HALVES, MOST_SPANS, 2) where they begin and end (rad).
+        reached: (HALVES, MOST_SPANS) a value of φ (rad) on each at which the pose is reached.
         geometry: (3, m) the arm's geometry at thirds of a turn, see `Chain.geometry`.
         known: (1,) whether spans are known of the arm.
         corners: (CORNERS,) values of φ.
@@ -63,6 +72,7 @@ class Spans(NamedTuple):
 
     number: np.ndarray
     ends: Array
+    reached: Array
     geometry: Array
     known: np.ndarray
     corners: Array
@@ -78,6 +88,7 @@ def new_spans(locked: Locked) -> Spans:
     return Spans(
         number=np.full(HALVES, -1),
         ends=np.empty((HALVES, MOST_SPANS, 2)),
+        reached=np.empty((HALVES, MOST_SPANS)),
         geometry=geometry,
         known=np.array([aside and locked.row[SLACK] == 0.0]),
         corners=np.empty(CORNERS),
@@ -117,8 +128,14 @@ def find_spans(spans, chain, locked, T):
         for k in range(corners - 1):
             low, high = spans.corners[k], spans.corners[k + 1]
             middle = 0.5 * (low + high)
-            if abs(_wave(terms[0], math.sin(middle), math.cos(middle))) <= 1.0:
+            if abs(_wave(terms[0], math.sin(middle), math.cos(middle))) <= 1.0 + TOUCHES:
                 _scan(spans, terms, half, low, high)
+            elif (
+                k > 0
+                and abs(_wave(terms[0], math.sin(low), math.cos(low))) <= 1.0 + TOUCHES
+                and _radicand(terms, half, low)[0] >= -TOUCHES
+            ):
+                _begin(spans, half, low, low)
 
 
 @njit(**STRICT)
@@ -209,7 +226,7 @@ def _scan(spans, terms, half, low, high):
     parts = max(1, math.ceil((high - low) / STEP))
     value, sine = _radicand(terms, half, low)
     if value >= 0.0:
-        _begin(spans, half, low)
+        _begin(spans, half, low, low)
     left = low
     for k in range(parts):
         spans.phi[0] = high if k == parts - 1 else low + (high - low) * (k + 1) / parts
@@ -227,9 +244,11 @@ def _scan(spans, terms, half, low, high):
                 count += 1
                 continue
             if value < 0.0 and other >= 0.0:
-                _begin(spans, half, left)
+                _begin(spans, half, left, right)
             elif value >= 0.0 and other < 0.0:
                 spans.ends[half, spans.number[half] - 1, 1] = right
+            elif least < 0.0 and max(value, other) >= -rise:
+                _touch(spans, terms, half, (low, high), left, value, right, other)
             left, value, sine = right, other, beyond
             count -= 1
     if value >= 0.0:
@@ -237,10 +256,31 @@ def _scan(spans, terms, half, low, high):
 
 
 @njit(**STRICT)
-def _begin(spans, half, at):
-    """Begin a span, or go on with one that ends there."""
-    count = spans.number[half]
-    if count > 0 and (count == MOST_SPANS or spans.ends[half, count - 1, 1] >= at):
+def _touch(spans, terms, half, corners, left, value, right, other):
+    """Write a span without width where a radicand touches zero between two values of φ, or at a corner.
+
+    It is negative at both values, and a parabola in between.
+    """
+    phi, width = left if value > other else right, right - left
+    bend = value + other - 2.0 * _radicand(terms, half, left + 0.5 * width)[0]
+    away = 0.25 * (value - other) / bend if bend < 0.0 else 1.0
+    if abs(away) <= 0.5 + ROOT_TOLERANCE:
+        phi = left + (0.5 + away) * width
+    elif phi not in corners:  # the largest is in the part beside this one
         return
-    spans.ends[half, count, 0] = at
+    if _radicand(terms, half, phi)[0] >= -TOUCHES:
+        _begin(spans, half, phi, phi)
+
+
+@njit(**STRICT)
+def _begin(spans, half, at, reached):
+    """Begin a span, or go on with one that ends there; it has no width yet."""
+    count = spans.number[half]
+    if count > 0 and spans.ends[half, count - 1, 1] >= at:
+        return
+    if count == MOST_SPANS:
+        spans.ends[half, count - 1, 1] = at
+        return
+    spans.ends[half, count, 0] = spans.ends[half, count, 1] = at
+    spans.reached[half, count] = reached
     spans.number[half] = count + 1

@@ -70,6 +70,31 @@ def test_branches_reach_poses_on_their_spans_and_nowhere_else(name):
     assert gaps < 0.01 * 150 * 2 * VALUES
 
 
+@pytest.mark.parametrize("bent", [0.0, 1e-9, 1e-6, 1e-4])
+def test_poses_of_a_straight_elbow_are_reached_on_the_narrowest_spans(bent):
+    """At a value on the span, also where the pose is rounded like those of maps."""
+    arm = Scene.load("log_iiwa_and_panda").arm("iiwa")
+    ik = solver_for(arm, 1)
+    assert isinstance(ik, CompiledIK)
+    locked = locked_joint(ik)
+    assert locked is not None and ik.locked is not None
+    spans, rng = new_spans(locked), np.random.default_rng(1)
+    for _ in range(40):
+        q = rng.uniform(arm.lower, arm.upper)
+        q[3] = bent * rng.choice([-1.0, 1.0])
+        T = arm.tool_pose(q)
+        T[:3, 3] += rng.uniform(-3e-10, 3e-10, 3)
+        spans_of(spans, ik.chain, locked, T)
+        ends = [spans.ends[half, : spans.number[half]] for half in range(2)]
+        off = [np.abs(own - q[ik.locked]).max(axis=1) for own in ends]
+        half = int(np.argmin([min(own, default=np.inf) for own in off]))
+        k = int(np.argmin(off[half]))
+        assert off[half][k] < 3 * bent + 1e-3
+        there = ik.at(spans.reached[half, k : k + 1]).solve(T)
+        assert len(there.q)
+        assert np.abs(arm.tool_pose(there.q)[:, :3, 3] - T[:3, 3]).max() < 2e-8
+
+
 def test_of_arms_with_the_locked_joint_in_the_middle_no_spans_are_known():
     arm = Scene.load("log_two_gr3").arm("west_left")
     ik = solver_for(arm, 32)

@@ -29,13 +29,16 @@ from symgrasp.ik.vectors import STRICT
 
 __all__ = ["arm_gap", "find_branches", "is_to_check", "plan_values", "retreat_gap"]
 
+NARROW = 4.0 * FINEST
+"""Width (rad) of a span up to which a value on it is told: those beside its ends may be off it."""
+
 
 @njit(**STRICT)
 def plan_values(nodes, covered, T):
     """Write the values of φ with which the search of a pose (4, 4) begins, in order; return how many.
 
     Beside the ends of its range they are those to both sides of the ends of branches, where these are known,
-    and others in between, where branches reach the pose.
+    one between ends that are near each other, and others where branches reach the pose.
     """
     locked, spans, planned = covered.locked, nodes.spans, nodes.planned
     find_spans(spans, nodes.chain, locked, T)
@@ -43,6 +46,8 @@ def plan_values(nodes, covered, T):
     count = 2
     for half in range(HALVES):
         for k in range(spans.number[half]):
+            if spans.ends[half, k, 1] - spans.ends[half, k, 0] <= NARROW:
+                count = _sort_in(planned, count, spans.reached[half, k])
             for end in range(2):
                 for side in range(2):
                     phi = spans.ends[half, k, end] + (FINEST if side else -FINEST)

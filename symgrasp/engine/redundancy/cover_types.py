@@ -40,7 +40,7 @@ OPEN_KEPT = 512
 SLOTS = 32
 """Values of the redundancy that are kept at a time: both ends of a part that is halved again and again."""
 
-PLANNED = 2 + 4 * HALVES * MOST_SPANS + 64
+PLANNED = 2 + 5 * HALVES * MOST_SPANS + 64
 """Values of the redundancy with which the search of a cell begins, at most."""
 
 

@@ -11,6 +11,7 @@ from symgrasp.compiling import ENTRY, njit
 from symgrasp.engine.reach import Reach, beyond_reach
 from symgrasp.ik.at_phi import Locked, geometry_at
 from symgrasp.ik.chain import Chain
+from symgrasp.ik.joints import ROOT_TOLERANCE
 from symgrasp.ik.spherical import reach as wrist_reach
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
@@ -70,4 +71,4 @@ def _elbow_is_beyond(turned, joint, T):
         s1 += 2.0 * value * math.sin(angle)
         c2 += 2.0 * value * math.cos(2.0 * angle)
         s2 += 2.0 * value * math.sin(2.0 * angle)
-    return abs(mean) - math.sqrt(c1 * c1 + s1 * s1) - math.sqrt(c2 * c2 + s2 * s2) > 1.0 + 1e-9
+    return abs(mean) - math.sqrt(c1 * c1 + s1 * s1) - math.sqrt(c2 * c2 + s2 * s2) > 1.0 + ROOT_TOLERANCE
