@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from symgrasp.bench.random_scenes import scene_of_kind
 from symgrasp.engine.redundancy.cover import FINEST
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
@@ -54,3 +55,17 @@ def test_it_is_at_least_the_one_that_is_stated(scene, reason):
     dense = searched(scene, MOST_SAMPLES)
     assert not (dense.feasible & ~m.feasible).any()
     assert np.isfinite(m.q[m.feasible]).all()
+
+
+def test_where_pybullet_alone_decides_it_is_asked_all_over_the_range(tmp_path):
+    """Beside a drum 0.8 m thick, whose facets PyBullet takes for its surface, thousands of values are its."""
+    scene = Scene.from_content(scene_of_kind("fat", 406, tmp_path)).with_settings(heights=12, angles=24)
+    cell = 1, 7, 4
+    only = np.zeros((2, 12, 24), dtype=bool)
+    only[cell] = True
+    found: list[FeasibilityMap] = []
+    for samples in ("auto", MOST_SAMPLES):
+        with open_world(scene.with_settings(redundancy=samples)) as world:
+            found.append(MapMaker(world).map("north west", only=only))
+    assert [m.feasible[cell] for m in found] == [True, True]
+    assert found[0].resolution > FINEST

@@ -29,7 +29,7 @@ from symgrasp.engine.redundancy.candidates import (
     retreat_gap,
 )
 from symgrasp.engine.redundancy.cover_types import (
-    OPEN_KEPT,
+    MOST_UNDECIDED,
     TOUCHES,
     CoverInput,
     CoverResult,
@@ -37,6 +37,7 @@ from symgrasp.engine.redundancy.cover_types import (
     new_nodes,
 )
 from symgrasp.engine.redundancy.exclusion import EXCLUDED, TOUCHING, what_is_known
+from symgrasp.engine.redundancy.undecided import new_undecided, note_undecided
 from symgrasp.engine.retreat_search import copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
     BLOCKED,
@@ -95,10 +96,8 @@ def cover(
         proven=np.zeros(c, dtype=bool),
         left=np.zeros(c),
         visited=np.zeros(c, dtype=np.int64),
-        undecided_count=np.zeros(c, dtype=np.int32),
-        undecided_phi=np.empty((c, OPEN_KEPT)),
-        undecided_branch=np.empty((c, OPEN_KEPT), dtype=np.int16),
-        overlaps=np.empty((c, OPEN_KEPT), dtype=bool),
+        undecided=new_undecided(c, MOST_UNDECIDED),
+        overlapping=new_undecided(c, MOST_UNDECIDED),
     )
     idle: SimpleQueue[tuple[Nodes, Scratch, BranchScratch]] = SimpleQueue()
     for scratch in scratches:
@@ -153,7 +152,7 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
     those = i, T, inputs.row[run], hand, tool
     free = _visit(
         nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, left,
-        math.inf,
+        covered.step,
     )  # fmt: skip
     for k in range(1, planned):
         if free:
@@ -162,7 +161,7 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
         count = 1
         free = _visit(
             nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those,
-            nodes.stack[0], math.inf,
+            nodes.stack[0], covered.step,
         )  # fmt: skip
         while count > 0 and not free:
             right = nodes.stack[count - 1]
@@ -185,6 +184,8 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
             nodes.used[left] = False
             left = right
             count -= 1
+    if not free:
+        result.left[i] = max(result.left[i], result.undecided.spacing[i])
 
 
 @njit(**STRICT)
@@ -207,7 +208,7 @@ def _visit(
         run: index of the cell's run.
         those: what is known of the cell: its index, tool pose (4, 4) and row, the clearance (m) of the
             pieces that are fixed to the tool, and what `tool_retreats` says of their retreat.
-        width: width (rad) of the part that is halved there.
+        width: width (rad) of the part that is halved there, at most.
 
     Returns:
         Whether one is free; it is then in the result.
@@ -227,14 +228,10 @@ def _visit(
         if gap == -math.inf:
             continue
         if gap == UNDECIDED:
-            touches = nodes.state[at, b] == TOUCHES
-            if touches and width <= COARSE:
-                continue
-            kept = result.undecided_count[i]
-            result.undecided_count[i] += 1
-            if kept < OPEN_KEPT:
-                result.undecided_phi[i, kept], result.undecided_branch[i, kept] = nodes.phi[at], b
-                result.overlaps[i, kept] = touches
+            if nodes.state[at, b] != TOUCHES:
+                note_undecided(result.undecided, i, nodes.phi[at], b, width)
+            elif width > COARSE:
+                note_undecided(result.overlapping, i, nodes.phi[at], b, width)
             continue
         result.found[i], result.phi[i], result.branch[i] = True, nodes.phi[at], b
         result.clearance[i] = max(0.0, gap - FREE_BAND)

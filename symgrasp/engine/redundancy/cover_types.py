@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.collision.pieces import PackedPieces
+from symgrasp.engine.redundancy.undecided import Undecided
 from symgrasp.ik.at_phi import Locked
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.spans import HALVES, MOST_SPANS, Spans, new_spans
@@ -16,7 +17,7 @@ __all__ = [
     "FALLS",
     "GONE",
     "HITS",
-    "OPEN_KEPT",
+    "MOST_UNDECIDED",
     "OUTSIDE",
     "SKIPPED",
     "SLOTS",
@@ -34,7 +35,7 @@ GONE, OUTSIDE, HITS, FALLS, STOPS, TOUCHES, UNSURE, SKIPPED = range(8)
 branch leads on along the retreat, pieces overlap by less than PyBullet may be off, only PyBullet can decide
 for another reason, or it is excluded all around there."""
 
-OPEN_KEPT = 512
+MOST_UNDECIDED = 512
 """Largest number of undecided candidates of a cell that are listed."""
 
 SLOTS = 32
@@ -70,13 +71,12 @@ class CoverResult(NamedTuple):
         branch: (c,) its branch.
         clearance: (c,) lower bound of its clearance (m).
         proven: (c,) whether it is proven that there is none.
-        left: (c,) width (rad) of the widest part of the range that was neither excluded nor halved; pieces
-            that overlap all along a part exclude it, whatever PyBullet says.
+        left: (c,) width (rad) of the widest part of the range that was neither excluded nor halved, or of
+            whose middle PyBullet is not asked; pieces that overlap all along a part exclude it, whatever
+            PyBullet says.
         visited: (c,) number of values of the redundancy at which candidates were checked.
-        undecided_count: (c,) number of undecided candidates.
-        undecided_phi: (c, OPEN_KEPT) redundancy (rad) of the first of them.
-        undecided_branch: (c, OPEN_KEPT) their branches.
-        overlaps: (c, OPEN_KEPT) whether pieces overlap there, although PyBullet may not say so.
+        undecided: the candidates that only PyBullet can decide, `MOST_UNDECIDED` at most.
+        overlapping: those of them whose pieces overlap, although PyBullet may not say so; as many.
     """
 
     found: np.ndarray
@@ -87,10 +87,8 @@ class CoverResult(NamedTuple):
     proven: np.ndarray
     left: Array
     visited: np.ndarray
-    undecided_count: np.ndarray
-    undecided_phi: Array
-    undecided_branch: np.ndarray
-    overlaps: np.ndarray
+    undecided: Undecided
+    overlapping: Undecided
 
 
 class Nodes(NamedTuple):

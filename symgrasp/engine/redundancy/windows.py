@@ -35,6 +35,7 @@ from symgrasp.engine.redundancy.cover import COARSE, FINEST
 from symgrasp.engine.redundancy.cover_types import GONE, SKIPPED, CoverInput, Nodes, new_nodes
 from symgrasp.engine.redundancy.exclusion import BEND, EXCLUDED, LEAST_BEND, TOUCHING, what_is_known
 from symgrasp.engine.redundancy.pair_exclusion import SAGITTA
+from symgrasp.engine.redundancy.undecided import Undecided, new_undecided, note_undecided
 from symgrasp.engine.redundancy.vectors import SAME_CURVE, copy_pose, wrapped
 from symgrasp.engine.retreat_search import copy_row, tool_clearance, tool_retreats
 from symgrasp.engine.search_types import (
@@ -58,7 +59,7 @@ __all__ = ["FINEST", "MOST_WINDOWS", "STEP", "WindowResult", "windows"]
 MOST_WINDOWS = 128
 """Most windows of a cell that are told apart; more would be those of noise."""
 
-MOST_OPEN = 4096
+MOST_UNDECIDED = 4096
 """Most candidates of a cell that only PyBullet can decide, and that are listed."""
 
 FREE = SKIPPED + 1
@@ -86,18 +87,14 @@ class WindowResult(NamedTuple):
         branch: (c, MOST_WINDOWS) branch of each.
         ends: (c, MOST_WINDOWS, 2) where it begins and ends (rad).
         whole: (c, MOST_WINDOWS) whether it is free all along; else parts of it are to the resolution.
-        open_count: (c,) number of candidates that only PyBullet can decide.
-        open_phi: (c, MOST_OPEN) redundancy (rad) of the first of them.
-        open_branch: (c, MOST_OPEN) their branches.
+        undecided: the candidates that only PyBullet can decide, `MOST_UNDECIDED` at most.
     """
 
     found: np.ndarray
     branch: np.ndarray
     ends: Array
     whole: np.ndarray
-    open_count: np.ndarray
-    open_phi: Array
-    open_branch: np.ndarray
+    undecided: Undecided
 
 
 class _Free(NamedTuple):
@@ -141,9 +138,7 @@ def windows(
         branch=np.zeros((c, MOST_WINDOWS), dtype=np.int64),
         ends=np.zeros((c, MOST_WINDOWS, 2)),
         whole=np.zeros((c, MOST_WINDOWS), dtype=bool),
-        open_count=np.zeros(c, dtype=np.int64),
-        open_phi=np.empty((c, MOST_OPEN)),
-        open_branch=np.empty((c, MOST_OPEN), dtype=np.int64),
+        undecided=new_undecided(c, MOST_UNDECIDED),
     )
     idle: SimpleQueue[tuple[Nodes, _Free, Scratch, BranchScratch]] = SimpleQueue()
     count = branch_count(chain)
@@ -206,14 +201,14 @@ def _find(nodes, free, scratch, branches, moving, pieces, tree, inputs, balance,
     left = _slot(nodes, free, nodes.planned[0])
     _visit(
         nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those, left,
-        locked,
+        locked, covered.step,
     )  # fmt: skip
     for k in range(1, planned):
         nodes.stack[0] = _slot(nodes, free, nodes.planned[k])
         count = 1
         _visit(
             nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those,
-            nodes.stack[0], locked,
+            nodes.stack[0], locked, covered.step,
         )  # fmt: skip
         while count > 0:
             right = nodes.stack[count - 1]
@@ -223,6 +218,7 @@ def _find(nodes, free, scratch, branches, moving, pieces, tree, inputs, balance,
                 left = right
                 count -= 1
                 continue
+            width = nodes.phi[right] - nodes.phi[left]
             middle = _slot(nodes, free, 0.5 * (nodes.phi[left] + nodes.phi[right]))
             nodes.stack[count] = middle
             copy_row(nodes.excluded[right], nodes.excluded[middle])
@@ -230,7 +226,7 @@ def _find(nodes, free, scratch, branches, moving, pieces, tree, inputs, balance,
             count += 1
             _visit(
                 nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those,
-                middle, locked,
+                middle, locked, width,
             )  # fmt: skip
     for b in range(len(free.begun)):
         _end(free, result, i, b)
@@ -374,14 +370,16 @@ def _chord(here, there, size, k):
 
 @njit(**STRICT)
 def _visit(
-    nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those, at, locked
-):
+    nodes, free, scratch, branches, moving, pieces, tree, inputs, balance, result, run, those, at, locked,
+    width,
+):  # fmt: skip
     """Check all candidates of a cell at the value of φ of slot ``at``, and write them there.
 
     Args:
         run: index of the cell's run.
         those: what is known of the cell: its index, tool pose (4, 4) and row, and what `tool_retreats` says
             of the retreat of its hand.
+        width: width (rad) of the part that is halved there, at most.
     """
     i, T, row, tool = those
     find_branches(nodes, branches, locked, T, at)
@@ -402,9 +400,6 @@ def _visit(
         if gap == -math.inf:
             continue
         if gap == UNDECIDED:
-            kept = result.open_count[i]
-            result.open_count[i] += 1
-            if kept < MOST_OPEN:
-                result.open_phi[i, kept], result.open_branch[i, kept] = nodes.phi[at], b
+            note_undecided(result.undecided, i, nodes.phi[at], b, width)
             continue
         nodes.state[at, b], free.gap[at, b] = FREE, gap

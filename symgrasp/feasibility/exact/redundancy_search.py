@@ -14,9 +14,9 @@ from symgrasp.engine.geometry import ArmGeometry
 from symgrasp.engine.kinematics import Scratch
 from symgrasp.engine.reach import Reach, reach_of
 from symgrasp.engine.redundancy.cover import cover
-from symgrasp.engine.redundancy.cover_types import OPEN_KEPT, CoverInput, CoverResult
+from symgrasp.engine.redundancy.cover_types import CoverInput, CoverResult
 from symgrasp.engine.redundancy.out_of_reach import out_of_reach
-from symgrasp.engine.redundancy.windows import MOST_OPEN, windows
+from symgrasp.engine.redundancy.windows import windows
 from symgrasp.engine.search_types import RowChecks
 from symgrasp.feasibility.cell import Window
 from symgrasp.feasibility.exact.batches import Batch
@@ -111,7 +111,7 @@ class RedundancySearch:
             batch: of the search.
             cells: their rolls, rows and columns, (c,) each.
         """
-        for k in np.flatnonzero(~covered.found & (covered.undecided_count > 0)):
+        for k in np.flatnonzero(~covered.found & (covered.undecided.number + covered.overlapping.number > 0)):
             cell = tuple(int(part[k]) for part in cells)
             if draft.reason[cell] == Reason.FEASIBLE:
                 continue
@@ -151,14 +151,15 @@ class RedundancySearch:
         covered = self._covered(np.arange(len(tools)), locked)
         own = windows(*parts, geometry.balance, rows, covered, self._arm.dof)
         for k in range(len(tools)):
-            n, m = int(own.found[k]), min(int(own.open_count[k]), MOST_OPEN)
+            n = int(own.found[k])
             columns = own.branch[k, :n], *own.ends[k, :n].T, own.whole[k, :n]
             listed = [Window(*row) for row in zip(*(c.tolist() for c in columns), strict=True)]
             if settle or not listed:
-                left = zip(own.open_branch[k, :m].tolist(), own.open_phi[k, :m].tolist(), strict=True)
+                phi, branch = own.undecided.of(k)
+                left = list(zip(branch.tolist(), phi.tolist(), strict=True))
                 tell = progress and partial(progress, k / len(tools))
                 is_free = partial(self._is_free, batch, tools[k], int(inputs.row[k]), tell)
-                yield settled(listed, list(left), is_free, (locked.lower, locked.upper))
+                yield settled(listed, left, is_free, (locked.lower, locked.upper))
             else:
                 yield tuple(sorted(listed))
 
@@ -185,12 +186,9 @@ class RedundancySearch:
 
 def _asked(covered: CoverResult, k: int) -> tuple[Array, np.ndarray]:
     """Return the redundancy (rad) and the branch of the candidates of cell k that PyBullet decides."""
-    count = min(int(covered.undecided_count[k]), OPEN_KEPT)
-    phi, branch = covered.undecided_phi[k, :count], covered.undecided_branch[k, :count]
-    overlaps = covered.overlaps[k, :count]
-    asked, some = np.flatnonzero(~overlaps), np.flatnonzero(overlaps)
-    if len(some) > MOST_OVERLAPPING:  # evenly
-        some = some[np.lexsort((phi[some], branch[some]))]
-        some = some[np.linspace(0, len(some) - 1, MOST_OVERLAPPING).astype(int)]
-    these = np.sort(np.concatenate([asked, some]))
-    return phi[these], branch[these]
+    phi, branch = covered.undecided.of(k)
+    some, other = covered.overlapping.of(k)
+    if len(some) > MOST_OVERLAPPING:
+        evenly = np.lexsort((some, other))[np.linspace(0, len(some) - 1, MOST_OVERLAPPING).astype(int)]
+        some, other = some[evenly], other[evenly]
+    return np.concatenate([phi, some]), np.concatenate([branch, other])
