@@ -38,6 +38,9 @@ MOST_OVERLAPPING = 32
 """Candidates of a cell at most that PyBullet is asked for between the samples although their pieces overlap,
 by so little that it may call them free. There are hundreds where a link all but touches a body all along."""
 
+MOST_AT_ONCE = 32
+"""Candidates that PyBullet checks between two pauses, at most."""
+
 
 class RedundancySearch:
     """Searches all of the redundancy of one arm.
@@ -102,7 +105,7 @@ class RedundancySearch:
         batch: Batch,
         cells: tuple[np.ndarray, ...],
     ) -> Iterator[None]:
-        """Let PyBullet check what `cover` left open; pause after every cell.
+        """Let PyBullet check what `cover` left open; pause after some candidates.
 
         Args:
             draft: the map, in which it is written.
@@ -120,8 +123,12 @@ class RedundancySearch:
             s = ik.solve(T_base_tool[k])
             these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
             listed = [(s.q[j], int(s.sample[j]), int(s.branch[j])) for j in these]
-            self._open.decide(draft, cell, T_base_tool[k], ik, listed, phi)
-            yield
+            for first in range(0, len(listed), MOST_AT_ONCE):
+                some = listed[first : first + MOST_AT_ONCE]
+                by_tool = self._open.decide(draft, cell, T_base_tool[k], ik, some, phi)
+                yield
+                if by_tool or draft.reason[cell] == Reason.FEASIBLE:
+                    break
 
     def windows(
         self,
