@@ -48,7 +48,7 @@ def with_free_homes(scene: Scene, progress: Progress | None = None) -> Scene:
 
     Args:
         scene: the scene.
-        progress: called with 0 while its world is opened; may raise `Cancelled`.
+        progress: called with 0 while its world is opened and homes are tried; may raise `Cancelled`.
 
     Raises:
         UrdfError, MeshError, SceneError: PyBullet cannot make a shape of the scene.
@@ -56,18 +56,22 @@ def with_free_homes(scene: Scene, progress: Progress | None = None) -> Scene:
     if not any(_open_joints(scene, robot) for robot in scene.robots.values()):
         return scene
     with open_world(scene, progress) as world:
-        return free_homes(world)
+        return free_homes(world, progress)
 
 
-def free_homes(world: BulletWorld) -> Scene:
+def free_homes(world: BulletWorld, progress: Progress | None = None) -> Scene:
     """Return what `with_free_homes` does for the scene of a world: the same one if it has free homes.
 
     Where others were found, the world has the robots there.
+
+    Args:
+        world: the world.
+        progress: called with 0 before every try; may raise `Cancelled`.
     """
     scene, found = world.scene, dict[str, _Home]()
     for entry in scene.file.robots:
         robot = scene.robots[entry.name]
-        home = _Search(world, robot).run() if _open_joints(scene, robot) else None
+        home = _Search(world, robot, progress).run() if _open_joints(scene, robot) else None
         if home:
             found[entry.name] = home
             world.set_robot(entry.name, home.values)
@@ -138,10 +142,11 @@ class _Search:
     Args:
         world: the world, with all other robots where they are parked.
         robot: the robot.
+        progress: called with 0 before every try; may raise `Cancelled`.
     """
 
-    def __init__(self, world: BulletWorld, robot: Robot) -> None:
-        self._world, self._robot = world, robot
+    def __init__(self, world: BulletWorld, robot: Robot, progress: Progress | None) -> None:
+        self._world, self._robot, self._progress = world, robot, progress
         scene, model = world.scene, robot.model
         arms = [arm for arm in scene.arms.values() if arm.robot is robot]
         self._arm = arms[0]
@@ -230,6 +235,8 @@ class _Search:
 
     def _pairs(self, values: Array) -> list[Collision]:
         """Return the pairs that collide at joint values, with the object in any task."""
+        if self._progress:
+            self._progress(0.0)
         world, scene = self._world, self._world.scene
         world.set_robot(self._robot.name, values)
         pairs = world.arm_collisions(self._arm)

@@ -24,14 +24,14 @@ def prepared(scene: Scene, progress: Progress | None = None) -> Scene:
 
     Args:
         scene: the scene.
-        progress: called with 0 while its world is opened; may raise `Cancelled`.
+        progress: called with 0 while its world is opened and homes are tried; may raise `Cancelled`.
 
     Raises:
         SceneError: see `check_tasks` and `symgrasp.world.home.check_homes`.
         UrdfError, MeshError: PyBullet cannot make a shape of the scene.
     """
     with open_world(scene, progress) as world:
-        found = free_homes(world)
+        found = free_homes(world, progress)
         if found is scene:
             return _checked(world)
     with open_world(found, progress) as world:

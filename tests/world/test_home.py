@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import create_map
 from symgrasp.robot.robot import Robot
 from symgrasp.scene.scene import Scene
-from symgrasp.world import check_homes, checked_self_pairs, open_world, prepared, with_free_homes
+from symgrasp.world import check_homes, checked_self_pairs, home, open_world, prepared, with_free_homes
 from tests.conftest import SHIPPED, write_scene
 
 UNUSED = {
@@ -126,6 +127,21 @@ def test_a_home_is_free_of_obstacles_of_the_object_and_of_other_robots(content):
         for task in found.tasks.values():
             world.set_object(task.T_world_object)
             assert [world.arm_collisions(arm) for arm in found.arms.values()] == [[], []]
+
+
+@pytest.mark.parametrize("find", [with_free_homes, prepared])
+def test_cancel_is_looked_at_before_every_try(content, monkeypatch, find):
+    """A box around all of the robot: no home is free, and 1,000 moves are tried."""
+    content["obstacles"] = [{"name": "box", "box": [3, 3, 3], "pose": {"position": [0, 0, 1.5]}}]
+    scene, told = no_home(content), list[float]()
+    monkeypatch.setattr(home, "MOST_MOVES", 40)
+    with suppress(SceneError):
+        find(scene, told.append)
+    before = len(told)
+    monkeypatch.setattr(home, "MOST_MOVES", 80)
+    with suppress(SceneError):
+        find(scene, told.append)
+    assert len(told) - 2 * before >= 40
 
 
 def test_where_nothing_helps_the_error_names_the_pair_and_what_to_do(content):

@@ -17,7 +17,6 @@ from symgrasp.collision.boxes import boxes_of
 from symgrasp.collision.pieces import pose_rows
 from symgrasp.engine import search
 from symgrasp.engine.balance import loaded
-from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
@@ -28,8 +27,9 @@ from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Window
 from symgrasp.feasibility.exact.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.exact.certified import LEVELS, CellProver
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
-from symgrasp.feasibility.exact.recording import FixedBodies, PieceBodies, record_cover, record_search
+from symgrasp.feasibility.exact.recording import record_cover, record_search
 from symgrasp.feasibility.exact.redundancy_search import RedundancySearch
+from symgrasp.feasibility.exact.scene_bodies import FixedBodies, PieceBodies, SceneBodies
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.map_draft import MapDraft
@@ -44,7 +44,7 @@ from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.scene.balance import load_of_hand
 from symgrasp.scene.parts import Task
-from symgrasp.world import BodyName, BulletWorld, Collision
+from symgrasp.world import BulletWorld
 
 __all__ = ["ExactEngine"]
 
@@ -122,9 +122,7 @@ class ExactEngine:
         self._scratch = new_scratch(self._geometry.pose, self._geometry.pieces.size, arm.dof)
         self._copies: list[Scratch] = []
         self._prover: CellProver | None = None
-        # Pairs of which the arm moves neither, at their distances; those with the object differ map by map.
-        self._reach = max(CLEARANCE_LIMIT, self._settings.margin)
-        pairs = world.pairs_within(arm, self._reach)
+        self._bodies = SceneBodies(world, arm, self._geometry)
         tell(0.0)
         geometry, limits = self._geometry, np.array([arm.lower, arm.upper])
         self._most = CLEARANCE_LIMIT
@@ -135,7 +133,6 @@ class ExactEngine:
         self._balance = self._geometry.balance
         self._open = OpenCandidates(world, arm, geometry, self._scratch, self._opening)
         self._redundancy = RedundancySearch(arm, geometry, self._open)
-        self._fixed_pairs = [c for c in pairs if c.reason != Reason.OBJECT_COLLISION and self._is_fixed(c)]
 
     @staticmethod
     def knows(arm: Arm) -> bool:
@@ -228,7 +225,7 @@ class ExactEngine:
         self, found: FeasibilityMap, task: Task, only: np.ndarray | None, progress: Progress | None
     ) -> np.ndarray:
         """Return which cells (R, H, A) of a map that was just computed hold as a whole, of some or all."""
-        if self._fixed_bodies().collision is not None:
+        if self._bodies.fixed(self._most).collision is not None:
             return np.ones(found.reason.shape, dtype=bool)  # bodies collide whatever the arm does
         if self._prover is None:
             scene, ik = self.world.scene, self._solvers.at(0, 0)
@@ -274,7 +271,7 @@ class ExactEngine:
         Returns:
             The cells of which all of the redundancy is to be searched.
         """
-        fixed, bodies = self._fixed_bodies(), self._bodies(draft)
+        fixed, bodies = self._bodies.fixed(self._most), self._bodies.pieces_of(draft)
         wanted = np.array([misfit is None for misfit in self._misfit])
         rows = np.flatnonzero(wanted if only is None else wanted & only.any(axis=(0, 2)))
         searched: list[SampledCells] = []
@@ -299,41 +296,6 @@ class ExactEngine:
                 record_cover(draft, covered, where)
                 steps = self._redundancy.decide(draft, covered, inputs.T_base_tool[some], batch, where)
                 _tell_again(steps, tell, these.start / len(cells.left))
-
-    def _fixed_bodies(self) -> FixedBodies:
-        """Measure the bodies that the arm does not move, with the object where it is now."""
-        with_object = self.world.pairs_within(self.arm, self._reach, (self.world.scene.file.object.name,))
-        gap, deepest = self._most, None
-        for c in [*self._fixed_pairs, *filter(self._is_fixed, with_object)]:
-            distance = self._reach - c.depth
-            gap = min(gap, distance - HIT_BAND)
-            depth = self.world.margin_for(c.reason) - distance
-            if depth > 0 and (deepest is None or depth > deepest.depth):
-                deepest = c._replace(depth=depth)
-        return FixedBodies(max(gap, 0.0), deepest)
-
-    def _is_fixed(self, c: Collision) -> bool:
-        """Whether a pair involves the arm's robot, but no link that the arm moves."""
-        name = self.arm.robot.name
-        own = [body.link for body in (c.a, c.b) if body.body == name]
-        return bool(own) and not self._geometry.moving_links.intersection(own)
-
-    def _bodies(self, draft: MapDraft) -> PieceBodies:
-        """Name all pieces in a map."""
-        names = self._geometry.names
-        return PieceBodies(
-            np.array([draft.body_index(str(name)) for name in names]),
-            np.array([self._collision_reason(name) for name in names]),
-        )
-
-    def _collision_reason(self, hit: BodyName) -> Reason:
-        """Return what the arm's collision with a body is called."""
-        scene = self.world.scene
-        if hit.body == self.arm.robot.name:
-            return Reason.SELF_COLLISION
-        if hit.body in scene.robots:
-            return Reason.ROBOT_COLLISION
-        return Reason.OBJECT_COLLISION if hit.body == scene.file.object.name else Reason.SCENE_COLLISION
 
     def _search(
         self,
@@ -438,7 +400,7 @@ class ExactEngine:
         if locked is None:
             expected = "one of seven joints, whose redundancy is known at any value"
             raise InputError("windows", "arm", self.arm.name, expected)
-        fixed = self._fixed_bodies()
+        fixed = self._bodies.fixed(self._most)
         found: list[tuple[Window, ...]] = [()] * len(cells)
         fits = np.array([self._misfit[row] is None for row in cells[:, 1]], dtype=bool)
         which = np.flatnonzero(fits & (fixed.collision is None))

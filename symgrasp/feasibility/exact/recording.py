@@ -2,42 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from symgrasp.engine import search
 from symgrasp.engine.redundancy.cover import FINEST
 from symgrasp.engine.redundancy.cover_types import CoverResult
+from symgrasp.feasibility.exact.scene_bodies import FixedBodies, PieceBodies
 from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.reason import Reason
-from symgrasp.world import Collision
 
-__all__ = ["FixedBodies", "PieceBodies", "record_cover", "record_search"]
-
-
-class FixedBodies(NamedTuple):
-    """How close the bodies are that the arm does not move: the same for every candidate of a map.
-
-    Attributes:
-        gap: distance (m) that they have at least, at most what any configuration has.
-        collision: their deepest collision, which every candidate shares; None where there is none.
-    """
-
-    gap: float
-    collision: Collision | None
-
-
-class PieceBodies(NamedTuple):
-    """What the pieces of the engine's geometry are called in a map.
-
-    Attributes:
-        number: (P,) body of each piece in the map's list of names.
-        reason: (P,) what a collision with the piece is called.
-    """
-
-    number: np.ndarray
-    reason: np.ndarray
+__all__ = ["record_cover", "record_search"]
 
 
 def record_search(

@@ -118,14 +118,14 @@ class RedundancySearch:
             cell = tuple(int(part[k]) for part in cells)
             if draft.reason[cell] == Reason.FEASIBLE:
                 continue
-            phi, branch = _asked(covered, int(k))
-            ik = batch.compiled.at(phi)
-            s = ik.solve(T_base_tool[k])
-            these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
-            listed = [(s.q[j], int(s.sample[j]), int(s.branch[j])) for j in these]
-            for first in range(0, len(listed), MOST_AT_ONCE):
-                some = listed[first : first + MOST_AT_ONCE]
-                by_tool = self._open.decide(draft, cell, T_base_tool[k], ik, some, phi)
+            every, branches = _asked(covered, int(k))
+            for first in range(0, len(every), MOST_AT_ONCE):
+                phi, branch = (part[first : first + MOST_AT_ONCE] for part in (every, branches))
+                ik = batch.compiled.at(phi)
+                s = ik.solve(T_base_tool[k])
+                these = np.flatnonzero((s.branch == branch[s.sample]) & s.inside)
+                listed = [(s.q[j], int(s.sample[j]), int(s.branch[j])) for j in these]
+                by_tool = self._open.decide(draft, cell, T_base_tool[k], ik, listed, phi)
                 yield
                 if by_tool or draft.reason[cell] == Reason.FEASIBLE:
                     break
