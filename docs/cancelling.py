@@ -230,7 +230,7 @@ def _plans(scene: Scene) -> Iterator[tuple[str, Work]]:
             with closing(MapService()) as maps, closing(PlanService(maps, folders)) as plans:
                 yield (
                     opened,
-                    lambda tell, plans=plans, text=text: plans.open(text, "plan.json", None, tell),
+                    lambda tell, plans=plans, text=text: plans.open(text, "plan.json", None, None, tell),
                 )
 
 

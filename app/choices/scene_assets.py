@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from symgrasp.files import temporary_folder
+from symgrasp.scene.content import file_references
 from symgrasp.scene.scene import Scene
 
 __all__ = ["NO_ASSETS", "BuiltScene", "SceneAssets", "UploadFolder", "Visuals"]
@@ -63,11 +64,11 @@ class SceneAssets:
             folders: further ones that it may refer to.
         """
         visuals = {urdf: self.visuals.get(urdf, links) for urdf, links in built.visuals.items()}
-        used = [robot.urdf for robot in built.scene.file.robots]
+        used = [holder[key] for _, holder, key in file_references(built.scene.content)]
         kept = [
             folder
             for folder in dict.fromkeys((*self.folders, *folders))
-            if any(urdf.startswith(f"{folder.path.resolve()}/") for urdf in used)
+            if any(path.startswith(f"{folder.path.resolve()}/") for path in used)
         ]
         return replace(self, visuals=visuals, folders=tuple(kept))
 

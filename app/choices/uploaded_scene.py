@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from symgrasp.scene.scene import Scene
 
-from .scene_assets import NO_ASSETS, SceneAssets
+from .scene_assets import NO_ASSETS, SceneAssets, UploadFolder
 
 __all__ = ["UploadedScene"]
 
@@ -24,3 +24,7 @@ class UploadedScene:
     option: str
     scene: Scene
     assets: SceneAssets = NO_ASSETS
+
+    def with_folder(self, folder: UploadFolder) -> UploadedScene:
+        """Return the scene that was read from an archive, which was unpacked into this folder."""
+        return replace(self, assets=replace(self.assets, folders=(folder,)))

@@ -12,6 +12,7 @@ from typing import Any
 
 from symgrasp.errors import Cancelled, NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.plan.plan import Plan
 from symgrasp.progress import Progress
 from symgrasp.robot.catalogue import CatalogueRobot
 from symgrasp.scene.format import RobotFile
@@ -213,11 +214,22 @@ class ComputeProcess:
         """Find out where the object or the robot may stand; see `SurveyService.survey`."""
         return self._call("survey", progress, request)
 
+    def write(
+        self, plan: Plan, format_name: str, folders: Sequence[Path], progress: Progress
+    ) -> tuple[str, bytes]:
+        """Return a plan as a file: its name and content; see `PlanService.write`."""
+        return self._call("write", progress, plan, format_name, folders, reads=plan.scene.name)
+
     def open(
-        self, content: bytes, name: str, progress: Progress, unpacked: Scene | None = None
+        self,
+        content: bytes,
+        name: str,
+        progress: Progress,
+        unpacked: Scene | None = None,
+        folder: Path | None = None,
     ) -> OpenedPlan:
         """Read and verify a plan file; see `PlanService.open`."""
-        return self._call("open", progress, content, name, unpacked, reads=name)
+        return self._call("open", progress, content, name, unpacked, folder, reads=name)
 
     def _results(self, requests: Sequence[MapRequest]) -> Maps:
         """Return the maps that the last call computed, as the answers to requests."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -38,10 +38,13 @@ from symgrasp.robot.handprint import Handprint
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 
+from ..choices.scene_assets import NO_ASSETS, SceneAssets
 from ..choices.uploaded_scene import UploadedScene
-from ..files.scene_files import refuse_foreign_files
+from ..files.plan_archives import read_plan_archive
+from ..files.plan_formats import plan_file
+from ..files.scene_files import MAX_NAME, refuse_foreign_files
 from ..files.shown_paths import shown_paths
-from ..scene3d.visual_meshes import read_visuals
+from ..scene3d.visual_meshes import built_to_show
 from ..state.object_pose import ObjectPose, with_poses
 from ..state.plans.plan_results import ClimbReplay, PlanFileReport, PlanKind, PlanResult, PlanResults, Refusal
 from ..state.requests import MapRequest, Maps
@@ -270,7 +273,16 @@ class PlanService:
                 return MotionOutcome(index, with_motion(plan, motion), reasons, listed)
         raise NoPlanError("no motion: " + "; ".join(failures_in_words(failures)))
 
-    def open(self, content: bytes, name: str, unpacked: Scene | None, progress: Progress) -> OpenedPlan:
+    def write(
+        self, plan: Plan, format_name: str, folders: Sequence[Path], progress: Progress
+    ) -> tuple[str, bytes]:
+        """Return a plan as a file, which may take the files of its robots; see `plan_file`."""
+        progress(0.0)
+        return plan_file(plan, format_name, folders)
+
+    def open(
+        self, content: bytes, name: str, unpacked: Scene | None, folder: Path | None, progress: Progress
+    ) -> OpenedPlan:
         """Read and verify a plan file; if the plan holds, return all that is needed to show it but its maps.
 
         The references to files in its scene are checked before anything is loaded.
@@ -280,29 +292,34 @@ class PlanService:
             name: of the file.
             unpacked: its scene, where that was read from an archive and its files lie elsewhere than the plan
                 says: the plan is verified with this scene.
+            folder: an empty one to unpack an archive into; None where the file is no archive.
             progress: called with the finished share; may raise `Cancelled`.
 
         Raises:
+            InputError: see `app.files.plan_archives.read_plan_archive`.
             PlanError: the file is too large or is not a plan.
-            SceneError: its scene refers to files that an uploaded scene may not use.
+            SceneError, UrdfError: its scene refers to files that an uploaded scene may not use.
         """
         self.close()
-        plan = Plan.parse(content, name)
-        if unpacked:
-            update = {"content": unpacked.content, "sha256": unpacked.sha256}
-            plan = plan.model_copy(update={"scene": plan.scene.model_copy(update=update)})
+        if folder:
+            plan = read_plan_archive(name, content, folder, self._folders)
+            content = plan.to_json().encode()
+        elif unpacked:
+            plan = Plan.parse(content, name)
+            plan = plan.model_copy(update={"scene": plan.scene.with_content(unpacked.content)})
             content = plan.to_json().encode()
         else:
+            plan = Plan.parse(content, name)
             refuse_foreign_files(f"{name}: scene.content", plan.scene.content, self._folders)
         checked = check_plan(content, name, part_of(progress, 0, 2))
         report = PlanFileReport(name, checked.report.checks, tuple(map(shown_paths, checked.report.failures)))
         scene, plan = checked.scene, checked.plan
         if scene is None:
             return OpenedPlan(report)
-        read_visuals(scene, part_of(progress, 1, 2))
-        return OpenedPlan(
-            report, UploadedScene(f"{name} (upload)", scene), plan_result(plan, scene, partial(progress, 1.0))
-        )
+        built = built_to_show(scene, part_of(progress, 1, 2))
+        assets = SceneAssets(built.visuals) if folder else NO_ASSETS
+        uploaded = UploadedScene(f"{name[:MAX_NAME]} (upload)", scene, assets)
+        return OpenedPlan(report, uploaded, plan_result(plan, scene, partial(progress, 1.0)))
 
     def _start_planner(self, request: PlanRequest, scene: Scene, maps: FeasibilityMaps) -> Plans:
         def report_progress(share: float) -> None:

@@ -76,6 +76,7 @@ class _Server:
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
             "probability": self._maps.probability, "windows": self._maps.windows,
             "plan": plans.plan, "more": plans.more, "motion": plans.motion, "open": plans.open,
+            "write": plans.write,
             "read_scene": uploads.read_scene, "file_kind": uploads.file_kind,
             "measure": uploads.measure, "mount": uploads.mount,
             "survey": SurveyService(lambda part: channel.send(Part(part))).survey,

@@ -23,7 +23,7 @@ from ..files.archives import pack
 from ..files.file_kinds import FileKind, file_kind
 from ..files.robot_files import catalogue_entry, read_robot_entry, rearmed
 from ..files.scene_files import read_scene, read_scene_archive
-from ..scene3d.visual_meshes import read_visuals
+from ..scene3d.visual_meshes import built_to_show
 
 __all__ = ["UploadService"]
 
@@ -168,8 +168,4 @@ class UploadService:
 def _checked(scene: Scene, progress: Progress) -> BuiltScene:
     """Return a scene of which maps can be computed, with all that is read from its files to show it."""
     scene = prepared(scene, lambda _: progress(0.3))
-    for robot in scene.robots.values():
-        for link in robot.model.colliding_links():
-            progress(0.5)
-            robot.model.hulls(link)  # kept in the model: the server draws them, but reads no uploaded file
-    return BuiltScene(scene, read_visuals(scene, part_of(progress, 1, 2)))
+    return built_to_show(scene, part_of(progress, 1, 2))

@@ -16,7 +16,7 @@ from typing import NoReturn
 
 from symgrasp.errors import InputError, printable
 
-__all__ = ["ARCHIVE_LIMIT", "pack", "unpack"]
+__all__ = ["ARCHIVE_LIMIT", "is_archive", "names_in", "pack", "unpack"]
 
 ARCHIVE_LIMIT = 50_000_000
 """Largest archive (bytes) that is read."""
@@ -41,6 +41,22 @@ ENCRYPTED = 0x1
 
 IGNORED = "__MACOSX"
 """Folder that macOS adds to archives, with hidden copies of all names."""
+
+
+def is_archive(content: bytes) -> bool:
+    """Return whether the content of a file is that of a ZIP file."""
+    return content.startswith(b"PK")
+
+
+def names_in(content: bytes) -> list[PurePosixPath]:
+    """Return the names of the files that an archive says it holds, at most so many; none if it is damaged."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            return [PurePosixPath(name) for name in archive.namelist()[:MOST_FILES]]
+    except MemoryError:
+        raise
+    except Exception:  # of a damaged archive, whatever the reader raises
+        return []
 
 
 def unpack(name: str, content: bytes, folder: Path) -> list[Path]:

@@ -21,6 +21,7 @@ from symgrasp.descriptions.srdf import find_srdf
 from symgrasp.errors import InputError, SceneError, as_written
 from symgrasp.files import LARGEST_YAML, SCENES_DIR, TEMPORARY, parse_yaml, read_file
 from symgrasp.references import package_dirs, portable, resolve
+from symgrasp.scene.content import file_references
 from symgrasp.scene.field_errors import describe_error
 from symgrasp.scene.format import SceneFile, xacro_texts
 from symgrasp.scene.scene import Scene
@@ -32,11 +33,16 @@ from .robot_files import plain_urdf
 __all__ = [
     "MAX_NAME",
     "SCENE_LIMIT",
+    "names_beside",
+    "only_file",
     "read_scene",
     "read_scene_archive",
+    "refer_beside",
     "refuse_foreign_files",
     "scene_archive",
     "scene_yaml",
+    "unpacked_robots",
+    "upload_files",
 ]
 
 SCENE_LIMIT = LARGEST_YAML
@@ -58,17 +64,14 @@ def scene_yaml(scene: Scene, beside: Mapping[Path, str] | None = None) -> str:
         scene: the scene.
         beside: folders that the document is given along with → their names beside it.
     """
-    beside = beside or {}
     content = scene.file.model_dump(mode="json", exclude_none=True)
+    refer_beside(content, beside or {})
     elsewhere = []
-    for _, holder, key in _references(content):
+    for _, holder, key in file_references(content):
         path = Path(holder[key])
-        found = next((folder for folder in beside if path.is_relative_to(folder)), None)
-        if found is not None:
-            holder[key] = f"{beside[found]}/{path.relative_to(found).as_posix()}"
-        elif path.is_absolute() and path.is_relative_to(SCENES_DIR):
+        if path.is_absolute() and path.is_relative_to(SCENES_DIR):
             holder[key] = SHIPPED + path.relative_to(SCENES_DIR).as_posix()
-        elif not holder[key].startswith("package://"):
+        elif path.is_absolute():
             elsewhere.append(holder[key])
     lines = ["# A scene of symgrasp: `symgrasp app FILE` opens it."]
     if elsewhere:
@@ -113,7 +116,7 @@ def read_scene(
     except ValidationError as error:
         raise SceneError(source, *describe_error(error, data)) from None
     roots = [folder.resolve() for folder in folders]
-    for field, holder, key in _references(plain):
+    for field, holder, key in file_references(plain):
         holder[key] = _allowed(source, field, holder[key], roots)
     check(plain)
     _check_xacro_args(source, plain)
@@ -135,32 +138,66 @@ def read_scene_archive(name: str, content: bytes, folder: Path, folders: Iterabl
         InputError: see `app.files.archives.unpack`; or there is not exactly one scene in its first folder.
         SceneError, UrdfError, ProfileError, MeshError: see `read_scene`.
     """
-    files = unpack(name, content, folder)
-    scenes = [path for path in files if path.suffix.lower() in (".yaml", ".yml")]
-    least = min((len(path.parts) for path in scenes), default=0)
-    scenes = [path for path in scenes if len(path.parts) == least]
-    if len(scenes) != 1:
-        found = [path.relative_to(folder).as_posix() for path in scenes]
-        raise InputError(name, "files", found or "no .yaml file", "one scene, with the robots it refers to")
-    inside = folder.resolve()
-
-    def check(content: dict[str, Any]) -> None:
-        for field, holder, key in _references(content):
-            path = Path(holder[key])
-            if not path.is_absolute() or not path.is_relative_to(inside):
-                continue
-            if field.startswith("obstacles"):
-                expected = "a file of an installed package, or one of the server's scenes"
-                raise SceneError(name, field, path.name, expected)
-            if key == "urdf":
-                plain = plain_urdf(path, folder, xacro_texts(holder.pop("xacro_args", None)))
-                if plain != path and "srdf" not in holder and (srdf := find_srdf(path)):
-                    holder["srdf"] = str(srdf)
-                holder[key] = str(plain)
-
-    content = read_file(scenes[0], SCENE_LIMIT + 1)
-    uploaded = read_scene(scenes[0].name, content, (scenes[0].parent.resolve(), *folders), check)
+    path = only_file(name, unpack(name, content, folder), folder, (".yaml", ".yml"), "scene")
+    uploaded = read_scene(
+        path.name,
+        read_file(path, SCENE_LIMIT + 1),
+        (path.parent.resolve(), *folders),
+        lambda content: unpacked_robots(name, content, folder),
+    )
     return replace(uploaded, option=f"{name[:MAX_NAME]} (upload)")
+
+
+def only_file(name: str, files: Iterable[Path], folder: Path, endings: tuple[str, ...], what: str) -> Path:
+    """Return the file with one of some endings that no other one of an unpacked archive stands above.
+
+    Args:
+        name: of the archive.
+        files: of the archive.
+        folder: that it was unpacked into.
+        endings: of the file's name.
+        what: is sought, for errors.
+
+    Raises:
+        InputError: there is none, or there are several.
+    """
+    found = [path for path in files if path.suffix.lower() in endings]
+    least = min((len(path.parts) for path in found), default=0)
+    found = [path for path in found if len(path.parts) == least]
+    if len(found) != 1:
+        names = [path.relative_to(folder).as_posix() for path in found]
+        expected = f"one {what}, with the robots it refers to"
+        raise InputError(name, "files", names or f"no {endings[0]} file", expected)
+    return found[0]
+
+
+def unpacked_robots(name: str, content: dict[str, Any], folder: Path) -> None:
+    """Check the files of an unpacked archive that the content of a scene refers to, before any is read.
+
+    The content refers to the URDF that is made of a xacro or MJCF file from then on.
+
+    Args:
+        name: of the archive.
+        content: with absolute references; is changed.
+        folder: that it was unpacked into.
+
+    Raises:
+        SceneError: an obstacle refers to one.
+        UrdfError: see `app.files.robot_files.plain_urdf`.
+    """
+    inside = folder.resolve()
+    for field, holder, key in file_references(content):
+        path = Path(holder[key])
+        if not path.is_absolute() or not path.is_relative_to(inside):
+            continue
+        if field.startswith("obstacles"):
+            expected = "a file of an installed package, or one of the server's scenes"
+            raise SceneError(name, field, path.name, expected)
+        if key == "urdf":
+            plain = plain_urdf(path, folder, xacro_texts(holder.pop("xacro_args", None)))
+            if plain != path and "srdf" not in holder and (srdf := find_srdf(path)):
+                holder["srdf"] = str(srdf)
+            holder[key] = str(plain)
 
 
 def scene_archive(scene: Scene, name: str, folders: Sequence[Path]) -> bytes:
@@ -171,12 +208,29 @@ def scene_archive(scene: Scene, name: str, folders: Sequence[Path]) -> bytes:
         name: of the scene file in it.
         folders: where the files of uploaded robots are.
     """
-    inner = {folder.resolve(): f"files{k}" for k, folder in enumerate(folders, 1)}
-    files = [(name, scene_yaml(scene, inner).encode())]
-    for folder, called in inner.items():
-        paths = sorted(path for path in folder.rglob("*") if path.is_file())
-        files += [(f"{called}/{path.relative_to(folder).as_posix()}", path.read_bytes()) for path in paths]
-    return pack(files)
+    beside = names_beside(folders)
+    return pack([(name, scene_yaml(scene, beside).encode()), *upload_files(beside)])
+
+
+def names_beside(folders: Sequence[Path]) -> dict[Path, str]:
+    """Return folders of uploaded files, resolved → their names beside a file that refers to them."""
+    return {folder.resolve(): f"files{k}" for k, folder in enumerate(folders, 1)}
+
+
+def refer_beside(content: dict[str, Any], beside: Mapping[Path, str]) -> None:
+    """Make the content of a scene refer to the files of some folders by the folders' names beside it."""
+    for _, holder, key in file_references(content):
+        path = Path(holder[key])
+        for folder, name in beside.items():
+            if path.is_relative_to(folder):
+                holder[key] = f"{name}/{path.relative_to(folder).as_posix()}"
+
+
+def upload_files(beside: Mapping[Path, str]) -> Iterator[tuple[str, bytes]]:
+    """Yield the files of some folders for an archive: name in it, content."""
+    for folder, name in beside.items():
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            yield f"{name}/{path.relative_to(folder).as_posix()}", path.read_bytes()
 
 
 def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable[Path]) -> None:
@@ -192,10 +246,13 @@ def refuse_foreign_files(source: str, content: dict[str, Any], folders: Iterable
     except ValidationError as error:
         raise SceneError(source, *describe_error(error, content)) from None
     roots = [folder.resolve() for folder in folders]
-    for field, holder, key in _references(plain):
+    for field, holder, key in file_references(plain):
         reference = holder[key]
         if not reference.startswith("package://") and not Path(reference).is_absolute():
-            raise SceneError(source, field, reference, "package://<package>/<path>, or an absolute path")
+            expected = (
+                "package://<package>/<path>, an absolute path, or a file in the same ZIP file as the plan"
+            )
+            raise SceneError(source, field, reference, expected)
         _allowed(source, field, reference, roots)
     _check_xacro_args(source, plain)
 
@@ -235,20 +292,3 @@ def _inside(path: Path | None, roots: list[Path]) -> Path | None:
     inner = [path.relative_to(root).parts for root in roots if path.is_relative_to(root)]
     own = [parts for parts in inner if not any(part.startswith(TEMPORARY) for part in parts)]
     return path if own else None
-
-
-def _references(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], str]]:
-    """Yield every reference to a file in the content of a scene: field, the mapping it is in, its key."""
-    holders: list[tuple[str, dict[str, Any]]] = [("object", content["object"])]
-    for i, robot in enumerate(content["robots"]):
-        holders.append((f"robots[{i}]", robot))
-        arms = [(f"robots[{i}]", robot)]
-        arms += [(f"robots[{i}].arms[{k}]", arm) for k, arm in enumerate(robot.get("arms", []))]
-        holders += [
-            (f"{field}.hand", arm["hand"]) for field, arm in arms if isinstance(arm.get("hand"), dict)
-        ]
-    holders += [(f"obstacles[{i}]", obstacle) for i, obstacle in enumerate(content["obstacles"])]
-    for field, holder in holders:
-        for key in ("urdf", "srdf", "mesh"):
-            if key in holder:
-                yield f"{field}.{key}", holder, key

@@ -6,7 +6,10 @@ import math
 
 import viser
 
-from ..files.plan_formats import FORMATS, PLAN_LIMIT
+from symgrasp.plan.plan import LARGEST_PLAN
+
+from ..files.archives import ARCHIVE_LIMIT
+from ..files.plan_formats import FORMATS
 from ..html.conflicts import plan_file_html
 from ..html.motion import motion_html
 from ..html.readout import solution_html
@@ -114,10 +117,11 @@ class PlanFilePanel(Panel):
             )
             self.upload = self.upload_button(
                 "Open a plan",
-                PLAN_LIMIT,
+                ARCHIVE_LIMIT,
                 plans.open_file,
-                mime_type=".json",
-                hint=f"JSON; at most {PLAN_LIMIT / 1e6:g} MB. It is verified before it is shown.",
+                mime_type=".json,.zip",
+                hint=f"JSON of at most {LARGEST_PLAN / 1e6:g} MB; or a ZIP file of a plan with its robots, "
+                f"at most {ARCHIVE_LIMIT / 1e6:g} MB. It is verified before it is shown.",
             )
             self.report = self.html()
 

@@ -19,9 +19,9 @@ from symgrasp.meshes import read_parts
 from symgrasp.progress import Progress, cached, part_of
 from symgrasp.scene.scene import Scene
 
-from ..choices.scene_assets import Visuals
+from ..choices.scene_assets import BuiltScene, Visuals
 
-__all__ = ["link_visuals", "read_visuals"]
+__all__ = ["built_to_show", "link_visuals", "read_visuals"]
 
 Color = tuple[int, ...]
 
@@ -67,6 +67,24 @@ def link_visuals(urdf: bytes, progress: Progress | None) -> dict[str, bytes]:
             tell()
             glbs[link.name] = export_glb(scene, include_normals=True)
     return glbs
+
+
+def built_to_show(scene: Scene, progress: Progress | None) -> BuiltScene:
+    """Return a scene with all that is read from its files to show it.
+
+    Args:
+        scene: the scene.
+        progress: called with the finished share; may raise `Cancelled`.
+
+    Raises:
+        MeshError: a mesh cannot be read.
+    """
+    for robot in scene.robots.values():
+        for link in robot.model.colliding_links():
+            if progress:
+                progress(0.0)
+            robot.model.hulls(link)  # kept in the model: the server draws them, but reads no uploaded file
+    return BuiltScene(scene, read_visuals(scene, progress))
 
 
 def read_visuals(scene: Scene, progress: Progress | None = None) -> Visuals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import re
 from pathlib import Path
@@ -25,8 +26,10 @@ from symgrasp.feasibility.pictures import to_png
 from symgrasp.files import check_size, parse_json, read_file, write_atomically
 from symgrasp.plan.motion_record import MotionRecord
 from symgrasp.poses import Array, quat_wxyz
+from symgrasp.references import resolve
+from symgrasp.scene.content import content_sha256, file_references
 from symgrasp.scene.field_errors import describe_error
-from symgrasp.scene.format import MOST_TASKS, WHOLE
+from symgrasp.scene.format import MOST_TASKS, WHOLE, SceneFile
 
 if TYPE_CHECKING:  # reading plans takes neither
     from symgrasp.feasibility.map import FeasibilityMap
@@ -52,6 +55,13 @@ CLEARANCE_LIMIT = 0.1
 
 LARGEST_PLAN = 5_000_000
 """Largest plan file (bytes) that is read."""
+
+OTHER_FILES = {
+    ".yaml": "not a scene",
+    ".yml": "not a scene",
+    ".zip": "which an archive of the page has beside the robots' files, once it is unpacked",
+}
+"""Ending of a file that is no plan → what to say of it."""
 
 NUMBERS = re.compile(r"\[\n\s*([-+\d.eE,\s]+?)\n\s*\]")
 """An array of numbers over several lines; in a string there is no line break."""
@@ -182,6 +192,10 @@ class SceneRecord(_Part):
     sha256: str
     content: dict[str, Any]
 
+    def with_content(self, content: dict[str, Any]) -> SceneRecord:
+        """Return the record of a scene with this content, which is hashed."""
+        return self.model_copy(update={"content": content, "sha256": content_sha256(content)})
+
 
 class Plan(_Part):
     """A plan, format version 3: version 1 has no motion, and version 2 no proven margins."""
@@ -261,20 +275,41 @@ class Plan(_Part):
         else:
             page.show_html(document, name)
 
+    def found_from(self, folder: Path) -> Plan:
+        """Return the plan with absolute paths in place of those that its scene gives relative to a folder.
+
+        A plan whose scene does not have the hash that the plan states stays as it is.
+        """
+        record, content = self.scene, copy.deepcopy(self.scene.content)
+        if content_sha256(content) != record.sha256:
+            return self
+        try:
+            SceneFile.model_validate(content)
+        except ValidationError:
+            return self
+        moved = False
+        for _, holder, key in file_references(content):
+            reference = holder[key]
+            if "://" not in reference and not Path(reference).is_absolute():
+                path = resolve(reference, folder) or folder / reference
+                holder[key], moved = str(path.resolve()), True
+        return self.model_copy(update={"scene": record.with_content(content)}) if moved else self
+
     @staticmethod
     def load(path: str | Path) -> Plan:
-        """Read a plan.
+        """Read a plan; what its scene refers to by relative paths is beside it.
 
         Raises:
             PlanError: the file is missing or is not such a plan.
         """
+        expected = OTHER_FILES.get(Path(path).suffix)
+        if expected and Path(path).is_file():
+            raise PlanError(path, "file", Path(path).suffix, f"a plan: a JSON file, {expected}")
         try:
             content = read_file(Path(path), LARGEST_PLAN)
         except (OSError, ValueError) as error:
             raise PlanError(path, "file", str(error), "a readable JSON file") from error
-        if Path(path).suffix in (".yaml", ".yml"):
-            raise PlanError(path, "file", Path(path).suffix, "a plan: a JSON file, not a scene")
-        return Plan.parse(content, str(path))
+        return Plan.parse(content, str(path)).found_from(Path(path).parent)
 
     @staticmethod
     def parse(content: str | bytes, source: str) -> Plan:

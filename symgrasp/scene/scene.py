@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,6 +17,7 @@ from symgrasp.object.profile import Profile
 from symgrasp.page import page_module
 from symgrasp.robot.robot import Arm, Robot
 from symgrasp.scene.building import SceneBuilder, check_settings
+from symgrasp.scene.content import content_sha256
 from symgrasp.scene.field_errors import describe_error
 from symgrasp.scene.format import (
     MOST_TASKS,
@@ -135,7 +134,7 @@ class Scene:
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the content as canonical JSON."""
-        return _sha256(self.content)
+        return content_sha256(self.content)
 
     @cached_property
     def map_sha256(self) -> str:
@@ -145,7 +144,7 @@ class Scene:
         were when the scene was loaded. The scene's name, description and tasks have no part in it.
         """
         thing, mass = self.file.object.name, self.object_mass
-        return _sha256(
+        return content_sha256(
             map_content(self.robots, self.arms, thing, self.profile, mass, self.obstacles, self.settings)
         )
 
@@ -327,8 +326,3 @@ def _task_file(task: Task) -> TaskFile:
     """Return a task as a scene file has it; raise ValidationError if its name is empty or too long."""
     pose = PoseFile.of(task.T_world_object)
     return TaskFile(name=task.name, arms=task.arms, pose=pose, supported=task.supported)
-
-
-def _sha256(content: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of plain data as canonical JSON."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -7,7 +7,12 @@ from pathlib import Path
 
 import pybullet_data
 
+from app.compute.upload_service import UploadService
 from app.files.archives import pack
+from symgrasp.files import SCENES_DIR
+from symgrasp.plan.plan import Plan
+from symgrasp.planners.planning import plan_sequential
+from symgrasp.scene.scene import Scene
 
 PANDA = Path(pybullet_data.getDataPath()) / "franka_panda"
 
@@ -19,3 +24,13 @@ def panda_archive() -> bytes:
     meshes = sorted(path for path in (PANDA / "meshes").rglob("*") if path.is_file())
     files = [(f"my_panda/{path.relative_to(PANDA).as_posix()}", path.read_bytes()) for path in meshes]
     return pack([("my_panda/urdf/panda.urdf", urdf.encode()), *files])
+
+
+def plan_of_upload(folder: Path) -> Plan:
+    """Return a plan of that Panda, uploaded into an empty folder."""
+    bottle = Scene.load("bottle_on_table").with_settings(heights=8, angles=16, redundancy=8)
+    service = UploadService((SCENES_DIR,))
+    _, built = service.read_robot(
+        bottle, "panda", "p.zip", panda_archive(), folder, bottle, lambda share: None
+    )
+    return plan_sequential(built.scene)

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from app.files.archives import pack
+from app.files.archives import pack, unpack
+from app.files.plan_formats import FORMATS
+from symgrasp.plan.plan import Plan
+from symgrasp.plan.verify import verify
 from symgrasp.scene.scene import Scene
 from tests.app.robot_archives import panda_archive
 from tests.e2e.page import GraspPage
@@ -114,3 +117,47 @@ def test_an_uploaded_robot_goes_into_a_file_and_opens_again(open_page, tmp_path)
     upload(another, "Open a scene (YAML or ZIP)", saved)
     expect(another.frame.get_by_label("Scene", exact=True)).to_have_value(f"{saved.name} (upload)")
     assert not page.complaints
+
+
+def test_a_plan_of_an_uploaded_robot_goes_out_in_every_format_and_opens_again(open_page, tmp_path):
+    page = open_page()
+    page.expect_title("panda")
+    open_robot_folder(page)
+    robot = tmp_path / "my panda.zip"
+    robot.write_bytes(panda_archive())
+    upload(page, "Upload a robot", robot)
+    expect(page.frame.get_by_label("Robot", exact=True)).to_have_value("my panda.zip (upload)")
+    page.expect_title("panda")
+    page.tab("Sequence")
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 1 task: h = ")).to_be_visible()
+    saved = {}
+    for name in ("JSON", "CSV", "Trajectory", "TSR"):
+        page.choose("Format", name)
+        with page.page.expect_download() as download:
+            page.button("Download plan").click()
+        saved[name] = tmp_path / download.value.suggested_filename
+        download.value.save_as(saved[name])
+    assert saved["JSON"].suffix == ".zip"
+    (tmp_path / "unpacked").mkdir()
+    unpack(saved["JSON"].name, saved["JSON"].read_bytes(), tmp_path / "unpacked")
+    plan = Plan.load(tmp_path / "unpacked" / f"{saved['JSON'].stem}.json")
+    assert verify(plan).holds
+    for name in ("CSV", "Trajectory", "TSR"):
+        assert saved[name].read_text(encoding="utf-8") == FORMATS[name][1](plan)
+
+    another = open_page("soda_can")
+    another.tab("Sequence")
+    upload(another, "Open a plan", saved["JSON"])
+    expect(another.text(f"{saved['JSON'].name} holds: ")).to_be_visible()
+    expect(another.frame.get_by_label("Scene", exact=True)).to_have_value(f"{saved['JSON'].name} (upload)")
+    another.expect_title("panda")
+    another.tab("Files")
+    upload(another, "Open a scene (YAML or ZIP)", saved["JSON"])  # the other button takes it as well
+    another.tab("Sequence")
+    expect(another.text("One grasp for 1 task: h = ")).to_be_visible()
+    assert not another.alerts.all()
+    alone = tmp_path / "unpacked" / f"{saved['JSON'].stem}.json"
+    upload(another, "Open a plan", alone)
+    expect(another.alerts).to_contain_text("a file in the same ZIP file as the plan")
+    assert page.complaints == another.complaints == []

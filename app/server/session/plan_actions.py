@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from symgrasp.errors import InputError
 from symgrasp.progress import Progress
 
 from ...choices.scene_assets import UploadFolder
@@ -14,8 +12,8 @@ from ...choices.uploaded_scene import UploadedScene
 from ...compute.cache import SharedCache
 from ...compute.compute_process import ComputeProcess
 from ...compute.plan_service import MotionRequest, OpenedPlan, PlanRequest
+from ...files.archives import is_archive
 from ...files.file_kinds import FileKind
-from ...files.plan_formats import FORMATS
 from ...state.changes import open_upload
 from ...state.job_changes import failed
 from ...state.plans.plan_changes import more_listed, motion_found, show_results
@@ -99,7 +97,7 @@ class PlanActions:
             kind = self._process.file_kind(name, content, progress) or expected
             if kind == "scene":
                 return self.read_scene(name, content, progress)
-            opened = self._process.open(content, name, lambda share: progress(share / 2))
+            opened = self._read_plan(name, content, lambda share: progress(share / 2))
             return opened, self.maps(opened.maps, lambda share: progress((1 + share) / 2))
 
         def show(state: State, result: UploadedScene | tuple[OpenedPlan, Maps]) -> State:
@@ -112,13 +110,20 @@ class PlanActions:
 
         self._session.submit(f"{'Verifying' if expected == 'plan' else 'Opening'} {name}", run, show)
 
+    def _read_plan(self, name: str, content: bytes, progress: Progress) -> OpenedPlan:
+        """Read and verify an uploaded plan; an archive is unpacked into a folder of its own."""
+        if not is_archive(content):
+            return self._process.open(content, name, progress)
+        folder = UploadFolder()
+        opened = self._process.open(content, name, progress, folder=folder.path)
+        return replace(opened, scene=opened.scene and opened.scene.with_folder(folder))
+
     def read_scene(self, name: str, content: bytes, progress: Progress) -> UploadedScene:
         """Read an uploaded scene; an archive is unpacked into a folder of its own."""
         if not name.lower().endswith(".zip"):
             return self._process.read_scene(name, content, None, progress)
         folder = UploadFolder()
-        uploaded = self._process.read_scene(name, content, folder.path, progress)
-        return replace(uploaded, assets=replace(uploaded.assets, folders=(folder,)))
+        return self._process.read_scene(name, content, folder.path, progress).with_folder(folder)
 
     def maps(self, requests: Sequence[MapRequest], progress: Progress) -> Maps:
         """Return maps by task and arm, computing those that are not cached."""
@@ -131,22 +136,16 @@ class PlanActions:
         return maps
 
     def download(self, format_name: str) -> None:
-        """Send the plan to the browser in one of `FORMATS`."""
+        """Send the plan to the browser in one of `app.files.plan_formats.FORMATS`."""
+        state = self._session.state
+        if state is None or state.plan is None:
+            return
+        plan, folders = state.plan.plan, [folder.path for folder in state.assets.folders]
 
-        def send(state: State) -> None:
-            if state.plan:
-                if state.assets.folders and format_name == "JSON":
-                    expected = (
-                        "a robot of the list, for the file names those of the robot; choose another format, "
-                        "or save the scene (Files), unpack it and run `symgrasp plan`"
-                    )
-                    raise InputError("plan file", "robots", "an upload", expected)
-                plan = state.plan.plan
-                ending, write = FORMATS[format_name]
-                name = re.sub(r"\W+", "_", f"{plan.scene.name}_{plan.kind}")
-                self._session.send(name + ending, write(plan).encode())
+        def run(progress: Progress) -> None:
+            self._session.send(*self._process.write(plan, format_name, folders, progress))
 
-        self._session.attempt(send)
+        self._session.submit("Writing the plan", run, lambda state, _: state)
 
 
 def show_opened_plan(state: State, opened: OpenedPlan, maps: Maps) -> State:

@@ -18,7 +18,6 @@ from app.compute import plan_service
 from app.compute.cache import SharedCache
 from app.compute.map_service import MapService
 from app.compute.plan_service import PLANS_PER_BATCH, SEARCH, MotionRequest, PlanRequest, PlanService
-from app.files.plan_formats import PLAN_LIMIT
 from app.render.drawn_poses import drawn_joint_values, drawn_object_pose
 from app.render.playback import plan_joint_values
 from app.render.prints import shown_prints
@@ -31,6 +30,7 @@ from app.state.task_list import TaskList
 from symgrasp.errors import Cancelled, InputError, NoPlanError, PlanError, SceneError, SymgraspError
 from symgrasp.files import SCENES_DIR
 from symgrasp.motion.choosing import Failure
+from symgrasp.plan.plan import LARGEST_PLAN
 from symgrasp.planners.gaps import PrintGaps
 from symgrasp.planners.planning import sequential_plans
 from symgrasp.poses import pose_error
@@ -311,7 +311,7 @@ def test_the_gap_that_is_shown_is_that_of_the_planner():
 )
 def test_a_plan_from_a_file_brings_its_scene(plans, name, kind):
     plan = planned(name, kind).plan.plan
-    found = plans.open(plan.to_json().encode(), "a.json", None, quiet)
+    found = plans.open(plan.to_json().encode(), "a.json", None, None, quiet)
     assert found.report.failures == ()
     assert found.report.checks > 10
     state = show_opened_plan(opened("soda_can"), found, planned(name, kind).maps)
@@ -325,7 +325,9 @@ def test_a_plan_from_a_file_brings_its_scene(plans, name, kind):
 def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans):
     text = planned("pick_pour_place", "sequential").plan.plan.to_json()
     h = planned("pick_pour_place", "sequential").plan.plan.tasks[0].holds[0].grasp.h
-    found = plans.open(text.replace(f'"h": {h!r}', f'"h": {h + 0.01!r}').encode(), "a.json", None, quiet)
+    found = plans.open(
+        text.replace(f'"h": {h!r}', f'"h": {h + 0.01!r}').encode(), "a.json", None, None, quiet
+    )
     assert found.plan is None
     assert any("10.0" in failure or "0.01" in failure for failure in found.report.failures)
     before = with_plan("soda_can", "sequential")
@@ -335,16 +337,20 @@ def test_a_plan_that_does_not_hold_is_reported_with_numbers_and_not_shown(plans)
     assert state.plan_results.opened is found.report
     with pytest.raises(SceneError, match=r"obstacles\[1\].mesh.*expected a file of an installed package"):
         plans.open(
-            text.replace("package://static_scenes/bowl.obj", "/etc/passwd").encode(), "a.json", None, quiet
+            text.replace("package://static_scenes/bowl.obj", "/etc/passwd").encode(),
+            "a.json",
+            None,
+            None,
+            quiet,
         )
-    with pytest.raises(SceneError, match="or an absolute path"):
+    with pytest.raises(SceneError, match="or a file in the same ZIP file as the plan"):
         plans.open(
-            text.replace("package://static_scenes/bowl.obj", "bowl.obj").encode(), "a.json", None, quiet
+            text.replace("package://static_scenes/bowl.obj", "bowl.obj").encode(), "a.json", None, None, quiet
         )
     with pytest.raises(PlanError, match="more than 5 MB"):
-        plans.open(b" " * (PLAN_LIMIT + 1), "a.json", None, quiet)
+        plans.open(b" " * (LARGEST_PLAN + 1), "a.json", None, None, quiet)
     with pytest.raises(PlanError, match="JSON"):
-        plans.open(b"{", "a.json", None, quiet)
+        plans.open(b"{", "a.json", None, None, quiet)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from queue import Queue
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from app.choices import object_choice
 from app.compute import map_service, process_pool
 from app.compute.cache import SharedCache
 from app.files import scene_files
+from app.files.plan_formats import plan_file
 from app.scene3d.visual_meshes import read_visuals
 from app.server.door import lobby
 from app.server.session.actions import Actions
@@ -24,9 +26,10 @@ from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
 from tests.app import failures
 from tests.app.choices.test_object_choice import stl
+from tests.app.robot_archives import plan_of_upload
 from tests.app.server.session.served import Server, ready, start_server, title
 from tests.app.state.test_plan_results import planned
-from tests.app.wire import Wire
+from tests.app.wire import WAIT, Wire
 from tests.hostile import chain_urdf, doubling_yaml
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -75,7 +78,14 @@ def forbidden(*_: object, **__: object) -> None:
 
 
 @pytest.fixture
-def no_parsers(monkeypatch) -> None:
+def plan_archive(tmp_path) -> bytes:
+    """A plan with the files of its robot."""
+    (tmp_path / "robot").mkdir()
+    return plan_file(plan_of_upload(tmp_path / "robot"), "JSON", [tmp_path / "robot"])[1]
+
+
+@pytest.fixture
+def no_parsers(plan_archive, monkeypatch) -> None:
     """Every parser of files breaks in this process; those that a session starts have their own."""
     planned("pick_pour_place", "sequential")  # it is kept
     read_visuals(Scene.load("pick_pour_place"))  # meshes that ship may be read for the 3D view
@@ -91,7 +101,9 @@ def no_parsers(monkeypatch) -> None:
         monkeypatch.setattr(module, name, forbidden)
 
 
-def test_the_server_parses_no_upload_itself(visitor, actions, content, no_parsers):
+def test_the_server_parses_no_upload_itself(
+    visitor, sessions, actions, content, plan_archive, no_parsers, monkeypatch
+):
     content["name"] = "the uploaded one"
     actions.upload_scene("mine.yaml", yaml.safe_dump(content).encode())
     visitor.wait_for(lambda html: "the uploaded one" in title(html) and ready(html))
@@ -101,6 +113,17 @@ def test_the_server_parses_no_upload_itself(visitor, actions, content, no_parser
     assert found
     actions.plans.open_file("plan.json", found.plan.to_json().encode())
     visitor.wait_for(lambda html: "plan.json" in html and "pick_pour_place" in title(html) and ready(html))
+    actions.plans.open_file("plan.zip", plan_archive)
+    visitor.wait_for(lambda html: "plan.zip" in html and "bottle_on_table" in title(html) and ready(html))
+    sent: Queue[tuple[str, bytes]] = Queue()
+    monkeypatch.setattr(sessions[-1], "send", lambda *file: sent.put(file))
+    for form, name in {
+        "TSR": "bottle_on_table_sequential.tsr.yaml",
+        "JSON": "bottle_on_table_sequential.zip",
+    }.items():
+        actions.plans.download(form)
+        assert sent.get(timeout=WAIT)[0] == name
+        visitor.wait_for(ready)
 
 
 @pytest.mark.parametrize(
