@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
 from tests.app.html.test_profile import oval_stl
 from tests.conftest import write_scene
-from tests.e2e.page import GraspPage
+from tests.e2e.page import WAIT, GraspPage
 
 BOTTLE = Scene.load("bottle_on_table")
 COLUMNS_PER_DEGREE = 4
@@ -304,7 +305,7 @@ def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
     page = open_page()
     page.upload(path)  # as if it were in metres
     expect(page.alerts).to_contain_text("expected 0.005 to 10 m; choose the unit of the mesh")
-    expect(page.frame.get_by_text("successfully")).to_have_count(0)  # viser's notice
+    expect(page.frame.get_by_text("successfully").filter(visible=True)).to_have_count(0)  # viser's notice
     assert np.array_equal(page.picture(), drawn(bottle_map))
     page.choose("Mesh unit", "mm")  # tries again, without another upload
     expect(page.frame.get_by_label("Object", exact=True)).to_have_value(f"{hostile} (upload)")
@@ -319,6 +320,40 @@ def test_a_mesh_is_uploaded_and_held(open_page, bottle_map, tmp_path):
     expect(page.text(f"the {object_choice.name} turns")).to_be_visible()
     page.expect_title("soda_can")
     assert page.frame.evaluate("window.hacked") is None
+    assert page.complaints == []
+
+
+WATCH = """() => {
+  window.notices = [];
+  new MutationObserver(() => {
+    const found = [...document.querySelectorAll("div")].filter(e => e.textContent.endsWith("successfully."));
+    window.notices.push(...found.filter(e => !e.childElementCount).map(e => e.checkVisibility()));
+  }).observe(document.body, {subtree: true, childList: true, characterData: true});
+}"""
+"""Notes whether viser's notice that a file was uploaded is seen, whenever it is in the document."""
+
+
+def test_no_layout_calls_a_refused_file_uploaded(open_page, tmp_path):
+    page = open_page()
+    page.frame.evaluate(WATCH)
+    path = tmp_path / "bad.stl"
+    path.write_bytes(b"no mesh")
+
+    def expect_hidden_notice() -> None:
+        """Wait until viser has shown its notice, unseen, and taken it away again."""
+        deadline = time.monotonic() + WAIT / 1000
+        while not page.frame.evaluate("window.notices.length"):
+            assert time.monotonic() < deadline, "viser gave no notice"
+            page.next_frame()
+        expect(page.frame.get_by_text("File uploaded successfully.")).to_have_count(0)
+        assert not any(page.frame.evaluate("window.notices.splice(0)"))
+
+    page.upload(path)
+    expect(page.alerts).to_contain_text("bad.stl")
+    expect_hidden_notice()
+    for size in (390, 844), (1280, 800):
+        page.page.set_viewport_size({"width": size[0], "height": size[1]})
+        expect_hidden_notice()
     assert page.complaints == []
 
 

@@ -82,12 +82,10 @@ class UploadButton:
     Attributes:
         limit: largest file (bytes) that it takes.
         refuse: called with the name and size (bytes) of a larger one, and with the id of its transfer.
-        received: called with the id of a transfer whose last part is here.
     """
 
     limit: int
     refuse: Callable[[str, int, str], None]
-    received: Callable[[str], None]
 
 
 class Uploads:
@@ -115,7 +113,6 @@ class Uploads:
         transfer.add(message)
         if transfer.is_complete:
             del self._open[message.transfer_uuid]
-            self._buttons[transfer.uuid].received(message.transfer_uuid)
         return True
 
     def _starts(self, message: BrowserMessage) -> bool:
@@ -131,8 +128,6 @@ class Uploads:
             raise Misuse("two files at once")
         if message.part_count:
             self._open[message.transfer_uuid] = _Transfer(uuid, size, message.part_count)
-        else:
-            button.received(message.transfer_uuid)
         return True
 
 

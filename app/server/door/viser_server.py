@@ -19,7 +19,7 @@ from websockets.asyncio import server as websockets_server
 
 from .front_door import FrontDoor
 
-__all__ = ["AsyncMessageBuffer", "WakingBuffer", "any_port", "end_upload", "hide_upload", "quiet_server"]
+__all__ = ["AsyncMessageBuffer", "WakingBuffer", "any_port", "end_upload", "quiet_server"]
 
 
 class _LoopEvent(asyncio.Event):
@@ -90,16 +90,6 @@ def _listening_at(door: FrontDoor) -> Iterator[None]:
             setattr(websockets_server, "serve", listen)  # noqa: B010
 
 
-def hide_upload(client: viser.ClientHandle, transfer: str) -> None:
-    """Take viser's notice of a transfer away, which would call it successful before the file is read.
-
-    Args:
-        client: the browser.
-        transfer: uuid of the transfer.
-    """
-    client.gui._websock_interface.queue_message(_messages.RemoveNotificationMessage(f"upload-{transfer}"))
-
-
 def end_upload(client: viser.ClientHandle, button: str, transfer: str) -> None:
     """Have a browser forget a file that is not received: end its progress bar, and free the button.
 
@@ -108,8 +98,6 @@ def end_upload(client: viser.ClientHandle, button: str, transfer: str) -> None:
         button: uuid of the button.
         transfer: uuid of the transfer.
     """
-    # viser's client takes an upload for running until as many bytes are received as it has, and for
-    # successful if it is exactly as many.
-    queue = client.gui._websock_interface.queue_message
-    queue(_messages.FileTransferPartAck(button, transfer, transferred_bytes=2, total_bytes=1))
-    hide_upload(client, transfer)
+    # viser's client takes an upload for running until as many bytes are received as it has.
+    ended = _messages.FileTransferPartAck(button, transfer, transferred_bytes=1, total_bytes=1)
+    client.gui._websock_interface.queue_message(ended)

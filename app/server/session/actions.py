@@ -24,7 +24,7 @@ from ...state import changes, job_changes, robot_changes
 from ...state.page_link import Camera
 from ...state.state import State
 from ..door.browser_messages import UploadButton
-from ..door.viser_server import end_upload, hide_upload
+from ..door.viser_server import end_upload
 from ..snapshot import snapshot_html
 from .plan_actions import PlanActions
 from .session_api import SessionApi
@@ -228,9 +228,7 @@ class Actions:
             limits = f"{size / 1e6:.1f} MB", f"a file of at most {limit / 1e6:g} MB"
             self._fail(InputError(name, "size of the file", *limits))
 
-        self._upload_buttons[uuid] = UploadButton(
-            limit, refuse, lambda transfer: hide_upload(self._client, transfer)
-        )
+        self._upload_buttons[uuid] = UploadButton(limit, refuse)
 
     def save_map(self, kind: str) -> None:
         """Send the map that is shown as a picture, in a format of `app.render.map_picture.FORMATS`."""
