@@ -15,7 +15,7 @@ import numpy as np
 
 from symgrasp.errors import NoPlanError
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.motion.choosing import Failure, failures_in_words, moving_plans
+from symgrasp.motion.choosing import MOST_TRIED, Failure, failures_in_words, moving_plans
 from symgrasp.motion.record import from_plan, with_motion
 from symgrasp.motion.times import timing
 from symgrasp.object.manifold import ROLLS, wrap
@@ -65,6 +65,9 @@ PLANS_PER_BATCH = 10
 
 SEARCH = 0.5
 """Share of a planner's progress in which it searches; in the rest the plans are listed."""
+
+FIRST = 0.5
+"""Share of the progress of a motion in which the first plan is tried; in the rest all others are."""
 
 FeasibilityMaps = Mapping[tuple[str, str], FeasibilityMap]
 """(task, arm) → map."""
@@ -259,12 +262,24 @@ class PlanService:
         Raises:
             NoPlanError: none has one; says why.
         """
+        progress = rising(progress)
         self._progress, self._share = progress, 0.0
         timing.load(progress)
         failures: list[Failure] = []
+        most = MOST_TRIED if request.more else len(request.plans)
+
+        def tell(share: float) -> None:
+            """Tell the progress over all plans from that of one."""
+            if tried := len(failures):
+                share = FIRST + (1 - FIRST) * (tried - 1 + share) / (most - 1)
+            else:  # mostly the first one has a motion
+                share *= FIRST
+            self._share = share
+            progress(share)
+
         scene = with_poses(request.scene, request.poses)
         plans = chain(request.plans, self._not_listed() if request.more else ())
-        with closing(moving_plans(scene, plans, failures, progress=progress)) as found:
+        with closing(moving_plans(scene, plans, failures, progress=tell)) as found:
             for plan, motion in found:
                 index, reasons = len(failures), tuple(failure.reason for failure in failures)
                 count = max(index + 1 - len(request.plans), 0)

@@ -18,7 +18,7 @@ from symgrasp.progress import Progress, part_of
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
 
-__all__ = ["Failure", "best_motion", "failures_in_words", "moving_plans"]
+__all__ = ["MOST_TRIED", "Failure", "best_motion", "failures_in_words", "moving_plans"]
 
 MOST_TRIED = 200
 """Most plans that are tried."""

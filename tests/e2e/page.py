@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -94,7 +95,7 @@ class GraspPage:
     def alerts(self) -> Locator:
         return self.frame.get_by_role("alert").filter(visible=True).and_(self.frame.locator(".sg-note"))
 
-    def text(self, text: str) -> Locator:
+    def text(self, text: str | re.Pattern[str]) -> Locator:
         """What is seen of a text; tabs that were looked at before are still there, out of sight."""
         return self.frame.get_by_text(text).filter(visible=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ from symgrasp.plan.verify import verify
 from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.planners.planning import plan_bimanual, plan_sequential
 from symgrasp.scene.scene import Scene
+from tests.app.caught import caught_content
+from tests.conftest import write_scene
 from tests.e2e.page import GraspPage
 
 SCREENSHOTS = Path(__file__).parent / "screenshots"
@@ -261,6 +264,35 @@ def test_a_motion_is_found_scrubbed_played_and_downloaded(open_page, tmp_path):
     plan = Plan.load(path)
     assert plan.motion
     assert verify(plan).holds
+
+
+def test_a_motion_that_does_not_exist_is_sought_cancelled_and_said_to_be_missing(open_page, tmp_path):
+    content = caught_content()
+    content["map"] |= {"heights": 6, "angles": 12}
+    page = open_page()
+    page.tab("Files")
+    with page.page.expect_file_chooser() as chooser:
+        page.button("Open a scene (YAML or ZIP)").click()
+    chooser.value.set_files(write_scene(tmp_path, content))
+    page.expect_title("caught")
+    page.tab("Sequence")
+    page.button("One grasp for all tasks").click()
+    expect(page.text("One grasp for 1 task: h = ")).to_be_visible()
+    page.button("With motion").click()
+    for share in r"\d+", r"[5-9]\d":  # it moves, on to the plans behind the first
+        expect(page.text(re.compile(rf"Planning the motion … {share} %"))).to_be_visible()
+    page.button("Cancel").click()
+    expect(page.text("Planning the motion")).to_have_count(0)
+    expect(page.text("One grasp for 1 task: h = ")).to_be_visible()
+    page.button("With motion").click()
+    expect(page.alerts).to_contain_text(
+        re.compile("no motion: plans? 1.*: the reach of panda to pick: no way was found in"), timeout=120_000
+    )
+    expect(page.text("Planning the motion")).to_have_count(0)
+    expect(page.button("With motion")).to_be_visible()
+    expect(page.text("One grasp for 1 task: h = ")).to_be_visible()
+    shoot(page, "no_motion")
+    assert page.complaints == []
 
 
 @pytest.mark.parametrize("size", [(390, 844), (1280, 800)], ids=["390", "1280"])

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from contextlib import closing
+from itertools import pairwise
 
 import pytest
 
 from app.compute import plan_service
 from app.compute.map_service import MapService
-from app.compute.plan_service import PLANS_PER_BATCH, PlanRequest, PlanService
+from app.compute.plan_service import FIRST, PLANS_PER_BATCH, MotionRequest, PlanRequest, PlanService
 from app.state.plans.plan_results import PlanKind
-from symgrasp.errors import Cancelled
+from symgrasp.errors import Cancelled, NoPlanError
 from symgrasp.planners.planning import plan_sequential
+from symgrasp.scene.scene import load_scene
+from tests.app.caught import caught_content
 from tests.conftest import load_small
 
 CASES: list[tuple[str, PlanKind, str, str]] = [
@@ -94,3 +97,26 @@ def test_one_may_cancel_between_the_prints_of_tasks_and_their_gaps(monkeypatch):
         )
     plan_service.plan_result(plan_sequential(scene), scene, lambda: events.append("told"))
     assert events == ["told", "step"] * 2 * 3  # a print and a gap for each of three tasks
+
+
+def test_the_progress_of_a_motion_rises_over_all_plans_that_have_none():
+    scene = load_scene(caught_content())
+    with closing(MapService()) as maps, closing(PlanService(maps, ())) as service:
+        found = service.plan(PlanRequest(scene, "sequential", "best", "panda"), {}, lambda _: None)
+        plans = tuple(result.plan for result in found.plans[:3])
+        shares: list[float] = []
+        with pytest.raises(NoPlanError, match=r"no motion: plan.*: the reach of panda to pick: no way"):
+            service.motion(MotionRequest(scene, {}, plans), shares.append)
+        assert shares == sorted(shares)
+        for low, high in pairwise((0.0, FIRST, (1 + FIRST) / 2, 1.0)):  # it moves while each is tried
+            assert len({share for share in shares if low <= share < high}) > 1
+        told = []
+
+        def progress(share: float) -> None:
+            told.append(share)
+            if share > FIRST:
+                raise Cancelled
+
+        with pytest.raises(Cancelled):
+            service.motion(MotionRequest(scene, {}, plans), progress)
+        assert [share > FIRST for share in told] == [False] * (len(told) - 1) + [True]  # no further
