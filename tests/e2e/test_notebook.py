@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 from nbclient import NotebookClient
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, WebSocket, expect
 
+from app.server.door.front_door import MAP
+from symgrasp.feasibility.create import create_map
+from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.poses import rotation_z
+from symgrasp.scene.scene import Scene
+from tests.app.shown_map import ShownMap
 from tests.conftest import ROOT
 from tests.e2e.other_host import served
 from tests.e2e.page import WAIT
+from tests.e2e.test_page import drawn
+
+SCENE = Scene.load("soda_can").with_settings(heights=12, angles=24, redundancy=4)
 
 CELL = """import symgrasp as sg
 scene = sg.load_scene("soda_can").with_settings(heights=12, angles=24, redundancy=4)
@@ -39,6 +51,22 @@ def shown_by(thread: ThreadPoolExecutor, tmp_path: Path) -> Iterator[list[str]]:
         thread.submit(kernel.__exit__, None, None, None).result()
 
 
+def _take_maps(socket: WebSocket, shown: ShownMap) -> None:
+    def take(message: bytes | str) -> None:
+        assert isinstance(message, bytes)
+        shown.take(message)
+
+    if MAP in socket.url:
+        socket.on("framereceived", take)
+
+
+def _wait_for_map(page: Page, shown: ShownMap, expected: FeasibilityMap) -> None:
+    deadline = time.monotonic() + WAIT / 1000
+    while (picture := shown.picture()) is None or not np.array_equal(picture, drawn(expected)):
+        assert time.monotonic() < deadline, "the map never became right"
+        page.evaluate("() => new Promise(done => requestAnimationFrame(done))")
+
+
 @pytest.fixture
 def thread() -> Iterator[ThreadPoolExecutor]:
     with ThreadPoolExecutor(1) as thread:  # an event loop of Playwright runs in this one
@@ -50,11 +78,14 @@ def test_a_notebook_shows_the_live_page_and_later_the_3d_view(browser: Browser, 
     context.set_default_timeout(WAIT)
     try:
         page = context.new_page()
+        shown = ShownMap()
+        page.on("websocket", lambda socket: _take_maps(socket, shown))
         with shown_by(thread, tmp_path) as (scene, turned), served(scene) as address:
             page.goto(address)
             live = page.frame_locator("iframe")
             expect(live.locator("#title")).to_have_text("soda_can · pick · panda")
             expect(live.locator("#nothing")).to_be_hidden()
+            _wait_for_map(page, shown, create_map(SCENE))
             # A click on the map is one in the scene: both are of one session.
             live.get_by_test_id("map").click(position={"x": 120, "y": 120})
             panel = live.frame_locator("#view")
@@ -64,6 +95,9 @@ def test_a_notebook_shows_the_live_page_and_later_the_3d_view(browser: Browser, 
                 expect(live.locator("#turn")).to_contain_text("turned by 0.00°")
                 expect(live.locator("#title")).to_have_text("soda_can · pick · panda")
                 expect(live.locator("#nothing")).to_be_hidden()
+                pick = SCENE.task("pick")
+                pose = pick.T_world_object @ rotation_z(0.5)
+                _wait_for_map(page, shown, create_map(SCENE.with_task(replace(pick, T_world_object=pose))))
         assert not list(tmp_path.iterdir())
         with served(scene) as address:
             page.goto(address)

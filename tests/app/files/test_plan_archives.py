@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from app.choices.object_choice import from_mesh
 from app.compute.map_service import MapService
 from app.compute.plan_service import PlanService
 from app.files.archives import pack, unpack
@@ -19,8 +20,11 @@ from symgrasp.errors import InputError, PlanError, SymgraspError
 from symgrasp.files import SCENES_DIR
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify
-from symgrasp.scene.content import content_sha256
+from symgrasp.planners.planning import plan_sequential
+from symgrasp.scene.content import content_sha256, file_references
+from tests.app.choices.test_object_choice import stl
 from tests.app.robot_archives import plan_of_upload
+from tests.conftest import load_small
 
 
 def quiet(share: float) -> None:
@@ -150,3 +154,13 @@ def test_the_command_line_says_to_unpack_it(archive, tmp_path, capsys):
 
 def test_without_uploads_a_plan_is_one_file(plan):
     assert plan_file(plan, "JSON", [])[0] == "bottle_on_table_sequential.json"
+
+
+def test_a_plan_of_an_uploaded_mesh_needs_no_file():
+    choice = from_mesh("can.stl", stl(), 1.0)
+    scene = load_small("bottle_on_table").with_object(choice.name, choice.profile)
+    name, content = plan_file(plan_sequential(scene), "JSON", [])
+    plan = Plan.parse(content, name)
+    files = [holder[key] for _, holder, key in file_references(plan.scene.content)]
+    assert files == ["package://pybullet_data/franka_panda/panda.urdf"]
+    assert verify(plan).holds
