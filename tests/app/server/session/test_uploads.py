@@ -28,7 +28,7 @@ from tests.app import failures
 from tests.app.choices.test_object_choice import stl
 from tests.app.robot_archives import plan_of_upload
 from tests.app.server.session.served import Server, ready, start_server, title
-from tests.app.state.test_plan_results import planned
+from tests.app.state.states import planned
 from tests.app.wire import WAIT, Wire
 from tests.hostile import chain_urdf, doubling_yaml
 
