@@ -1,8 +1,9 @@
 """The geometry of an arm at any value of its redundancy, compiled: what `Chain.geometry` has for samples.
 
 The locked joint turns all that comes after it about its axis, as a rigid body: axes, tool, and the points
-where axes meet. A triple or a pair of axes on both sides of the locked joint meets on its axis, and stays
-there.
+where axes meet. A triple of axes on both sides of the locked joint meets on its axis, and stays
+there. Of arms without a triple, where the pair meets and how the other axes lie is computed anew at every
+value, unless the locked joint is the last.
 """
 
 from __future__ import annotations
@@ -30,8 +31,10 @@ from symgrasp.ik.chain import (
     WRIST_SEEN,
 )
 from symgrasp.ik.compiled import CompiledIK
-from symgrasp.ik.pair.geometry import PAIR_PHI
-from symgrasp.ik.vectors import STRICT, cross, dot, minus, plus, rotate, vec
+from symgrasp.ik.families import BESIDE, chain_geometries, free_joints, parallel_below
+from symgrasp.ik.pair.at_phi import write_pair
+from symgrasp.ik.pair.geometry import MEETING_PAIR, PAIR_PHI, SHIFTED, WRIST_POINT
+from symgrasp.ik.vectors import STRICT, cross, dot, minus, plus, rotate, row, vec
 from symgrasp.poses import Array
 
 __all__ = ["Locked", "geometry_at", "locked_joint"]
@@ -45,6 +48,9 @@ class Locked(NamedTuple):
         phi: that value (rad).
         axis: (3,) axis of the locked joint, in the base.
         centre: (3,) a point on it.
+        points: (6, 3) a point on each free joint's axis, in the order of the closed form, where the geometry
+            of an arm without a spherical triple is computed from them; else (0, 3).
+        parallel: sine of the angle between the axes of joints 5 and 6 below which they do not meet.
         after: (8,) which parts the locked joint turns: the free joints 1 to 6 in the order of the closed
             form, the point where the triple meets, and that where the pair does.
         place: index of the redundancy in the row.
@@ -57,6 +63,8 @@ class Locked(NamedTuple):
     phi: float
     axis: Array
     centre: Array
+    points: Array
+    parallel: float
     after: np.ndarray
     place: int
     spherical: bool
@@ -67,19 +75,31 @@ class Locked(NamedTuple):
 def locked_joint(ik: CompiledIK) -> Locked | None:
     """Return what is needed to compute an arm's geometry at any φ, or None where that is not known.
 
-    It is known for arms with a spherical triple, and for others whose last joint is locked.
+    It is known for arms with a spherical triple, for those of which two axes meet, and for others whose last
+    joint is locked.
     """
     joint = ik.locked
     family = int(ik.chain.joint[8])
-    if joint is None or ik.arm.pitched or (family != SPHERICAL and joint != ik.arm.dof - 1):
+    if joint is None or ik.arm.pitched or (family == THREE_PARALLEL and joint != ik.arm.dof - 1):
         return None
     after = ik.chain.joint[:6] > joint
     lower, upper = one_turn(float(ik.arm.lower[joint]), float(ik.arm.upper[joint]))
+    row, phi, points, parallel = ik.chain.geometry[0].copy(), float(ik.phi[0]), np.empty((0, 3)), 0.0
+    if family == MEETING_PAIR and joint != ik.arm.dof - 1:
+        own = free_joints(ik.arm, joint, phi, bool(ik.chain.joint[7]))
+        points = np.ascontiguousarray(own.o)
+        row[:P0] = np.concatenate([own.h.ravel(), own.R0.ravel()])
+        row[P0 : P0 + 3], row[SHIFTED] = own.p0, 0.0
+        known = chain_geometries(ik.arm, joint, ik.phi)
+        assert known is not None  # or there would be no solver
+        parallel = parallel_below(known[0])
     return Locked(
-        row=ik.chain.geometry[0].copy(),
-        phi=float(ik.phi[0]),
+        row=row,
+        phi=phi,
         axis=ik.arm.H[joint].copy(),
         centre=np.cumsum(ik.arm.P, axis=0)[joint].copy(),
+        points=points,
+        parallel=parallel,
         after=np.array([*after, after[:3].all(), after[4:].all()]),
         place={SPHERICAL: PHI, THREE_PARALLEL: PARALLEL_PHI}.get(family, PAIR_PHI),
         spherical=family == SPHERICAL,
@@ -91,6 +111,14 @@ def locked_joint(ik: CompiledIK) -> Locked | None:
 @njit(**STRICT)
 def geometry_at(locked, phi, g):
     """Write the geometry (m,) of an arm at a value φ (rad) of its redundancy into g."""
+    if len(locked.points):
+        if not _pair_at(locked, phi, g):
+            shifted = _pair_at(locked, phi + BESIDE, g)
+            g[SHIFTED] = 1.0
+            if not shifted:
+                g[WRIST_POINT] = math.nan  # nothing is found there
+        g[locked.place] = phi
+        return
     for i in range(len(g)):
         g[i] = locked.row[i]
     g[locked.place] = phi
@@ -117,6 +145,41 @@ def geometry_at(locked, phi, g):
     _constants(g, MIDDLE, vec(g, AXES + 9), a, b)
     g[MIDDLE + 2] -= 0.5 * (dot(a, a) + dot(b, b))
     _constants(g, TRIPLE, vec(g, AXES + 3), vec(g, AXES + 6), vec(g, AXES))
+
+
+@njit(**STRICT)
+def _pair_at(locked, phi, g):
+    """Write the geometry of an arm of which two axes meet; return whether they do at φ (rad)."""
+    for i in range(len(g)):
+        g[i] = locked.row[i]
+    axis = vec(locked.axis, 0)
+    s, c = math.sin(phi - locked.phi), math.cos(phi - locked.phi)
+    for j in range(3):
+        x, y, z = rotate(axis, s, c, (g[R0 + j], g[R0 + 3 + j], g[R0 + 6 + j]))
+        g[R0 + j], g[R0 + 3 + j], g[R0 + 6 + j] = x, y, z
+    _put(g, P0, _turned(locked, s, c, vec(g, P0)))
+    for k in range(6):
+        if locked.after[k]:
+            _put(g, AXES + 3 * k, rotate(axis, s, c, vec(g, AXES + 3 * k)))
+    p = (
+        _point(locked, s, c, 0), _point(locked, s, c, 1), _point(locked, s, c, 2),
+        _point(locked, s, c, 3), _point(locked, s, c, 4), _point(locked, s, c, 5),
+    )  # fmt: skip
+    return write_pair(g, p, locked.parallel)
+
+
+@njit(**STRICT)
+def _point(locked, s, c, k):
+    """Return a point on the axis of a free joint, turned by the locked joint by an angle of that sine."""
+    point = row(locked.points, k)
+    return _turned(locked, s, c, point) if locked.after[k] else point
+
+
+@njit(**STRICT)
+def _turned(locked, s, c, point):
+    """Return a point (3,) turned about the axis of the locked joint."""
+    centre = vec(locked.centre, 0)
+    return plus(rotate(vec(locked.axis, 0), s, c, minus(point, centre)), centre)
 
 
 @njit(**STRICT)

@@ -13,7 +13,10 @@ from symgrasp.ik.pair.geometry import PairGeometry, pair_geometry
 from symgrasp.poses import Array, rotation_about
 from symgrasp.robot.robot import Arm
 
-__all__ = ["COARSE", "EXACT", "Precision", "chain_geometries", "cosine_constants", "has_exact_pair"]
+__all__ = [
+    "BESIDE", "COARSE", "EXACT", "Joints", "Precision", "chain_geometries", "cosine_constants", "free_joints",
+    "has_exact_pair", "parallel_below",
+]  # fmt: skip
 
 
 class Precision(NamedTuple):
@@ -58,7 +61,7 @@ SLACK_RATIO = 100.0
 by. A root's radicand is the ratio of lengths, of which the shortest are a centimetre."""
 
 
-class _Joints(NamedTuple):
+class Joints(NamedTuple):
     """Six free joints in the order of a closed form, at one value of the locked joint.
 
     Attributes:
@@ -114,7 +117,7 @@ def _geometries(
     arm = _Screws(*(np.frombuffer(part).reshape(-1, 3) for part in screws))
     for precision, find in _FAMILIES:
         for backwards in (False, True):
-            rows = [find(_joints(arm, locked, float(value), backwards), precision) for value in phi]
+            rows = [find(free_joints(arm, locked, float(value), backwards), precision) for value in phi]
             known = [row for row in rows if row is not None]
             # At single values the axes of a pair may be parallel, or so nearly that nothing can be computed.
             if known and (
@@ -135,11 +138,11 @@ def _geometries(
 
 def has_exact_pair(arm: Arm, locked: int | None, phi: float) -> bool:
     """Whether two axes at one end of an arm meet without being moved, with a joint locked at φ."""
-    return any(_meeting_pair(_joints(arm, locked, phi, end), EXACT) is not None for end in (False, True))
+    return any(_meeting_pair(free_joints(arm, locked, phi, end), EXACT) is not None for end in (False, True))
 
 
-def _joints(arm: Arm | _Screws, locked: int | None, phi: float, backwards: bool) -> _Joints:
-    """Return the free joints of an arm with a joint locked at φ."""
+def free_joints(arm: Arm | _Screws, locked: int | None, phi: float, backwards: bool) -> Joints:
+    """Return the free joints of an arm with a joint locked at φ (rad), read from the tool if backwards."""
     h, o = arm.H.copy(), np.cumsum(arm.P, axis=0)
     R0, p0, o = arm.R0, o[-1], o[:-1].copy()
     if locked is not None:
@@ -151,10 +154,10 @@ def _joints(arm: Arm | _Screws, locked: int | None, phi: float, backwards: bool)
         h, o = np.delete(h, locked, axis=0), np.delete(o, locked, axis=0)
     if backwards:
         h, o = -h[::-1], o[::-1]
-    return _Joints(backwards, h, o, R0, p0, phi)
+    return Joints(backwards, h, o, R0, p0, phi)
 
 
-def _spherical(joints: _Joints, precision: Precision) -> SphericalGeometry | None:
+def _spherical(joints: Joints, precision: Precision) -> SphericalGeometry | None:
     """Return the geometry of joints with a spherical triple and a pair that meet, else None."""
     backwards, h, o, R0, p0, phi = joints
     triple, pair = _common_point(h[:3], o[:3], precision), _common_point(h[4:], o[4:], precision)
@@ -170,13 +173,13 @@ def _spherical(joints: _Joints, precision: Precision) -> SphericalGeometry | Non
     return SphericalGeometry(backwards, h, R0, p0, S, W, a, b, middle, turns, phi, slack)
 
 
-def _three_parallel(joints: _Joints, precision: Precision) -> ParallelGeometry | None:
+def _three_parallel(joints: Joints, precision: Precision) -> ParallelGeometry | None:
     """Return the geometry of joints of which 2, 3, 4 are parallel and 5, 6 meet, else None."""
     pair = _common_point(joints.h[4:], joints.o[4:], precision)
     return None if pair is None else _parallel_geometry(joints, precision, pair[0], pair[0], pair[1])
 
 
-def _three_parallel_skew(joints: _Joints, precision: Precision) -> ParallelGeometry | None:
+def _three_parallel_skew(joints: Joints, precision: Precision) -> ParallelGeometry | None:
     """Return the geometry of joints of which 2, 3, 4 are parallel and 5, 6 do not meet, else None."""
     h, o = joints.h, joints.o
     normal = np.cross(h[4], h[5])
@@ -187,7 +190,7 @@ def _three_parallel_skew(joints: _Joints, precision: Precision) -> ParallelGeome
 
 
 def _parallel_geometry(
-    joints: _Joints, precision: Precision, O5: Array, W: Array, off: float
+    joints: Joints, precision: Precision, O5: Array, W: Array, off: float
 ) -> ParallelGeometry | None:
     """Return the geometry of joints of which 2, 3, 4 are parallel, else None.
 
@@ -227,7 +230,7 @@ def _parallel_geometry(
     )
 
 
-def _meeting_pair(joints: _Joints, precision: Precision) -> PairGeometry | None:
+def _meeting_pair(joints: Joints, precision: Precision) -> PairGeometry | None:
     """Return the geometry of joints of which 5 and 6 meet, else None."""
     backwards, h, o, R0, p0, phi = joints
     pair = _common_point(h[4:], o[4:], precision)
@@ -243,11 +246,11 @@ def _beside(
     """
     if not isinstance(known, PairGeometry):
         return None
-    beside = _meeting_pair(_joints(arm, locked, phi + BESIDE, known.backwards), precision)
+    beside = _meeting_pair(free_joints(arm, locked, phi + BESIDE, known.backwards), precision)
     return None if beside is None else beside._replace(phi=phi, shifted=1.0)
 
 
-_FAMILIES: tuple[tuple[Precision, Callable[[_Joints, Precision], ChainGeometry | None]], ...] = (
+_FAMILIES: tuple[tuple[Precision, Callable[[Joints, Precision], ChainGeometry | None]], ...] = (
     (EXACT, _spherical),
     (EXACT, _three_parallel),
     (EXACT, _three_parallel_skew),
@@ -288,6 +291,11 @@ def cosine_constants(k: Array, a: Array, b: Array) -> Array:
     return np.array([middle, np.hypot(sine, cosine), part, np.sin(middle), np.cos(middle)])
 
 
+def parallel_below(precision: Precision) -> float:
+    """Return the length of the cross product of unit axes below which they are parallel, and do not meet."""
+    return PARALLEL if precision is EXACT else COARSE.sine
+
+
 def _common_point(h: Array, o: Array, precision: Precision) -> tuple[Array, float] | None:
     """Return the point (3,) where lines meet, and how far off it they are at most (m).
 
@@ -299,8 +307,7 @@ def _common_point(h: Array, o: Array, precision: Precision) -> tuple[Array, floa
     Returns:
         None where they do not meet, or two successive ones are parallel.
     """
-    parallel = PARALLEL if precision is EXACT else COARSE.sine
-    if (np.linalg.norm(np.cross(h[:-1], h[1:]), axis=1) < parallel).any():
+    if (np.linalg.norm(np.cross(h[:-1], h[1:]), axis=1) < parallel_below(precision)).any():
         return None
     across = np.eye(3) - h[:, :, None] * h[:, None, :]
     point = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, o))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from symgrasp.compiling import njit
 from symgrasp.ik.chain import P0, R0
 from symgrasp.ik.vectors import (
@@ -33,6 +35,7 @@ __all__ = [
     "outside",
     "settle",
     "sine",
+    "spread_in",
     "tool_motion",
     "turn_between",
     "within",
@@ -53,6 +56,9 @@ NEARLY_ALIGNED = 1e-20
 
 ROUNDED_ALIGNED, MOST_ALIGNED = 10.0, 1e-3
 """The same of an arm whose geometry is rounded, as a share of the slack of its roots, and at most."""
+
+SPREAD = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
+"""Numbers whose multiples, less whole ones, spread evenly (R. Kronecker's sequence), one for each joint."""
 
 BLURRED = 1e-4
 """Sine of a joint below which two branches are so near that other joints may be off by more than the
@@ -167,6 +173,16 @@ def outside(limits, joint, s, c):
     It is inside when the value nearest to the middle of the range is within half the range of it.
     """
     return c * limits[3, joint] + s * limits[4, joint] < limits[5, joint]
+
+
+@njit(**STRICT)
+def spread_in(limits, i, row):
+    """Write the i-th of joint values (n,) that spread evenly over the limits, or a turn of them."""
+    for j in range(row.shape[0]):
+        first = max(limits[0, j], limits[2, j] - math.pi)
+        last = min(limits[1, j], limits[2, j] + math.pi)
+        share = (i + 1) * SPREAD[j]
+        row[j] = first + (share - math.floor(share)) * (last - first)
 
 
 @njit(**STRICT)

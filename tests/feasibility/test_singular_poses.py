@@ -38,7 +38,7 @@ def starter(name: str) -> Scene:
     return Scene.from_content(content)
 
 
-@pytest.mark.parametrize("name", ["panda", "iiwa"])
+@pytest.mark.parametrize("name", ["panda", "iiwa", "gen3", "alex", "tiago_pro"])
 def test_what_is_free_is_feasible(name):
     """The object stands where the tool is at a configuration; PyBullet says whether that one is free."""
     scene = starter(name)

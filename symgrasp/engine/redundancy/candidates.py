@@ -24,13 +24,27 @@ from symgrasp.engine.retreat_search import arm_retreats, copy_row, moved_along
 from symgrasp.engine.search_types import BLOCKED, HIT, RETREAT_UNDECIDED, UNBALANCED
 from symgrasp.ik.at_phi import geometry_at
 from symgrasp.ik.branches import branches_at
+from symgrasp.ik.chain import Chain
+from symgrasp.ik.joints import spread_in
+from symgrasp.ik.newton import linearise
+from symgrasp.ik.self_motion import into_limits
 from symgrasp.ik.spans import FINEST, HALVES, find_spans, span_over
 from symgrasp.ik.vectors import STRICT
 
-__all__ = ["arm_gap", "find_branches", "is_to_check", "plan_values", "retreat_gap"]
+__all__ = ["arm_gap", "find_branches", "is_to_check", "plan_sought", "plan_values", "retreat_gap"]
 
 NARROW = 4.0 * FINEST
 """Width (rad) of a span up to which a value on it is told: those beside its ends may be off it."""
+
+SOUGHT, SEEK_STEPS = 48, 40
+"""Joint values all over the range from which Newton's method starts with all joints free, and its steps."""
+
+ALMOST, MORE_STEPS = 1e-4, 300
+"""Error (m and rad) of the tool after them from which it goes on, and its further steps: at the limit of the
+reach it converges slowly."""
+
+APART = 1e-4
+"""Distance (rad) of two values to which it leads that are told apart."""
 
 
 @njit(**STRICT)
@@ -53,6 +67,45 @@ def plan_values(nodes, covered, T):
                     phi = spans.ends[half, k, end] + (FINEST if side else -FINEST)
                     if locked.lower < phi < locked.upper:
                         count = _sort_in(planned, count, phi)
+    return _plan_between(nodes, covered, count)
+
+
+@njit(**STRICT)
+def plan_sought(nodes, branches, covered, T):
+    """Do what `plan_values` does with values at which Newton's method reaches a pose (4, 4), all joints free.
+
+    They are for arms without a closed form, whose branches may exist on short parts only, or at single
+    values. Joint values all over lead to them.
+
+    Returns:
+        How many there are; 0 where it leads to none.
+    """
+    locked, planned, chain, row = covered.locked, nodes.planned, nodes.chain, nodes.half
+    loose = Chain(chain.geometry, chain.joint, chain.limits, chain.leeway, chain.forward, nodes.unlocked)
+    J, A = branches.memory.J, branches.memory.A
+    planned[0], planned[1] = locked.lower, locked.upper
+    count = 2
+    for i in range(SOUGHT):
+        spread_in(chain.limits, i, row)
+        if not into_limits(loose, row, T, SEEK_STEPS, J, A):
+            _, move, turn, _ = linearise(chain.forward, nodes.unlocked, row, T, J)
+            if not (max(move, turn) < ALMOST and into_limits(loose, row, T, MORE_STEPS, J, A)):
+                continue
+        phi = row[chain.joint[6]]
+        if not locked.lower < phi < locked.upper:  # a turn without limits is covered once
+            phi -= 2.0 * math.pi * math.floor((phi - locked.lower) / (2.0 * math.pi))
+        near = not locked.lower < phi < locked.upper
+        for k in range(count):
+            near |= abs(planned[k] - phi) < APART
+        if not near:
+            count = _sort_in(planned, count, phi)
+    return _plan_between(nodes, covered, count) if count > 2 else 0
+
+
+@njit(**STRICT)
+def _plan_between(nodes, covered, count):
+    """Add values between those that are planned, where branches reach the pose; return the new count."""
+    spans, planned = nodes.spans, nodes.planned
     for k in range(count - 2, -1, -1):
         low, high = planned[k], planned[k + 1]
         if spans.number[0] < 0 or span_over(spans, 0, low, high) or span_over(spans, 1, low, high):
@@ -93,6 +146,7 @@ def is_to_check(nodes, branches, at, b):
     # Of excluded ones, too: they may be where another's curve ends.
     copy_row(branches.q[0][b], nodes.q[at, b])
     nodes.state[at, b] = SKIPPED
+    nodes.reached[0] = True
     return not nodes.excluded[at, b]
 
 

@@ -25,6 +25,7 @@ from symgrasp.engine.redundancy.candidates import (
     arm_gap,
     find_branches,
     is_to_check,
+    plan_sought,
     plan_values,
     retreat_gap,
 )
@@ -146,10 +147,24 @@ def _cover_cell(nodes, scratch, branches, moving, pieces, tree, inputs, balance,
             result.proven[i] = True
             return
     scratch.hit[2] = -1
-    nodes.used[:] = False
-    planned = plan_values(nodes, covered, T)
-    left = _slot(nodes, nodes.planned[0])
+    nodes.reached[0] = False
     those = i, T, inputs.row[run], hand, tool
+    parts = nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those
+    _cover_parts(*parts, plan_values(nodes, covered, T))
+    if not (nodes.reached[0] or covered.locked.spherical):
+        _cover_parts(*parts, plan_sought(nodes, branches, covered, T))
+
+
+@njit(**STRICT)
+def _cover_parts(
+    nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, planned
+):
+    """Cover a cell between planned values of φ, so many; stop at the first that is free."""
+    i = those[0]
+    nodes.used[:] = False
+    if planned == 0:
+        return
+    left = _slot(nodes, nodes.planned[0])
     free = _visit(
         nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, left,
         covered.step,

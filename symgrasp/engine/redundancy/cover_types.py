@@ -115,11 +115,13 @@ class Nodes(NamedTuple):
         excluded: (SLOTS, B) which branches are excluded on the part that ends at a slot.
         stack: (SLOTS,) slots of the ends of parts.
         used: (SLOTS,) which slots are taken.
+        reached: (1,) whether a branch existed at any of the values so far.
         spans: where branches reach the pose.
         planned: (PLANNED,) values of φ (rad) with which the search begins.
         end: (2, 12) poses of a pair of pieces at the other end of a part.
         placed: (2, 12) where the pieces of a pair were before it was looked at.
-        half: (n,) joint values half way.
+        half: (n,) joint values half way, or where Newton's method is.
+        unlocked: (n,) that no joint is locked.
         middle: (12,) pose of a piece there.
     """
 
@@ -140,11 +142,13 @@ class Nodes(NamedTuple):
     excluded: np.ndarray
     stack: np.ndarray
     used: np.ndarray
+    reached: np.ndarray
     spans: Spans
     planned: Array
     end: Array
     placed: Array
     half: Array
+    unlocked: np.ndarray
     middle: Array
 
 
@@ -168,10 +172,12 @@ def new_nodes(chain: Chain, locked: Locked, branches: int, joints: int) -> Nodes
         excluded=np.zeros((SLOTS, branches), dtype=bool),
         stack=np.empty(SLOTS, dtype=np.int64),
         used=np.zeros(SLOTS, dtype=bool),
+        reached=np.zeros(1, dtype=bool),
         spans=new_spans(locked),
         planned=np.empty(PLANNED),
         end=np.empty((2, 12)),
         placed=np.empty((2, 12)),
         half=np.empty(joints),
+        unlocked=np.zeros(joints, dtype=bool),
         middle=np.empty(12),
     )

@@ -12,7 +12,7 @@ from symgrasp.poses import Array
 __all__ = [
     "CHAIN_DIRECTION", "CHAIN_POINT", "COSINE", "COSINE_56", "FIRST_AXIS", "FIRST_POINT", "FRAME", "GENERAL",
     "KIND", "LENGTH", "MEETING", "MEETING_PAIR", "OUTER_LAST", "PAIR_PHI", "PARALLEL", "SHIFTED",
-    "SHOULDER_POINT", "SINE", "WRIST_POINT", "PairGeometry", "pair_geometry",
+    "SHOULDER_POINT", "SINE", "SPECIAL", "VARIES", "WORTH", "WRIST_POINT", "PairGeometry", "pair_geometry",
 ]  # fmt: skip
 
 WRIST_POINT, SHOULDER_POINT, FRAME, FIRST_AXIS, FIRST_POINT = 30, 33, 36, 45, 48

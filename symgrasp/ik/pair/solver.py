@@ -36,10 +36,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from symgrasp.compiling import njit
-from symgrasp.ik.joints import misses, nearest_turn, settle, tool_motion
+from symgrasp.ik.joints import misses, nearest_turn, settle, spread_in, tool_motion
 from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair.geometry import PAIR_PHI, SHIFTED
 from symgrasp.ik.pair.polynomial import equations_of, may_reach
@@ -55,9 +53,6 @@ PAIR_BRANCHES = 16
 MORE_STARTS, MORE_STEPS = 24, 20
 """Joint values all over the range from which a singular pose is sought where nothing else leads inside the
 limits, and steps from each."""
-
-SPREAD = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
-"""Numbers whose multiples, less whole ones, spread evenly (R. Kronecker's sequence), one for each joint."""
 
 SAME = 1e-7
 """Largest difference (rad) of the joints of configurations that count as one."""
@@ -136,11 +131,7 @@ def _search_everywhere(chain, g, T, q, exists, inside, memory, found):
     """Look for a configuration inside the limits from joint values all over; return how many there are."""
     for i in range(MORE_STARTS):
         row = memory.row
-        for j in range(row.shape[0]):
-            first = max(chain.limits[0, j], chain.limits[2, j] - math.pi)
-            last = min(chain.limits[1, j], chain.limits[2, j] + math.pi)
-            share = (i + 1) * SPREAD[j]
-            row[j] = first + (share - math.floor(share)) * (last - first)
+        spread_in(chain.limits, i, row)
         if chain.joint[6] >= 0:
             row[chain.joint[6]] = nearest_turn(chain.limits, chain.joint[6], g[PAIR_PHI])
         if into_limits(chain, row, T, MORE_STEPS, memory.J, memory.A):

@@ -1,0 +1,162 @@
+"""The geometry of arms of which the axes of the last two joints meet, from their axes. Compiled.
+
+It is what `symgrasp.ik.pair.geometry.pair_geometry` returns; see there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from symgrasp.compiling import njit
+from symgrasp.ik.chain import AXES
+from symgrasp.ik.pair.geometry import (
+    CHAIN_DIRECTION,
+    CHAIN_POINT,
+    COSINE,
+    COSINE_56,
+    FIRST_AXIS,
+    FIRST_POINT,
+    FRAME,
+    GENERAL,
+    KIND,
+    LENGTH,
+    MEETING,
+    OUTER_LAST,
+    PARALLEL,
+    SHOULDER_POINT,
+    SINE,
+    SPECIAL,
+    VARIES,
+    WORTH,
+    WRIST_POINT,
+)
+from symgrasp.ik.vectors import STRICT, cross, dot, minus, plus, vec
+
+__all__ = ["write_pair"]
+
+
+@njit(**STRICT)
+def write_pair(g, points, parallel):
+    """Write the parts of a `PairGeometry` that follow from its axes, which are in g.
+
+    Args:
+        g: (77,) a packed geometry.
+        points: six points (3,), one on each axis.
+        parallel: sine of the angle between the axes of joints 5 and 6 below which they do not meet.
+
+    Returns:
+        Whether there is such a geometry.
+    """
+    meets, W = _meeting_point(g, points, parallel)
+    k, m, a, b = vec(g, AXES + 3), vec(g, AXES + 6), points[1], points[2]
+    known, shoulder, elbow, n, length, s = _common_normal(k, a, m, b)
+    if not (meets and known):
+        return False
+    kind = MEETING if length < SPECIAL else PARALLEL if s < SPECIAL else GENERAL
+    _put(g, WRIST_POINT, W)
+    _put(g, SHOULDER_POINT, shoulder)
+    g[LENGTH] = 0.0 if kind == MEETING else length
+    g[COSINE], g[SINE] = dot(k, m), 0.0 if kind == PARALLEL else dot(n, cross(k, m))
+    g[COSINE_56], g[KIND] = dot(vec(g, AXES + 12), vec(g, AXES + 15)), kind
+    _write_frames(g, points, W, n, shoulder, elbow, -1.0)
+    last = _leading(g)
+    _write_frames(g, points, W, n, shoulder, elbow, 1.0)
+    first = _leading(g)
+    if last > WORTH * first:
+        _write_frames(g, points, W, n, shoulder, elbow, -1.0)
+        return last > VARIES
+    return first > VARIES
+
+
+@njit(**STRICT)
+def _meeting_point(g, points, parallel):
+    """Return whether the axes of joints 5 and 6 meet, and the point between them that is nearest to both."""
+    k, m, a, b = vec(g, AXES + 12), vec(g, AXES + 15), points[4], points[5]
+    n, d = cross(k, m), minus(b, a)
+    s2 = dot(n, n)
+    if s2 < parallel * parallel:
+        return False, a
+    x, y = dot(d, cross(m, n)) / s2, dot(d, cross(k, n)) / s2
+    p, q = _along(a, x, k), _along(b, y, m)
+    return True, (0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2]))
+
+
+@njit(**STRICT)
+def _common_normal(k, a, m, b):
+    """Do what `symgrasp.ik.pair.geometry._common_normal` does; first whether there is one."""
+    normal, d = cross(k, m), minus(b, a)
+    s = math.sqrt(dot(normal, normal))
+    if s < SPECIAL:
+        d = _along(d, -dot(k, d), k)
+        length = math.sqrt(dot(d, d))
+        n = _along((0.0, 0.0, 0.0), 1.0 / max(length, SPECIAL), d)
+        return length >= SPECIAL, a, plus(a, d), n, length, s
+    n = (normal[0] / s, normal[1] / s, normal[2] / s)
+    x, y, length = dot(d, cross(m, n)) / s, dot(d, cross(k, n)) / s, dot(d, n)
+    if length < 0.0:
+        n = (-n[0], -n[1], -n[2])
+    return True, _along(a, x, k), _along(b, y, m), n, abs(length), s
+
+
+@njit(**STRICT)
+def _along(a, x, k):
+    """Return a + x k."""
+    return (a[0] + x * k[0], a[1] + x * k[1], a[2] + x * k[2])
+
+
+@njit(**STRICT)
+def _write_frames(g, points, W, n, shoulder, elbow, way):
+    """Write the parts that are seen in the frames of joints 2 and 3, turned around if ``way`` is -1."""
+    k, m, h4, h5 = vec(g, AXES + 3), vec(g, AXES + 6), vec(g, AXES + 9), vec(g, AXES + 12)
+    x = (way * n[0], way * n[1], way * n[2])
+    F = (x, cross(k, n), (way * k[0], way * k[1], way * k[2]))
+    E = (x, cross(m, n), (way * m[0], way * m[1], way * m[2]))
+    for i in range(3):
+        _put(g, FRAME + 3 * i, F[i])
+    _put(g, FIRST_AXIS, _seen(F, vec(g, AXES)))
+    _put(g, FIRST_POINT, _seen(F, minus(points[0], shoulder)))
+    _write_circle(g, CHAIN_POINT, E, h4, minus(W, points[3]))
+    _write_circle(g, CHAIN_DIRECTION, E, h4, h5)
+    _put(g, CHAIN_POINT, plus(vec(g, CHAIN_POINT), _seen(E, minus(points[3], elbow))))
+    g[OUTER_LAST] = 1.0 if way < 0.0 else 0.0
+
+
+@njit(**STRICT)
+def _seen(frame, v):
+    """Return a vector as seen in a frame, whose axes are given."""
+    return (dot(frame[0], v), dot(frame[1], v), dot(frame[2], v))
+
+
+@njit(**STRICT)
+def _write_circle(g, place, frame, k, v):
+    """Write a vector turned about a unit axis, seen in a frame: at rest, coefficients of cosine and sine."""
+    along = dot(k, v)
+    rest = (along * k[0], along * k[1], along * k[2])
+    _put(g, place, _seen(frame, rest))
+    _put(g, place + 3, _seen(frame, minus(v, rest)))
+    _put(g, place + 6, _seen(frame, cross(k, v)))
+
+
+@njit(**STRICT)
+def _put(g, place, v):
+    """Write a vector (3,) into g."""
+    g[place], g[place + 1], g[place + 2] = v
+
+
+@njit(**STRICT)
+def _leading(g):
+    """Do what `symgrasp.ik.pair.geometry._leading` does."""
+    a, s = g[LENGTH], g[SINE]
+    if g[OUTER_LAST]:
+        axis = vec(g, FIRST_AXIS)
+        moment = cross(axis, vec(g, FIRST_POINT))
+        along, square = math.hypot(axis[0], axis[1]), 2.0 * math.sqrt(dot(moment, moment))
+        general = max(abs(s) * square, 2.0 * a * along)
+    else:
+        rest, c, t = vec(g, CHAIN_POINT), vec(g, CHAIN_POINT + 3), vec(g, CHAIN_POINT + 6)
+        along1, square1 = complex(c[2], -t[2]), complex(2.0 * dot(rest, c), -2.0 * dot(rest, t))
+        along, square = abs(along1), abs(square1)
+        general = math.sqrt(abs((s * square1) * (s * square1) + (2.0 * a * along1) * (2.0 * a * along1)))
+    if g[KIND] == MEETING:
+        return square
+    return along if g[KIND] == PARALLEL else general
