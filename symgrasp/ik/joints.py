@@ -60,9 +60,12 @@ ROUNDED_ALIGNED, MOST_ALIGNED = 10.0, 1e-3
 SPREAD = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
 """Numbers whose multiples, less whole ones, spread evenly (R. Kronecker's sequence), one for each joint."""
 
-BLURRED = 1e-4
-"""Sine of a joint below which two branches are so near that other joints may be off by more than the
-tolerance of limits: by the rounding of numbers, 2e-16, divided by its square."""
+BLURRED = 1e-2
+"""Sine of a joint, or length of the part of a vector across the axis about which it is turned into another,
+below which other joints may be off by more than the tolerance of limits: by the rounding of numbers, up to
+1e-13, divided by its square."""
+
+BLURRED4 = BLURRED**4
 
 
 @njit(**STRICT)
@@ -89,6 +92,8 @@ def turn_between(axis, a, b, aligned, free):
     """
     y, x = subproblem1(axis, a, b)
     if y * y + x * x > max(NEARLY_ALIGNED, aligned * aligned):
+        if y * y + x * x < BLURRED4:  # of the product of both parts
+            free[1] = max(free[1], 1.0)
         return y, x
     along_a, along_b = dot(axis, a), dot(axis, b)
     a = (a[0] - along_a * axis[0], a[1] - along_a * axis[1], a[2] - along_a * axis[2])
@@ -98,6 +103,7 @@ def turn_between(axis, a, b, aligned, free):
         if not math.isnan(free[0]):
             return math.sin(free[0]), math.cos(free[0])
         return y, x
+    free[1] = max(free[1], 1.0)
     return dot(axis, cross(a, b)), dot(a, b)
 
 
