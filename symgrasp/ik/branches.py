@@ -14,7 +14,7 @@ import numpy as np
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik.arcs import ARCS, HALVINGS
 from symgrasp.ik.chain import COSINE_TOLERANCE, THREE_PARALLEL, Chain
-from symgrasp.ik.joints import misses, onto_limits, settle, within
+from symgrasp.ik.joints import BLURS_SLIGHTLY, FAMILY, misses, onto_limits, settle, within
 from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.ik.pair.polynomial import POLYNOMIAL_NUMBERS
@@ -22,7 +22,7 @@ from symgrasp.ik.pair.solver import PAIR_BRANCHES, pair_branches
 from symgrasp.ik.pair.starts import STARTS
 from symgrasp.ik.pair.zeros import VIEWS
 from symgrasp.ik.parallel import parallel_branches
-from symgrasp.ik.self_motion import PULLS, into_limits
+from symgrasp.ik.self_motion import CLOSE, PULLS, VERY_CLOSE, into_limits
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
@@ -57,7 +57,8 @@ class Memory(NamedTuple):
             too: the radicand (at least -9) of its root that is negative, less 10 times the root's number;
             else 0.
         free: (2,) the angle (rad) that a joint takes which may take any, NaN for whichever rounding makes it;
-            and 2 where there was such a joint, 1 where branches all but coincide, else 0.
+            and `FAMILY` where there was such a joint, `BLURS` where branches all but coincide,
+            `BLURS_SLIGHTLY` where that is less so, else 0.
         q: (B, n) branches with other angles of such a joint.
         exists: (B,) which of them there are.
         inside: (B,) which are inside the limits.
@@ -187,7 +188,8 @@ def _move_inside(chain, g, T, q, exists, inside, memory):
     several of its members: the families may be curved, and inside the limits in more than one part. Beside
     one, rounding may have put a branch beyond a limit.
     """
-    for i in range(MEMBERS if memory.free[1] > 1.0 else 1):
+    close = VERY_CLOSE if memory.free[1] == BLURS_SLIGHTLY else CLOSE
+    for i in range(MEMBERS if memory.free[1] == FAMILY else 1):
         for b in range(exists.shape[0]):
             memory.exists[b] = False
         memory.free[0] = 2.0 * math.pi * i / MEMBERS
@@ -198,7 +200,7 @@ def _move_inside(chain, g, T, q, exists, inside, memory):
                 continue
             left = True
             row = memory.q[b]
-            if into_limits(chain, row, T, PULLS, memory.J, memory.A) and _in_cell(chain, row):
+            if into_limits(chain, row, T, PULLS, close, memory.J, memory.A) and _in_cell(chain, row):
                 for j in range(row.shape[0]):
                     q[b, j] = row[j]
                 exists[b] = inside[b] = True

@@ -25,12 +25,15 @@ from symgrasp.ik.vectors import (
 from symgrasp.robot.limits import LIMIT_TOLERANCE
 
 __all__ = [
+    "BLURS",
+    "BLURS_SLIGHTLY",
+    "FAMILY",
     "ROOT_TOLERANCE",
     "aligned_below",
-    "blurs",
     "miss",
     "misses",
     "nearest_turn",
+    "note_blur",
     "onto_limits",
     "outside",
     "settle",
@@ -60,12 +63,16 @@ ROUNDED_ALIGNED, MOST_ALIGNED = 10.0, 1e-3
 SPREAD = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
 """Numbers whose multiples, less whole ones, spread evenly (R. Kronecker's sequence), one for each joint."""
 
-BLURRED = 1e-2
-"""Sine of a joint, or length of the part of a vector across the axis about which it is turned into another,
-below which other joints may be off by more than the tolerance of limits: by the rounding of numbers, up to
-1e-13, divided by its square."""
+BLURRED, SLIGHTLY_BLURRED = 1e-4, 1e-2
+"""Sines of a joint, or lengths of the part of a vector across the axis about which it is turned into another,
+below which other joints may be off, by the rounding of numbers, up to 1e-13, divided by the square: by a lot,
+and by little, but more than the tolerance of limits."""
 
-BLURRED4 = BLURRED**4
+SLIGHTLY_BLURRED4 = SLIGHTLY_BLURRED**4
+
+FAMILY, BLURS, BLURS_SLIGHTLY = 2.0, 1.0, 0.5
+"""What is told of branches, see `symgrasp.ik.branches.Memory`: that a joint may take any angle, or that they
+are blurred or slightly so."""
 
 
 @njit(**STRICT)
@@ -75,9 +82,13 @@ def aligned_below(slack):
 
 
 @njit(**STRICT)
-def blurs(s, slack):
-    """Whether two branches all but coincide, by the sine of a joint; slack is that of roots, see `sine`."""
-    return s * s <= max(BLURRED * BLURRED, slack)
+def note_blur(square, slack, free):
+    """Note that branches are blurred, if so, by the square of a sine or length; slack is that of roots, see
+    `sine`, and free is of `symgrasp.ik.branches.Memory`."""
+    if square <= max(BLURRED * BLURRED, slack):
+        free[1] = max(free[1], BLURS)
+    elif square <= SLIGHTLY_BLURRED * SLIGHTLY_BLURRED:
+        free[1] = max(free[1], BLURS_SLIGHTLY)
 
 
 @njit(**STRICT)
@@ -92,18 +103,18 @@ def turn_between(axis, a, b, aligned, free):
     """
     y, x = subproblem1(axis, a, b)
     if y * y + x * x > max(NEARLY_ALIGNED, aligned * aligned):
-        if y * y + x * x < BLURRED4:  # of the product of both parts
-            free[1] = max(free[1], 1.0)
+        if y * y + x * x <= SLIGHTLY_BLURRED4:
+            note_blur(math.sqrt(y * y + x * x), 0.0, free)  # the product of both parts
         return y, x
     along_a, along_b = dot(axis, a), dot(axis, b)
     a = (a[0] - along_a * axis[0], a[1] - along_a * axis[1], a[2] - along_a * axis[2])
     b = (b[0] - along_b * axis[0], b[1] - along_b * axis[1], b[2] - along_b * axis[2])
     if min(dot(a, a), dot(b, b)) < aligned * aligned:
-        free[1] = 2.0
+        free[1] = FAMILY
         if not math.isnan(free[0]):
             return math.sin(free[0]), math.cos(free[0])
         return y, x
-    free[1] = max(free[1], 1.0)
+    free[1] = max(free[1], BLURS)
     return dot(axis, cross(a, b)), dot(a, b)
 
 

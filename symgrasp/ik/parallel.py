@@ -45,10 +45,11 @@ from symgrasp.ik.chain import (
     TURN,
 )
 from symgrasp.ik.joints import (
+    FAMILY,
     ROOT_TOLERANCE,
     aligned_below,
-    blurs,
     nearest_turn,
+    note_blur,
     outside,
     sine,
     tool_motion,
@@ -93,7 +94,7 @@ def parallel_branches(g, joint, limits, T, inside_only, q, exists, inside, work,
     length = math.sqrt(sy * sy + sx * sx)
     aligned, needed = aligned_below(g[PARALLEL_SLACK]), dot(h2, minus(wrist, base)) - part
     if length < aligned and abs(needed) < aligned:  # W is on the axis of joint 1, wherever that turns
-        free[1] = 2.0
+        free[1] = FAMILY
         if not math.isnan(free[0]):
             sy, sx, length, needed = math.sin(free[0]), math.cos(free[0]), 1.0, 1.0
     c = needed / length
@@ -220,8 +221,7 @@ def _elbow(g, joint, limits, t, total, q1, q5, q6, branch, inside_only, q, exist
             return
         c, s = math.copysign(1.0, c), 0.0  # the nearest; see `turn_between`
     aligned = aligned_below(g[PARALLEL_SLACK])
-    if blurs(s, g[PARALLEL_SLACK]):
-        free[1] = max(free[1], 1.0)
+    note_blur(s * s, g[PARALLEL_SLACK], free)
     from_shoulder = minus(vec(g, ELBOW), vec(g, SHOULDER))
     for i in range(2):
         way = s if i == 0 else -s

@@ -26,7 +26,7 @@ from symgrasp.ik.newton import (
 )
 from symgrasp.ik.vectors import STRICT
 
-__all__ = ["PULLS", "family_into_limits", "into_limits"]
+__all__ = ["CLOSE", "PULLS", "VERY_CLOSE", "family_into_limits", "into_limits"]
 
 WEIGHT2 = 1e-6
 """Square of the weight w (m/rad, or none)."""
@@ -48,6 +48,9 @@ CLOSE = 1e-7
 """Error (m and rad) of the tool that is small enough beside a singular pose, where the last digits of it
 depend on joints being outside."""
 
+VERY_CLOSE = 5e-11
+"""The same where joints are off by little, so that none is moved by more."""
+
 MEMBERS = 16
 """Members of a family, a turn of the joint that turns furthest in all, from which one inside is sought."""
 
@@ -59,7 +62,7 @@ LEAST_GAIN, WAITS = 0.9, 3
 
 
 @njit(**STRICT)
-def into_limits(chain, q, T, steps, J, A):
+def into_limits(chain, q, T, steps, close, J, A):
     """Move an arm inside its limits with the tool at a pose.
 
     Args:
@@ -67,11 +70,12 @@ def into_limits(chain, q, T, steps, J, A):
         q: (n,) joint values (rad), changed in place.
         T: tool pose (4, 4) in the base.
         steps: steps, at most.
+        close: error (m and rad) of the tool that is small enough, `CLOSE` at a singular pose.
         J, A: memory (n, 6) and (n, n + 1).
 
     Returns:
         Whether it is inside the limits, and the tool within `POLISHED` of the pose, or, where that leads
-        outside again, `CLOSE`.
+        outside again or is not enough, ``close``.
     """
     limits, before = chain.limits, math.inf
     for step in range(steps):
@@ -80,7 +84,7 @@ def into_limits(chain, q, T, steps, J, A):
             onto_limits(limits, q)
         free, move, turn, twist = linearise(chain.forward, chain.fixed, q, T, J)
         error = max(move, turn)
-        if fits and (error <= POLISHED or (step >= WAITS and error <= CLOSE)):
+        if fits and (error <= min(POLISHED, close) or (step >= WAITS and error <= close)):
             return True
         furthest = 0.0
         normal_equations(J, twist, free, max(move * move + turn * turn, DAMPING), A)
@@ -133,7 +137,7 @@ def family_into_limits(chain, q, T, rows, J, A):
         trial = rows[2]
         for j in range(q.shape[0]):
             trial[j] = member[j]
-        if into_limits(chain, trial, T, PULLS, J, A):
+        if into_limits(chain, trial, T, PULLS, CLOSE, J, A):
             for j in range(q.shape[0]):
                 q[j] = trial[j]
             return True

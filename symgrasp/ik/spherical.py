@@ -23,9 +23,9 @@ from symgrasp.ik.chain import AXES, CENTRE, CENTRE_SEEN, MIDDLE, P0, PHI, R0, SL
 from symgrasp.ik.joints import (
     ROOT_TOLERANCE,
     aligned_below,
-    blurs,
     miss,
     nearest_turn,
+    note_blur,
     outside,
     sine,
     tool_motion,
@@ -75,8 +75,7 @@ def spherical_branches(g, joint, limits, T, inside_only, q, exists, inside, miss
     if s < 0.0:
         miss(missing, 0, 8, 1, 1.0 - c * c)
         return False
-    if blurs(s, g[SLACK]):
-        free[1] = max(free[1], 1.0)
+    note_blur(s * s, g[SLACK], free)
     offset = math.atan2(s, c)
     for i in range(2):
         if i == 0:
@@ -208,8 +207,7 @@ def _triple(
             return
         c, s = math.copysign(1.0, c), 0.0  # the nearest; see `turn_between`
     aligned = aligned_below(g[SLACK])
-    if blurs(s, g[SLACK]):
-        free[1] = max(free[1], 1.0)
+    note_blur(s * s, g[SLACK], free)
     for i in range(2):
         way = s if i == 0 else -s
         s2, c2 = sm * c + cm * way, cm * c - sm * way

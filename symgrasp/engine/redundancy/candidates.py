@@ -27,7 +27,7 @@ from symgrasp.ik.branches import branches_at
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.joints import spread_in
 from symgrasp.ik.newton import linearise
-from symgrasp.ik.self_motion import into_limits
+from symgrasp.ik.self_motion import CLOSE, into_limits
 from symgrasp.ik.spans import FINEST, HALVES, find_spans, span_over
 from symgrasp.ik.vectors import STRICT
 
@@ -87,9 +87,9 @@ def plan_sought(nodes, branches, covered, T):
     count = 2
     for i in range(SOUGHT):
         spread_in(chain.limits, i, row)
-        if not into_limits(loose, row, T, SEEK_STEPS, J, A):
+        if not into_limits(loose, row, T, SEEK_STEPS, CLOSE, J, A):
             _, move, turn, _ = linearise(chain.forward, nodes.unlocked, row, T, J)
-            if not (max(move, turn) < ALMOST and into_limits(loose, row, T, MORE_STEPS, J, A)):
+            if not (max(move, turn) < ALMOST and into_limits(loose, row, T, MORE_STEPS, CLOSE, J, A)):
                 continue
         phi = row[chain.joint[6]]
         if not locked.lower < phi < locked.upper:  # a turn without limits is covered once

@@ -42,7 +42,7 @@ from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair.geometry import PAIR_PHI, SHIFTED
 from symgrasp.ik.pair.polynomial import equations_of, may_reach
 from symgrasp.ik.pair.zeros import search_turn
-from symgrasp.ik.self_motion import PULLS, family_into_limits, into_limits
+from symgrasp.ik.self_motion import CLOSE, PULLS, family_into_limits, into_limits
 from symgrasp.ik.vectors import STRICT
 
 __all__ = ["PAIR_BRANCHES", "pair_branches"]
@@ -112,7 +112,7 @@ def _add_branches(chain, T, q, exists, inside, memory, starts, found, singular):
         if singular and not fits:
             for j in range(row.shape[0]):
                 memory.row[j] = start[j]
-            if into_limits(chain, memory.row, T, PULLS, memory.J, memory.A):
+            if into_limits(chain, memory.row, T, PULLS, CLOSE, memory.J, memory.A):
                 reaches = fits = True
                 for j in range(row.shape[0]):
                     row[j] = memory.row[j]
@@ -134,7 +134,7 @@ def _search_everywhere(chain, g, T, q, exists, inside, memory, found):
         spread_in(chain.limits, i, row)
         if chain.joint[6] >= 0:
             row[chain.joint[6]] = nearest_turn(chain.limits, chain.joint[6], g[PAIR_PHI])
-        if into_limits(chain, row, T, MORE_STEPS, memory.J, memory.A):
+        if into_limits(chain, row, T, MORE_STEPS, CLOSE, memory.J, memory.A):
             for j in range(row.shape[0]):
                 q[found, j] = row[j]
             exists[found] = inside[found] = True
