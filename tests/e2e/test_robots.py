@@ -90,6 +90,15 @@ def test_the_base_is_dragged_saved_and_put_back(open_page, tmp_path):
     assert not page.complaints
 
 
+def upload_panda(page, folder):
+    """Upload a robot, and wait until the map is of it."""
+    robot = folder / "my panda.zip"
+    robot.write_bytes(panda_archive())
+    upload(page, "Upload a robot", robot)
+    expect(page.frame.get_by_label("Robot", exact=True)).to_have_value("my panda.zip (upload)")
+    page.expect_title("panda")
+
+
 def test_an_uploaded_robot_goes_into_a_file_and_opens_again(open_page, tmp_path):
     page = open_page()
     page.expect_title("panda")
@@ -99,11 +108,7 @@ def test_an_uploaded_robot_goes_into_a_file_and_opens_again(open_page, tmp_path)
     upload(page, "Upload a robot", bad)
     expect(page.alerts.first).to_contain_text("a relative path without '..'")
     page.expect_title("panda")  # nothing of the scene is lost
-    good = tmp_path / "my panda.zip"
-    good.write_bytes(panda_archive())
-    upload(page, "Upload a robot", good)
-    expect(page.frame.get_by_label("Robot", exact=True)).to_have_value("my panda.zip (upload)")
-    page.expect_title("panda")
+    upload_panda(page, tmp_path)
     page.tab("Files")
     with page.page.expect_download() as download:
         page.button("Save the scene (YAML)").click()
@@ -123,11 +128,7 @@ def test_a_plan_of_an_uploaded_robot_goes_out_in_every_format_and_opens_again(op
     page = open_page()
     page.expect_title("panda")
     open_robot_folder(page)
-    robot = tmp_path / "my panda.zip"
-    robot.write_bytes(panda_archive())
-    upload(page, "Upload a robot", robot)
-    expect(page.frame.get_by_label("Robot", exact=True)).to_have_value("my panda.zip (upload)")
-    page.expect_title("panda")
+    upload_panda(page, tmp_path)
     page.tab("Sequence")
     page.button("One grasp for all tasks").click()
     expect(page.text("One grasp for 1 task: h = ")).to_be_visible()
