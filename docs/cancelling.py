@@ -3,14 +3,14 @@
 Cancel takes effect on the page at once, whatever its process does. The process itself stops where the
 computation next tells its progress, and only then begins what is asked for next. So the longest time between
 two such moments is measured, for everything that the page computes, on every shipped scene: in a process that
-has just started, from nothing to the result, so that loading robots and opening worlds count. Two things
-cannot be stopped: compiling, which is left to end, and libraries that read a file, whose process is killed.
+has just started as the page starts its own, from nothing to the result, so that loading robots and opening
+worlds count. Two things cannot be stopped: compiling, which is left to end, and libraries that read a file,
+whose process is killed.
 """
 
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,7 +18,6 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from itertools import chain
-from multiprocessing.context import SpawnContext
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -29,7 +28,7 @@ import trimesh
 from app.compute.compute_process import ComputeProcess
 from app.compute.map_service import MapService
 from app.compute.plan_service import MotionRequest, PlanRequest, PlanService
-from app.compute.process_pool import ProcessPool
+from app.compute.process_pool import PROCESSES, ProcessPool
 from app.compute.survey_service import SurveyService
 from app.compute.upload_service import UploadService
 from app.files.scene_files import scene_yaml
@@ -265,8 +264,9 @@ def reading() -> Gap:
     )
 
 
-def _measured(context: SpawnContext, name: str, first: bool) -> list[Gap]:
-    with ProcessPoolExecutor(1, mp_context=context) as pool:
+def _measured(name: str, first: bool) -> list[Gap]:
+    # A copy of the same process as those of the page: what that has imported is there.
+    with ProcessPoolExecutor(1, mp_context=PROCESSES) as pool:
         return pool.submit(_measure, name, first).result()
 
 
@@ -282,13 +282,12 @@ def run(names: Sequence[str]) -> Iterator[Gap]:
 
     Where something was compiled, it is measured again.
     """
-    spawn = multiprocessing.get_context("spawn")
     for name in names:
         for first in (True, False):
-            found = _measured(spawn, name, first)
+            found = _measured(name, first)
             for _ in range(MOST_TRIES - 1):
                 if any(gap.compiled for gap in found):
-                    found = _measured(spawn, name, first)
+                    found = _measured(name, first)
             yield from found
 
 

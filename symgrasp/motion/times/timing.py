@@ -39,6 +39,12 @@ GRIP_TIME = 0.5
 ROUNDED_SHARE, CHORD_SHARE = 0.5, 0.2
 """Shares of how far a path may be off that rounding may take, and straight lines between rows besides."""
 
+PARTS = (
+    "matplotlib", "matplotlib.backend_bases", "matplotlib.axes", "matplotlib.projections",
+    "matplotlib.pyplot", "scipy.special", "scipy.interpolate", "toppra",
+)  # fmt: skip
+"""What `toppra` imports, in parts that take about a fifth of a second each, and itself."""
+
 
 def timed(motion: Motion, progress: Progress | None = None) -> Motion:
     """Return a motion with times.
@@ -233,7 +239,7 @@ def load(progress: Progress | None = None) -> None:
     Args:
         progress: called with 0 after every part; may raise `Cancelled`.
     """
-    for name in ("matplotlib", "matplotlib.pyplot", "toppra"):  # which imports the others before itself
+    for name in PARTS:
         with suppress(ImportError):
             import_module(name)
         if progress:
