@@ -32,9 +32,6 @@ DEVIATION = 1e-3
 NEAR_TOOL = 0.1
 """Distance (m) of these points from the tool, unless told otherwise."""
 
-KEPT = 6
-"""Edges into each configuration that are tried, those with the smallest turns first."""
-
 CLEAR = 0.02
 """Clearance (m) above which paths are equally good."""
 
@@ -150,15 +147,11 @@ def _following_turns(layer: Array, following: Array, limits: Array) -> Array:
 
 
 def _edges(layer: Array, new: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Return the edges worth trying: those without a jump, the shortest into each configuration."""
+    """Return the edges without a jump, as indices of both ends."""
     if not new.size:
         return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
-    turn = np.abs(new - layer[:, None]).max(axis=2)
-    nearest = np.argsort(turn, axis=0)[:KEPT]
-    b = np.broadcast_to(np.arange(new.shape[1]), nearest.shape)
-    a, b = nearest.ravel(), b.ravel()
-    keep = turn[a, b] <= LARGEST_TURN
-    return a[keep], b[keep]
+    a, b = np.nonzero(np.abs(new - layer[:, None]).max(axis=2) <= LARGEST_TURN)
+    return a, b
 
 
 def _middle(a: Array, b: Array) -> Array:
