@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -134,3 +135,18 @@ def test_the_first_screen():
     assert lines[2].startswith("![")
     assert lines[4].startswith("make app")
     assert lines[5].startswith("make test")
+
+
+def test_the_first_picture_is_a_short_animation():
+    first = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README.read_text())[0]
+    assert first == "docs/images/page_plays.webp"
+    assert (ROOT / first).stat().st_size < 2e6
+    with Image.open(ROOT / first) as picture:
+        assert picture.format == "WEBP"
+        assert getattr(picture, "n_frames", 1) > 40
+        frames = []
+        for k in range(0, getattr(picture, "n_frames", 1), 8):
+            picture.seek(k)
+            frames.append(np.asarray(picture.convert("RGB")).astype(int))
+    for one, two in pairwise(frames):
+        assert (np.abs(one - two).max(axis=2) > 40).any()

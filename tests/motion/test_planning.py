@@ -121,6 +121,15 @@ def test_handover():
     held = [s.held_by for s in motion.segments]
     assert ("left",) in held
     assert held.index(("right",)) > held.index(("left",))
+    # The second arm comes and closes its hand while the first one holds the object still, and only then
+    # that one opens its own.
+    kinds_of = [(s.kind, s.arms, s.held_by) for s in motion.segments]
+    taken = kinds_of.index(("close", ("right",), ("left",)))
+    assert [kind for kind, arms, by in kinds_of[:taken] if arms == ("right",) and by == ("left",)][-2:] == [
+        "reach",
+        "approach",
+    ]
+    assert kinds_of[taken + 1] == ("open", ("left",), ("right",))
     check(plan, motion)
 
 

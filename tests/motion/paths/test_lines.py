@@ -91,7 +91,9 @@ def test_no_way_along_a_path_keeps_further_from_things_than_the_one_that_is_foun
         cells = np.random.default_rng(1).permutation(np.argwhere(m.feasible))[:cells]
     solver, compared = solver_for(scene.arm(scene.task().arms[0]), samples), 0
     for roll, row, column in cells:
-        situation, poses = approach(scene, m.manifold.h[row], m.manifold.theta[column], ROLLS[roll], 0.15)
+        situation, poses = approach(
+            scene, float(m.manifold.h[row]), float(m.manifold.theta[column]), ROLLS[roll], 0.15
+        )
         expected = exhaustive(situation, solver, poses)
         if not expected:
             with pytest.raises(NoMotionError):
@@ -177,6 +179,8 @@ def test_a_grasp_of_a_map_with_an_approach_has_one_way_without_jumps(name):
     cells = np.random.default_rng(2).permutation(np.argwhere(m.feasible))[:10]
     assert len(cells) == 10
     for roll, row, column in cells:
-        situation, poses = approach(scene, m.manifold.h[row], m.manifold.theta[column], ROLLS[roll], length)
+        situation, poses = approach(
+            scene, float(m.manifold.h[row]), float(m.manifold.theta[column]), ROLLS[roll], length
+        )
         ends = configurations(coarse, poses[-1])
         assert len(follow([Leg(situation, poses)], fine, end=ends).ends)

@@ -82,6 +82,24 @@ def test_a_scene_sets_the_acceleration():
     check_limits(timed(quick))
 
 
+def test_a_scene_sets_lower_speeds_and_no_higher_ones():
+    rows = np.linspace(Scene.load("bottle_on_table").arm().home, GRASPED, 2)
+    plain = motion_along(rows, 0.0)
+    content = plain.scene.content
+    took = {}
+    for velocity in (0.1, 100.0):
+        robots = [{**robot, "velocity": velocity} for robot in content["robots"]]
+        motion = timed(replace(plain, scene=Scene.from_content({**content, "robots": robots})))
+        check_limits(motion)
+        (path,), (segment,) = motion.segments[0].joints.values(), motion.segments
+        assert segment.times is not None
+        speeds = np.abs(np.diff(path, axis=0)) / np.diff(segment.times)[:, None]
+        assert speeds.max() <= velocity
+        took[velocity] = motion.duration
+    assert took[0.1] > np.abs(rows[-1] - rows[0]).max() / 0.1
+    assert took[100.0] == pytest.approx(timed(plain).duration)
+
+
 def test_hands_take_their_time_and_arms_that_rest_stay():
     scene = Scene.load("bottle_on_table")
     pose = scene.task().T_world_object
