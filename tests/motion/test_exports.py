@@ -16,7 +16,11 @@ from scipy.interpolate import CubicHermiteSpline
 
 from symgrasp.cli.main import main
 from symgrasp.motion.exports import to_actions, to_html, to_table
+from symgrasp.motion.record import to_record
+from symgrasp.motion.segments import Motion, Segment
+from symgrasp.motion.times.timing import timed
 from symgrasp.poses import from_position_quat, pose_error
+from symgrasp.scene.scene import Scene
 from tests.motion.recorded import recorded_motion, recorded_plan
 
 
@@ -53,6 +57,44 @@ def test_hands_move_when_they_do_in_the_motion():
         values = motion.at(end).values["panda"]
         for joint, value in command["joints"].items():
             assert values[names.index(joint)] == pytest.approx(value, abs=1e-6)
+
+
+def test_every_arm_has_its_own_trajectory_and_commands():
+    """Both count from one start: the right hand opens, then the left arm moves, then the right one."""
+    scene = Scene.load("pr2_handover")
+    left, right = (scene.arms[name] for name in ("left", "right"))
+    both = set(left.joint_names) & set(right.joint_names)  # those of a torso stay
+    there = {
+        arm.name: arm.home + 0.1 * np.array([name not in both for name in arm.joint_names])
+        for arm in (left, right)
+    }
+    still = np.stack([right.home, right.home])
+    segments = (
+        Segment("open", ("right",), {"right": still}, None, {"right": (None, 0.05)}, (), "a", "a"),
+        Segment("reach", ("left",), {"left": np.stack([left.home, there["left"]])}, None, {}, (), "a", "a"),
+        Segment(
+            "reach", ("right",), {"right": np.stack([right.home, there["right"]])}, None, {}, (), "a", "a"
+        ),
+    )
+    motion = timed(Motion(scene, [scene.task().T_world_object], segments))
+    record = recorded_plan().scene.model_copy(update={"content": scene.content})
+    content = json.loads(
+        to_actions(recorded_plan().model_copy(update={"motion": to_record(motion), "scene": record}))
+    )
+    assert set(content) == {"left", "right"}
+    for arm in (left, right):
+        trajectory = content[arm.name]["trajectory"]
+        assert trajectory["joint_names"] == list(arm.joint_names)
+        for point in trajectory["points"]:
+            values = motion.at(seconds(point["time_from_start"])).values[arm.robot.name][arm.indices]
+            np.testing.assert_allclose(point["positions"], values, atol=1e-6)
+        end = trajectory["points"][-1]["positions"]
+        np.testing.assert_allclose(end, there[arm.name], atol=1e-9)
+    assert content["left"]["gripper"] == []
+    (command,) = content["right"]["gripper"]
+    assert seconds(command["time_from_start"]) == 0.0
+    assert seconds(command["duration"]) == pytest.approx(motion.segments[0].duration, abs=1e-9)
+    assert command["goal"]["command"]["position"] == 0.05
 
 
 def test_the_table_reads_back():

@@ -144,6 +144,35 @@ def _clearance(world: BulletWorld, arm, q: np.ndarray) -> float:
     return min(inside, default=0.01)
 
 
+def test_a_parked_robot_is_an_obstacle():
+    """Configurations that are free without it, and not with it, touch it in PyBullet."""
+    content = load_small("log_two_robots").content
+    (right,) = (robot for robot in content["robots"] if robot["name"] == "right")
+    right["base"]["position"] = [0.6 * x for x in right["base"]["position"]]  # nearer than it stands
+    scene = Scene.from_content(content)
+    alone = [robot for robot in content["robots"] if robot["name"] == "left"]
+    tasks = [{**task, "arms": ["left"]} for task in content["tasks"]]
+    arm = scene.arm("left")
+    q = np.random.default_rng(3).uniform(arm.lower, arm.upper, (4000, arm.dof))
+    with open_world(Scene.from_content({**content, "robots": alone, "tasks": tasks})) as world:
+        bodies = MotionScene(world.scene, world)
+        without = prove(bodies.situation(bodies.home(), [world.scene.arm("left")]), q, q).free
+    with open_world(scene) as world:
+        bodies = MotionScene(scene, world)
+        situation = bodies.situation(bodies.home(), [arm])
+        proof = prove(situation, q, q)
+        assert not (proof.free & ~without).any()
+        taken = np.flatnonzero(without & ~proof.free)
+        assert len(taken) > 20
+        for k in taken[:20]:
+            world.set_robot("left", arm.robot_values(q[k]))
+            touched = [c for c in world.pairs_within(arm, 1e-3) if "right" in (c.a.body, c.b.body)]
+            assert touched
+            assert "right" in {situation.names[piece].body for piece in proof.hits[k]}
+        with pytest.raises(NoMotionError, match=r"its start is in collision: .*right/"):
+            connect(situation, q[taken[:1]], arm.home[None])
+
+
 def test_a_start_in_collision_is_said_to_be_that():
     scene = load_small("pick_pour_place")
     with open_world(scene) as world:
