@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
 from symgrasp.ik import solver_for
-from symgrasp.motion.drafting import carrying
+from symgrasp.motion.drafting import carrying, draft
 from symgrasp.motion.drafting.carrying import tilt_limit
 from symgrasp.motion.drafting.ways import LIFT
-from symgrasp.motion.paths.lines import configurations
+from symgrasp.motion.paths.lines import Leg, LineTree, configurations
+from symgrasp.motion.paths.search import NoMotionError
 from symgrasp.motion.planning import plan_motion
 from symgrasp.planners.planning import plan_sequential
 from symgrasp.poses import Array, pose_error, translation
@@ -61,6 +63,27 @@ def test_a_carry_may_begin_and_end_in_every_configuration_of_the_grasp(ends):
     lifted = translation([0, 0, LIFT]) @ pick.holds[0].tool_pose.array()
     assert len(starts) > 1
     assert max(float(error.max()) for error in pose_error(arm.world_tool_pose(starts), lifted)) < 1e-6
+
+
+def test_straight_ways_out_of_all_tasks_are_looked_at_before_free_motions(ends, monkeypatch):
+    """Where the last one has none, no free motion is sought."""
+    scene = load_small("pick_pour_place", 12, 24, 8)
+    plan = plan_sequential(scene)
+    place = plan.tasks[-1].holds[0].tool_pose.array()
+    follow = draft.follow
+
+    def blocked(legs: Sequence[Leg], *rest: Any, **more: Any) -> LineTree:
+        if np.allclose(legs[-1].poses[-1], place, atol=1e-6):
+            raise NoMotionError("a wall")
+        return follow(legs, *rest, **more)
+
+    monkeypatch.setattr(draft, "follow", blocked)
+    with pytest.raises(NoMotionError, match="the carry from pour to place: its end: a wall"):
+        plan_motion(scene, plan)
+    assert ends == []
+    monkeypatch.setattr(draft, "follow", follow)
+    plan_motion(scene, plan)
+    assert len(ends) == 2
 
 
 def test_a_limit_between_two_tasks_goes_before_that_for_all():
