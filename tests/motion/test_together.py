@@ -94,6 +94,21 @@ def test_arms_reach_in_turn_where_only_that_has_room(monkeypatch):
     assert report, report.failures
 
 
+@pytest.mark.parametrize("arms", [1, 2, 4])
+def test_paths_that_are_nearly_the_best_are_combined_for_every_arm(arms):
+    """However many paths the others have."""
+    lines = {f"arm {k}": [np.full((2, 1), rank) for rank in range(200)] for k in range(arms)}
+    tried = [tuple(int(path[0, 0]) for path in chosen.values()) for chosen in taking.combinations(lines)]
+    assert all(list(chosen) == list(lines) for chosen in taking.combinations(lines))
+    assert len(tried) == len(set(tried)) == taking.COMBINATIONS
+    assert tried[0] == (0,) * arms
+    assert [sum(ranks) for ranks in tried] == sorted(sum(ranks) for ranks in tried)
+    for column in np.array(tried).T:
+        assert {0, 1, 2} <= {*column.tolist()}
+    few = {"a": lines["arm 0"][:2], "b": lines["arm 0"][:3]}
+    assert len(list(taking.combinations(few))) == 6
+
+
 def test_paths_at_equal_shares_have_the_rows_of_all():
     a, b = np.array([[0.0, 1.0], [2.0, 1.0], [3.0, 0.0]]), np.array([[5.0], [6.0], [6.0], [4.0]])
     ways = taking._at_equal_shares({"a": a, "b": b})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import islice, product
+from itertools import product
 
 import numpy as np
 
@@ -22,6 +22,9 @@ __all__ = ["COMBINATIONS", "combinations", "leave", "take"]
 
 COMBINATIONS = 64
 """Combinations of the paths of several arms that are tried."""
+
+RANKED = 1024
+"""About so many are ordered by how good they are."""
 
 
 def take(
@@ -142,10 +145,11 @@ def _move_free(
 
 
 def combinations(lines: Mapping[str, Sequence[Array]]) -> Iterator[dict[str, Array]]:
-    """Yield combinations of the paths of several arms, the best of each first."""
-    best = (paths[:COMBINATIONS] for paths in lines.values())
-    for chosen in islice(product(*best), COMBINATIONS):
-        yield dict(zip(lines, chosen, strict=True))
+    """Yield combinations of the paths of several arms, those of good ones first, in turn for all arms."""
+    each = max(2, int(RANKED ** (1 / max(1, len(lines)))))
+    ranks = product(*(range(min(len(paths), each)) for paths in lines.values()))
+    for chosen in sorted(ranks, key=sum)[:COMBINATIONS]:
+        yield {name: paths[k] for (name, paths), k in zip(lines.items(), chosen, strict=True)}
 
 
 def _touching(course: Course, arms: Sequence[Arm]) -> Situation:

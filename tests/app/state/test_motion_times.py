@@ -17,6 +17,7 @@ from app.state.plans.plan_results import SECONDS_PER_TASK, PlanResults
 from app.state.requests import MapRequest, MapResult
 from app.state.state import State
 from symgrasp.feasibility.create import create_map
+from symgrasp.object.manifold import ROLLS
 from tests.motion.recorded import recorded_motion, recorded_plan
 
 
@@ -48,6 +49,10 @@ def test_the_task_is_the_one_that_the_object_is_nearest_to():
         assert state.shown_task
         assert (state.task, state.shown_task.name) == (task, task)
         assert state.pick is not None  # its cell is marked on the map
+        grasp = state.shown_task.holds[0].grasp
+        assert state.pick.roll is not None
+        assert (state.pick.h, ROLLS[state.pick.roll]) == (grasp.h, grasp.roll)
+        assert np.cos(state.pick.theta - grasp.theta) == pytest.approx(1.0)
     for step, carry in ((1, carries[0]), (2, carries[1])):
         state = plan_changes.show_step(opened(), step)
         assert state.plan_results.position == pytest.approx(motion.starts[carry + 1])
