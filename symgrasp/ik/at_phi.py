@@ -32,7 +32,7 @@ from symgrasp.ik.chain import (
 )
 from symgrasp.ik.compiled import CompiledIK
 from symgrasp.ik.families import BESIDE, chain_geometries, free_joints, parallel_below
-from symgrasp.ik.pair.at_phi import write_pair
+from symgrasp.ik.pair.from_axes import meeting_point, write_pair
 from symgrasp.ik.pair.geometry import MEETING_PAIR, PAIR_PHI, SHIFTED, WRIST_POINT
 from symgrasp.ik.vectors import STRICT, cross, dot, minus, plus, rotate, row, vec
 from symgrasp.poses import Array
@@ -165,7 +165,8 @@ def _pair_at(locked, phi, g):
         _point(locked, s, c, 0), _point(locked, s, c, 1), _point(locked, s, c, 2),
         _point(locked, s, c, 3), _point(locked, s, c, 4), _point(locked, s, c, 5),
     )  # fmt: skip
-    return write_pair(g, p, locked.parallel)
+    meets, W = meeting_point(g, p, locked.parallel)
+    return meets and write_pair(g, p, W)
 
 
 @njit(**STRICT)

@@ -158,5 +158,9 @@ class ParallelGeometry(NamedTuple):
         """Return all parts but the first in one row (70,)."""
         return np.concatenate([np.ravel(part) for part in self[1:]])
 
+    def nowhere(self, phi: float) -> ParallelGeometry:
+        """Return the geometry of a value (rad) at which no solution is found."""
+        return self._replace(W=np.full(3, np.nan), phi=phi)
+
 
 ChainGeometry: TypeAlias = SphericalGeometry | ParallelGeometry | PairGeometry

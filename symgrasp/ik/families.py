@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.ik.chain import ChainGeometry, ParallelGeometry, SphericalGeometry
-from symgrasp.ik.pair.geometry import PairGeometry, pair_geometry
+from symgrasp.ik.pair.from_axes import pair_geometry
+from symgrasp.ik.pair.geometry import SHIFTED, PairGeometry
 from symgrasp.poses import Array, rotation_about
 from symgrasp.robot.robot import Arm
 
@@ -123,12 +124,10 @@ def _geometries(
             if known and (
                 find is _meeting_pair or (find is _three_parallel_skew and 2 * len(known) > len(rows))
             ):
-                nowhere = known[0]._replace(W=np.full(3, np.nan))  # nothing is found there
-                filled = zip(rows, phi, strict=True)
+                one, filled = known[0], zip(rows, phi, strict=True)
+                assert not isinstance(one, SphericalGeometry)  # which has no such values
                 return precision, [
-                    row
-                    or _beside(arm, locked, float(value), known[0], precision)
-                    or nowhere._replace(phi=float(value))
+                    row or _beside(arm, locked, float(value), one, precision) or one.nowhere(float(value))
                     for row, value in filled
                 ]
             if len(known) == len(rows):
@@ -247,7 +246,7 @@ def _beside(
     if not isinstance(known, PairGeometry):
         return None
     beside = _meeting_pair(free_joints(arm, locked, phi + BESIDE, known.backwards), precision)
-    return None if beside is None else beside._replace(phi=phi, shifted=1.0)
+    return None if beside is None else beside.at(phi, {SHIFTED: 1.0})
 
 
 _FAMILIES: tuple[tuple[Precision, Callable[[Joints, Precision], ChainGeometry | None]], ...] = (

@@ -1,13 +1,15 @@
-"""The geometry of arms of which the axes of the last two joints meet, from their axes. Compiled.
+"""The geometry of arms of which the axes of the last two joints meet, from their axes.
 
-It is what `symgrasp.ik.pair.geometry.pair_geometry` returns; see there.
+Compiled code calls `write_pair`, and Python `pair_geometry`.
 """
 
 from __future__ import annotations
 
 import math
 
-from symgrasp.compiling import njit
+import numpy as np
+
+from symgrasp.compiling import interpreted, njit
 from symgrasp.ik.chain import AXES
 from symgrasp.ik.pair.geometry import (
     CHAIN_DIRECTION,
@@ -22,35 +24,63 @@ from symgrasp.ik.pair.geometry import (
     LENGTH,
     MEETING,
     OUTER_LAST,
+    PAIR_PHI,
     PARALLEL,
     SHOULDER_POINT,
     SINE,
+    SIZE,
     SPECIAL,
     VARIES,
     WORTH,
     WRIST_POINT,
+    PairGeometry,
 )
 from symgrasp.ik.vectors import STRICT, cross, dot, minus, plus, vec
+from symgrasp.poses import Array
 
-__all__ = ["write_pair"]
+__all__ = ["meeting_point", "pair_geometry", "write_pair"]
+
+
+def pair_geometry(
+    backwards: bool, h: Array, o: Array, R0: Array, p0: Array, W: Array, phi: float
+) -> PairGeometry | None:
+    """Return the geometry of joints, with the outer joint that makes the equations well-conditioned.
+
+    Args:
+        backwards: whether they are read from the tool to the base.
+        h: (6, 3) unit axes.
+        o: (6, 3) a point on each axis.
+        R0: (3, 3) orientation of the tool.
+        p0: (3,) position of the tool.
+        W: (3,) point where the axes of joints 5 and 6 meet.
+        phi: value of the locked joint (rad).
+
+    Returns:
+        None where joints 2 and 3 have the same axis, or neither joint 1 nor joint 4 can be the inner one.
+    """
+    row = np.zeros(SIZE)
+    row[:WRIST_POINT] = np.concatenate([h.ravel(), R0.ravel(), p0])
+    row[PAIR_PHI] = phi
+    # Interpreted it takes as long as a few calls of numpy, with nothing to compile.
+    found = interpreted(write_pair)(row, [tuple(point) for point in o], tuple(W))
+    return PairGeometry(backwards, row) if found else None
 
 
 @njit(**STRICT)
-def write_pair(g, points, parallel):
+def write_pair(g, points, W):
     """Write the parts of a `PairGeometry` that follow from its axes, which are in g.
 
     Args:
-        g: (77,) a packed geometry.
+        g: (`SIZE`,) a packed geometry.
         points: six points (3,), one on each axis.
-        parallel: sine of the angle between the axes of joints 5 and 6 below which they do not meet.
+        W: (3,) point where the axes of joints 5 and 6 meet.
 
     Returns:
-        Whether there is such a geometry.
+        Whether there is such a geometry; see `pair_geometry`.
     """
-    meets, W = _meeting_point(g, points, parallel)
     k, m, a, b = vec(g, AXES + 3), vec(g, AXES + 6), points[1], points[2]
     known, shoulder, elbow, n, length, s = _common_normal(k, a, m, b)
-    if not (meets and known):
+    if not known:
         return False
     kind = MEETING if length < SPECIAL else PARALLEL if s < SPECIAL else GENERAL
     _put(g, WRIST_POINT, W)
@@ -69,8 +99,14 @@ def write_pair(g, points, parallel):
 
 
 @njit(**STRICT)
-def _meeting_point(g, points, parallel):
-    """Return whether the axes of joints 5 and 6 meet, and the point between them that is nearest to both."""
+def meeting_point(g, points, parallel):
+    """Return whether the axes of joints 5 and 6 meet, and the point between them that is nearest to both.
+
+    Args:
+        g: (`SIZE`,) a packed geometry, of which the axes are read.
+        points: six points (3,), one on each axis.
+        parallel: sine of the angle between the axes below which they do not meet.
+    """
     k, m, a, b = vec(g, AXES + 12), vec(g, AXES + 15), points[4], points[5]
     n, d = cross(k, m), minus(b, a)
     s2 = dot(n, n)
@@ -83,7 +119,18 @@ def _meeting_point(g, points, parallel):
 
 @njit(**STRICT)
 def _common_normal(k, a, m, b):
-    """Do what `symgrasp.ik.pair.geometry._common_normal` does; first whether there is one."""
+    """Return the common normal of two lines.
+
+    Args:
+        k: unit direction (3,) of the first line.
+        a: point (3,) on it.
+        m: unit direction (3,) of the second line.
+        b: point (3,) on it.
+
+    Returns:
+        Whether there is one, which is not so where both are the same line; its feet (3,) on them; its
+        direction (3,) and length; and the sine of the angle.
+    """
     normal, d = cross(k, m), minus(b, a)
     s = math.sqrt(dot(normal, normal))
     if s < SPECIAL:
@@ -145,9 +192,10 @@ def _put(g, place, v):
 
 @njit(**STRICT)
 def _leading(g):
-    """Do what `symgrasp.ik.pair.geometry._leading` does."""
+    """Return the size (m², or m) of the coefficients that tell the values of the inner joint apart."""
     a, s = g[LENGTH], g[SINE]
     if g[OUTER_LAST]:
+        # W has any distance from the axis of joint 1: 1 m stands for it.
         axis = vec(g, FIRST_AXIS)
         moment = cross(axis, vec(g, FIRST_POINT))
         along, square = math.hypot(axis[0], axis[1]), 2.0 * math.sqrt(dot(moment, moment))
