@@ -116,7 +116,7 @@ def _add_visual(
     named: Mapping[str | None, np.ndarray],
     tell: Callable[[], None],
 ) -> None:
-    meshes = _shapes(visual, link)
+    meshes = _shapes(visual, link, tell)
     own = [_own_color(mesh) for mesh in meshes]
     given = named.get(visual.material.name) if visual.material is not None else None
     # The colours of a mesh with several come before the single one of the URDF; those of a mesh with
@@ -147,7 +147,7 @@ def _own_color(mesh: trimesh.Trimesh) -> Color | None:
     return None
 
 
-def _shapes(visual: yourdfpy.Visual, link: str) -> list[trimesh.Trimesh]:
+def _shapes(visual: yourdfpy.Visual, link: str, tell: Callable[[], None]) -> list[trimesh.Trimesh]:
     geometry = visual.geometry
     assert geometry is not None  # the parser gives every visual one
     if geometry.box is not None:
@@ -157,7 +157,7 @@ def _shapes(visual: yourdfpy.Visual, link: str) -> list[trimesh.Trimesh]:
     if geometry.sphere is not None:
         return [trimesh.creation.icosphere(subdivisions=3, radius=geometry.sphere.radius)]
     assert geometry.mesh is not None
-    meshes = read_parts(Path(geometry.mesh.filename), f"link {link}: visual")
+    meshes = read_parts(Path(geometry.mesh.filename), f"link {link}: visual", tell)
     for mesh in meshes:
         mesh.apply_scale(np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3))
     return meshes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,9 +62,18 @@ def read_mesh(path: Path, field: str = "mesh", *, upright: bool = True) -> trime
     return joined(_parts(path, field, upright=upright))
 
 
-def read_parts(path: Path, field: str = "mesh") -> list[trimesh.Trimesh]:
-    """Read a mesh of a URDF as `read_mesh` does, as one mesh for each material, with their colours."""
-    return _parts(path, field, upright=False, materials=True)
+def read_parts(
+    path: Path, field: str = "mesh", tell: Callable[[], None] | None = None
+) -> list[trimesh.Trimesh]:
+    """Read a mesh of a URDF as `read_mesh` does, as one mesh for each material, with their colours.
+
+    Args:
+        path: the file.
+        field: what refers to it, for error messages.
+        tell: called once what the file says of itself is known, which takes half of the time; may raise
+            `Cancelled`.
+    """
+    return _parts(path, field, upright=False, materials=True, tell=tell)
 
 
 def read_groups(path: Path, field: str = "mesh") -> list[trimesh.Trimesh]:
@@ -131,7 +140,13 @@ def check_size(
 
 
 def _parts(
-    path: Path, field: str, *, upright: bool, materials: bool = False, groups: bool = False
+    path: Path,
+    field: str,
+    *,
+    upright: bool,
+    materials: bool = False,
+    groups: bool = False,
+    tell: Callable[[], None] | None = None,
 ) -> list[trimesh.Trimesh]:
     """Read the parts of a mesh, and compare them with what the file says of itself.
 
@@ -141,6 +156,8 @@ def _parts(
     from trimesh.resolvers import FilePathResolver
 
     declared = _declared(path, field)
+    if tell:
+        tell()
     kind = path.suffix.lower()[1:]
     try:
         with np.errstate(all="ignore"):  # numbers that are not finite are refused below

@@ -14,6 +14,7 @@ import trimesh
 from app.scene3d import visual_meshes
 from app.scene3d.visual_meshes import MAX_TRIANGLES, link_visuals
 from symgrasp.errors import SymgraspError
+from symgrasp.meshes import reading
 from symgrasp.robot.model import RobotModel
 from symgrasp.scene.scene import Scene
 
@@ -104,8 +105,10 @@ def test_a_fine_mesh_is_shown_with_fewer_triangles_in_the_same_place(tmp_path):
 def test_one_may_cancel_between_the_steps_of_every_mesh(tmp_path, monkeypatch):
     trimesh.creation.icosphere(subdivisions=5).export(tmp_path / "ball.stl")
     events: list[str] = []
-    for name in ("_shapes", "_simplified", "export_glb"):
-        step = getattr(visual_meshes, name)
+    parts = [(reading, "_declared"), (trimesh, "load_scene")]
+    parts += [(visual_meshes, name) for name in ("_simplified", "export_glb")]
+    for module, name in parts:
+        step = getattr(module, name)
 
         def noting(
             *arguments: object, name: str = name, step: Callable[..., object] = step, **options: object
@@ -113,7 +116,7 @@ def test_one_may_cancel_between_the_steps_of_every_mesh(tmp_path, monkeypatch):
             events.append(name)
             return step(*arguments, **options)
 
-        monkeypatch.setattr(visual_meshes, name, noting)
+        monkeypatch.setattr(module, name, noting)
     link_visuals(urdf(tmp_path, '<mesh filename="ball.stl"/>'), lambda _: events.append("told"))
-    assert [event for event in events if event != "told"] == ["_shapes", "_simplified", "export_glb"]
+    assert [event for event in events if event != "told"] == [name for _, name in parts]
     assert all("told" in pair for pair in pairwise(events))
