@@ -126,7 +126,7 @@ def _add_visual(
     share = MAX_TRIANGLES / sum(len(mesh.faces) for mesh in meshes)
     for mesh, color in zip(meshes, own, strict=True):
         tell()  # also between the steps, as a mesh may be large
-        mesh = _simplified(mesh, share)
+        mesh = _simplified(mesh, share, tell)
         tell()
         if given is not None and not painted:
             color = tuple(round(255 * c) for c in given)
@@ -163,10 +163,12 @@ def _shapes(visual: yourdfpy.Visual, link: str, tell: Callable[[], None]) -> lis
     return meshes
 
 
-def _simplified(mesh: trimesh.Trimesh, share: float) -> trimesh.Trimesh:
+def _simplified(mesh: trimesh.Trimesh, share: float, tell: Callable[[], None]) -> trimesh.Trimesh:
     """Return the shape of a mesh with this share of its triangles, or itself if that is all of them."""
     if share >= 1.0:
         return mesh
     mesh.merge_vertices(merge_tex=True, merge_norm=True)  # where vertices are double, gaps would open
+    tell()
     simple = mesh.simplify_quadric_decimation(percent=1.0 - share, aggression=DECIMATION_AGGRESSION)
+    tell()
     return smooth_shade(simple, angle=CREASE)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
-from typing import NamedTuple
+from functools import cache, lru_cache
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -116,23 +116,38 @@ def _geometries(
     """Do what `chain_geometries` does, for the bytes of H, P, R0 and phi."""
     phi = np.frombuffer(values)
     arm = _Screws(*(np.frombuffer(part).reshape(-1, 3) for part in screws))
+    joints = cache(lambda backwards: [free_joints(arm, locked, float(x), backwards) for x in phi])
     for precision, find in _FAMILIES:
+        # At single values the axes of a pair may be parallel, or so nearly that nothing can be computed.
+        most = {_meeting_pair: len(phi) - 1, _three_parallel_skew: (len(phi) - 1) // 2}.get(find, 0)
         for backwards in (False, True):
-            rows = [find(free_joints(arm, locked, float(value), backwards), precision) for value in phi]
+            rows = _rows(find, joints(backwards), precision, most)
+            if rows is None:
+                continue
             known = [row for row in rows if row is not None]
-            # At single values the axes of a pair may be parallel, or so nearly that nothing can be computed.
-            if known and (
-                find is _meeting_pair or (find is _three_parallel_skew and 2 * len(known) > len(rows))
-            ):
-                one, filled = known[0], zip(rows, phi, strict=True)
-                assert not isinstance(one, SphericalGeometry)  # which has no such values
-                return precision, [
-                    row or _beside(arm, locked, float(value), one, precision) or one.nowhere(float(value))
-                    for row, value in filled
-                ]
             if len(known) == len(rows):
                 return precision, known
+            one, filled = known[0], zip(rows, phi, strict=True)
+            assert not isinstance(one, SphericalGeometry)  # which has no such values
+            return precision, [
+                row or _beside(arm, locked, float(value), one, precision) or one.nowhere(float(value))
+                for row, value in filled
+            ]
     return None
+
+
+def _rows(
+    find: _Find, joints: Sequence[Joints], precision: Precision, most: int
+) -> list[ChainGeometry | None] | None:
+    """Return the geometries of a family, None where there is none; or None after more than ``most`` Nones."""
+    rows: list[ChainGeometry | None] = []
+    lost = 0
+    for own in joints:
+        rows.append(find(own, precision))
+        lost += rows[-1] is None
+        if lost > most:
+            return None
+    return rows
 
 
 def has_exact_pair(arm: Arm, locked: int | None, phi: float) -> bool:
@@ -249,7 +264,9 @@ def _beside(
     return None if beside is None else beside.at(phi, {SHIFTED: 1.0})
 
 
-_FAMILIES: tuple[tuple[Precision, Callable[[Joints, Precision], ChainGeometry | None]], ...] = (
+_Find: TypeAlias = Callable[[Joints, Precision], ChainGeometry | None]
+
+_FAMILIES: tuple[tuple[Precision, _Find], ...] = (
     (EXACT, _spherical),
     (EXACT, _three_parallel),
     (EXACT, _three_parallel_skew),

@@ -7,10 +7,13 @@ another.
 
 from __future__ import annotations
 
-from functools import lru_cache
+import hashlib
+from collections.abc import Sequence
+from functools import lru_cache, partial
 
 import numpy as np
 
+from symgrasp.caching import kept
 from symgrasp.poses import Array, inverse
 from symgrasp.robot.hand import Hand
 from symgrasp.robot.model import RobotModel
@@ -55,27 +58,30 @@ def _always(
         for hand in hands
     }
     of_hands = frozenset().union(*sources.values())
+    between_pairs = _between(model, checked_self_pairs(model))
     found: list[tuple[tuple[str, str], str]] = []
     for hand in hands:
         pairs = [
             pair
-            for pair in checked_self_pairs(model)
-            if (between := _between(model, pair))
-            and not between & moved
-            and between & of_hands
-            and between & of_hands <= sources[hand]
+            for pair, between in between_pairs.items()
+            if between and not between & moved and between & of_hands and between & of_hands <= sources[hand]
         ]
         if pairs:
             values = _values(model, hand, np.frombuffer(home))
-            found += [(pair, hand.name) for pair in _overlapping(model, pairs, values)]
+            key = ("overlapping", model.sha256, tuple(pairs), hashlib.sha256(values.tobytes()).hexdigest())
+            (overlap,) = kept(key, partial(_overlapping, model, pairs, values))
+            found += [(pairs[k], hand.name) for k in overlap.tolist()]
     return tuple(found)
 
 
-def _between(model: RobotModel, pair: tuple[str, str]) -> frozenset[int]:
+def _between(model: RobotModel, pairs: Sequence[tuple[str, str]]) -> dict[tuple[str, str], frozenset[int]]:
     """Return the joints that move one link of a pair and not the other, as indices of joint names."""
-    chains = [{j.name: j.source for j in model.chain(link) if j.source >= 0} for link in pair]
-    names = chains[0].keys() ^ chains[1].keys()
-    return frozenset((chains[0] | chains[1])[name] for name in names)
+    links = dict.fromkeys(link for pair in pairs for link in pair)
+    chains = {link: {j.name: j.source for j in model.chain(link) if j.source >= 0} for link in links}
+    return {
+        (a, b): frozenset((chains[a] | chains[b])[name] for name in chains[a].keys() ^ chains[b].keys())
+        for a, b in pairs
+    }
 
 
 def _values(model: RobotModel, hand: Hand, home: Array) -> Array:
@@ -87,8 +93,8 @@ def _values(model: RobotModel, hand: Hand, home: Array) -> Array:
     return values
 
 
-def _overlapping(model: RobotModel, pairs: list[tuple[str, str]], values: Array) -> list[tuple[str, str]]:
-    """Return the pairs that overlap at all joint values (S, N), by more than they move in between."""
+def _overlapping(model: RobotModel, pairs: list[tuple[str, str]], values: Array) -> tuple[np.ndarray]:
+    """Return which pairs (.,) overlap at all joint values (S, N), by more than they move in between."""
     least = dict.fromkeys(pairs, np.inf)
     client = pybullet.connect(pybullet.DIRECT)
     try:
@@ -110,11 +116,12 @@ def _overlapping(model: RobotModel, pairs: list[tuple[str, str]], values: Array)
                 if least[a, b] <= 0:
                     del least[a, b]
             if not least:
-                return []
+                return (np.empty(0, dtype=int),)
     finally:
         pybullet.disconnect(client)
     poses = model.forward(values)
-    return [pair for pair, depth in least.items() if depth > _step(model, pair, poses)]
+    found = [pairs.index(pair) for pair, depth in least.items() if depth > _step(model, pair, poses)]
+    return (np.array(found, dtype=int),)
 
 
 def _step(model: RobotModel, pair: tuple[str, str], poses: Array) -> float:

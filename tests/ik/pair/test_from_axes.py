@@ -10,7 +10,7 @@ from symgrasp.ik.families import free_joints
 from symgrasp.ik.pair.from_axes import pair_geometry
 from symgrasp.ik.pair.geometry import MEETING_PAIR, SPECIAL, WRIST_POINT
 from symgrasp.robot.catalogue import CATALOGUE
-from tests.ik.pair_reference import reference_row
+from tests.ik.pair.reference import reference_row
 
 
 @given(
