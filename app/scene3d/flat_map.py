@@ -11,7 +11,7 @@ from ..render.cell_colors import cell_colors
 from ..state.state import State
 from .cell_mesh import CellMesh, OnCell, flat_quads
 from .nodes import set_pose
-from .viewpoint import FLAT_SIZE, Box, Viewpoint, flat_map_box, flat_map_position
+from .viewpoint import FLAT_SIZE, Box, Viewpoint, flat_map_box, flat_map_pose, flat_map_position
 
 __all__ = ["FlatMap"]
 
@@ -43,7 +43,7 @@ class FlatMap:
             color=(255, 255, 255), cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
         self.title = add.add_label(
-            f"{root}/title", "unrolled map: click a cell", position=(0, height / 2 + 0.02, 0),
+            f"{root}/title", "unrolled map", position=(0, height / 2 + 0.02, 0),
             anchor="bottom-center", font_screen_scale=0.8,
         )  # fmt: skip
         self.cells = CellMesh(client, f"{root}/cells", *flat_quads(grid, width, height), grid.angles, on_cell)
@@ -67,7 +67,7 @@ class FlatMap:
 
     def _turn(self, view: Viewpoint) -> None:
         self._view = view
-        set_pose(self.frame, flat_map_box(self._position, view)[1])
+        set_pose(self.frame, flat_map_pose(self._position, view))
 
     def show(self, state: State) -> None:
         """Update it to a state."""

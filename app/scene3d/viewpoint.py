@@ -24,6 +24,7 @@ __all__ = [
     "choose_viewpoint",
     "corners",
     "flat_map_box",
+    "flat_map_pose",
     "flat_map_position",
     "hides",
     "link_boxes",
@@ -65,6 +66,9 @@ ALONG, AROUND_AXIS = 5, 6
 
 FLAT_SIZE = (0.33, 0.22)
 """Width and height (m) of the flat map."""
+
+TITLE_ROOM = 0.06
+"""Height (m) above the flat map that its title needs in a view of a metre and a half."""
 
 AROUND = 0.3
 """Robots surround an object that is nearer (m) than this to the mean of their bases."""
@@ -182,10 +186,17 @@ def flat_map_position(scene: Scene, T_world_object: Array, view: Viewpoint) -> A
     return position
 
 
-def flat_map_box(position: Array, view: Viewpoint) -> Box:
-    """Return the box that the flat map fills at a position (3,) where it faces a viewpoint."""
+def flat_map_pose(position: Array, view: Viewpoint) -> Array:
+    """Return the pose (4, 4) of the flat map at a position (3,) where it faces a viewpoint."""
     axes = np.stack([view.right, [0.0, 0.0, 1.0], view.direction], axis=-1)
-    return np.array([*FLAT_SIZE, 0.01]) / 2, from_rotation(axes, position)
+    return from_rotation(axes, position)
+
+
+def flat_map_box(position: Array, view: Viewpoint) -> Box:
+    """Return the box that the flat map and its title fill; see `flat_map_pose`."""
+    width, height = FLAT_SIZE
+    middle = flat_map_pose(position, view) @ translation([0.0, TITLE_ROOM / 2, 0.0])
+    return np.array([width, height + TITLE_ROOM, 0.01]) / 2, middle
 
 
 def corners(box: Box) -> Array:
