@@ -53,15 +53,17 @@ def grasp_html(state: State) -> str:
     why = ", ".join(filter(None, [escape(state.map.why(state.cell)), state.map.holds(state.cell)]))
     where += _probability_text(state)
     witness = state.map.witness(state.cell)
+    rests_on = f"<br>Rests on {escape(state.map.rests_on(state.cell))}."
     if witness is None and state.explanation and state.shown_candidate:
         best = "The best" if state.candidate == 0 else "One"
         ways = count_text(len(state.explanation.candidates), "way")
         return (
             f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} cannot hold it here: '
-            f"{escape(state.explanation.reason.label)}. {best} of {ways} to try is the ghost.</div>"
+            f"{escape(state.explanation.reason.label)}. {best} of {ways} to try is the ghost.{rests_on}</div>"
         )
     if witness is None:
-        return f'<div class="sg"><b>{where}</b><br>{escape(state.arm)} cannot hold it here: {why}</div>'
+        cannot = f"{escape(state.arm)} cannot hold it here: {why}.{rests_on}"
+        return f'<div class="sg"><b>{where}</b><br>{cannot}</div>'
     margin = state.map.margin(state.cell)
     least = "" if state.map.refined is None else "at least "
     holds = state.shown_task.holds if state.shown_task else ()

@@ -51,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
     counts = [f"{count} {reason.label}" for reason, count in found.counts().items()]
     text = f"{len(found.candidates)} candidates: {', '.join(counts)}" if counts else "no candidates"
     say(f"{text}; {found.unreachable} of {len(found.phi)} redundancy samples have none")
+    if found.reason != Reason.FEASIBLE:
+        say(f"that none is feasible rests on {found.rests_on}")
     for result in found.candidates:
         say(f"  {result.where}  {result.reason.label:18}  {result.why}")
     return 0

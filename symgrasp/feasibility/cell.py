@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from symgrasp.poses import Array
 
-__all__ = ["CLEARANCE_LIMIT", "Cell", "Margin", "Window", "Witness"]
+__all__ = ["CLEARANCE_LIMIT", "Cell", "Margin", "Window", "Witness", "rests_on_samples"]
 
 
 CLEARANCE_LIMIT = 0.05
@@ -79,3 +79,11 @@ class Window(NamedTuple):
     def width(self) -> float:
         """Its width (rad)."""
         return self.high - self.low
+
+
+def rests_on_samples(count: int) -> str:
+    """Say what it rests on that a cell is infeasible at so many samples of the redundancy.
+
+    Arms of six joints have one: all of their configurations.
+    """
+    return "1 redundancy sample" if count == 1 else f"{count} redundancy samples"

@@ -188,14 +188,16 @@ class MapMaker:
         if ik is None or the_arm.pitched:
             own = the_arm.grasping(grid, where.row, where.roll)
             self._solvers[the_arm.name] = ik = solver_for(own, self.scene.settings.samples)
-        tell = progress
+        tell, rests_on = progress, None
         if self.scene.settings.redundancy == "auto":
             first, tell = part_of(progress, 0, 2), part_of(progress, 1, 2)
             found = self.map(the_arm.name, the_task, manifold=grid, progress=first, certify=False)
             witness = found.witness(where)
             if witness is not None and not the_arm.pitched:
                 ik = solver_for(the_arm, self.scene.settings.samples, more=[witness.phi])
-        return explain_cell(self.world, ik, the_task, grid, where, tell)
+            rests_on = found.rests_on(where)
+        explanation = explain_cell(self.world, ik, the_task, grid, where, tell)
+        return explanation if rests_on is None else replace(explanation, rests_on=rests_on)
 
     def windows(
         self, m: FeasibilityMap, cells: np.ndarray, progress: Progress | None = None, *, settle: bool = True

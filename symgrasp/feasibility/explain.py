@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symgrasp.feasibility.candidates import CandidateChecker
-from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell
+from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell, rests_on_samples
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map_draft import without_candidates
 from symgrasp.ik import Solver
@@ -140,6 +140,7 @@ class Explanation:
         phi: (K,) redundancy samples (rad), with candidates or without.
         opening: opening of the hand (m).
         T_world_tool: tool pose (4, 4).
+        rests_on: what it rests on that the cell is feasible or infeasible, see `FeasibilityMap.rests_on`.
     """
 
     cell: Cell
@@ -148,11 +149,13 @@ class Explanation:
     phi: Array
     opening: float
     T_world_tool: Array
+    rests_on: str = ""
 
     def __str__(self) -> str:
         """The reason, how many candidates have which, and a line for each."""
         counts = ", ".join(f"{count} {reason.label}" for reason, count in self.counts().items())
         lines = [f"{self.reason.legend}: {len(self.candidates)} candidates{counts and ': ' + counts}"]
+        lines += [f"rests on {self.rests_on}"] if self.rests_on else []
         lines += [f"  {c.where}  {c.reason.label:18}  {c.why}" for c in self.candidates]
         return "\n".join(lines)
 
@@ -211,7 +214,16 @@ def explain_cell(
         reason = candidates[0].reason if candidates else without_candidates(ik)
     if progress and not candidates:
         progress(1.0)
-    return Explanation(cell, reason, tuple(candidates), ik.phi, opening, tools[cell])
+    return Explanation(
+        cell, reason, tuple(candidates), ik.phi, opening, tools[cell], _rests_on(reason, len(ik.phi))
+    )
+
+
+def _rests_on(reason: Reason, samples: int) -> str:
+    """Say what a reason rests on of which no more than samples of the redundancy are known."""
+    if reason == Reason.FEASIBLE:
+        return "its witness"
+    return "a proof" if reason < Reason.UNREACHABLE else rests_on_samples(samples)
 
 
 def _results(

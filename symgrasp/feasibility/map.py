@@ -15,7 +15,7 @@ import numpy as np
 from symgrasp import page
 from symgrasp.errors import SymgraspError
 from symgrasp.feasibility import pictures
-from symgrasp.feasibility.cell import Cell, Margin, Window, Witness
+from symgrasp.feasibility.cell import Cell, Margin, Window, Witness, rests_on_samples
 from symgrasp.feasibility.color_by import ColorBy, color_map
 from symgrasp.feasibility.map_files import ARRAYS, FORMAT_VERSION, read_map
 from symgrasp.feasibility.margins import cells_to_infeasible
@@ -169,7 +169,7 @@ class FeasibilityMap:
             return "a proof"
         if self.resolution:
             return f"a search of the redundancy to {self.resolution:.0e} rad"
-        return f"{len(self.phi)} redundancy samples"
+        return rests_on_samples(len(self.phi))
 
     def holds(self, cell: Cell | tuple[int, int, int]) -> str:
         """Say in words whether a cell is proven to hold as a whole; empty where that was not asked for."""

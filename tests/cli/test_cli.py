@@ -8,12 +8,14 @@ from typing import Any
 from xml.etree import ElementTree
 
 import jsonschema
+import numpy as np
 import pytest
 import yaml
 
 from docs.schemas import schemas
 from symgrasp.cli import export
 from symgrasp.cli.main import main
+from symgrasp.feasibility.create import create_map
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.files import SCENES_DIR
 from symgrasp.motion.exports import MOTION_EXPORTS
@@ -362,3 +364,69 @@ def test_a_map_in_the_colours_of_its_windows(tmp_path, capsys):
     assert pictures["reason"] != pictures["elbow-window"]
     assert main(["map", "ur5_bottle", "--color-by", "elbow-window"]) == 2  # its arm has six joints
     assert "expected one of seven joints" in capsys.readouterr().err
+
+
+def test_a_map_says_what_its_infeasible_cells_rest_on(content, tmp_path, capsys):
+    content["map"] = {"heights": 6, "angles": 12}
+    scene = str(write_scene(tmp_path, content))
+    out = tmp_path / "map.json"
+    assert main(["map", scene, "--out", str(out)]) == 0
+    said = re.search(
+        r"(\S+) % of the infeasible cells are proven to be, the others to (\S+) rad", _printed(capsys)
+    )
+    written = json.loads(out.read_text())
+    reason, proven = np.array(written["reason"]), np.array(written["proven"])
+    infeasible = reason != written["reasons"].index("FEASIBLE")
+    assert said
+    assert float(said[1]) == pytest.approx(100 * proven.sum() / infeasible.sum(), abs=0.05)
+    assert float(said[2]) == pytest.approx(written["resolution"], rel=0.5)
+    assert 0 < written["resolution"] < 0.01
+    assert main(["map", scene, "--redundancy", "5"]) == 0
+    assert "infeasible cells are proven" not in _printed(capsys)
+    roll, row, column = np.argwhere(
+        infeasible & ~proven & (reason > written["reasons"].index("UNREACHABLE"))
+    )[0]
+    where = ["--h", str(written["h"][row]), "--theta", str(np.rad2deg(written["theta"][column]))]
+    assert main(["explain", scene, *where, "--roll", str(180 * roll)]) == 0
+    assert "that none is feasible rests on a search of the redundancy to " in _printed(capsys)
+
+
+def test_a_map_says_what_is_proven_of_whole_cells_and_of_the_area(content, tmp_path, capsys):
+    content["map"] = {"heights": 6, "angles": 12, "redundancy": 4, "resolution": {"mm": 15, "deg": 10}}
+    out = tmp_path / "map.json"
+    assert main(["map", str(write_scene(tmp_path, content)), "--out", str(out)]) == 0
+    printed = _printed(capsys)
+    m = create_map(Scene.from_content(content))
+    assert m.certified is not None and m.refined is not None
+    for what, these in (("feasible", m.feasible), ("infeasible", ~m.feasible)):
+        assert f"{(m.certified & these).sum()} of {these.sum()} {what} cells (" in printed
+    assert f"feasible area, with cells split to parts: {m.refined.area}" in printed
+    assert 0 < m.refined.area.least < m.refined.area.most < 1
+    written = json.loads(out.read_text())
+    assert written["certified"] == m.certified.tolist()
+    assert written["refined"]["area"] == {
+        "feasible": m.refined.area.share,
+        "least": m.refined.area.least,
+        "most": m.refined.area.most,
+    }
+
+
+def test_verify_pins_a_scene_and_lets_no_number_be_overstated(can_plan, tmp_path, capsys):
+    plan, scene = tmp_path / "plan.json", tmp_path / "scene.yaml"
+    plan.write_text(json.dumps(can_plan))
+    scene.write_text(yaml.safe_dump(can_plan["scene"]["content"]))
+    assert main(["verify", str(plan), "--scene", str(scene), "--strict"]) == 0
+    assert "the plan holds" in _printed(capsys)
+    assert main(["verify", str(plan), "--scene", "soda_can"]) == 1
+    assert f"scene: map.heights is 6, but 24 in {Scene.load('soda_can').source}" in _printed(capsys)
+    over = copy.deepcopy(can_plan)
+    over["tasks"][0]["holds"][0]["limit_slack"] += 1e-7
+    plan.write_text(json.dumps(over))
+    assert main(["verify", str(plan)]) == 0
+    assert main(["verify", str(plan), "--strict"]) == 1
+    assert "from a limit, not" in _printed(capsys)
+
+
+def _printed(capsys) -> str:
+    """Return what was printed, however wide the console is."""
+    return " ".join(capsys.readouterr().out.split())

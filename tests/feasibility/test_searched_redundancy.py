@@ -17,10 +17,10 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
 from symgrasp.poses import inverse
 from symgrasp.reason import Reason
-from symgrasp.scene.format import AUTO_SAMPLES, MOST_SAMPLES
+from symgrasp.scene.format import AUTO_SAMPLES, MOST_SAMPLES, MapSettings
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
-from tests.conftest import load_small
+from tests.conftest import SHIPPED, load_small
 from tests.engine.random_scenes import random_scene, random_torso_scene
 
 
@@ -181,6 +181,35 @@ def test_an_explanation_has_the_witness_of_the_map():
     with open_world(scene) as world:
         explanation = MapMaker(world).explain("panda", None, Cell(*index.tolist()))
     assert explanation.reason == Reason.FEASIBLE
+
+
+def test_an_explanation_says_what_the_map_rests_on():
+    scene = Scene.load("bottle_on_table").with_settings(heights=6, angles=12)
+    m = create_map(scene)
+    searched = ~m.feasible & ~m.proven
+    cells = [np.argwhere(which)[0].tolist() for which in (m.feasible, searched, m.proven)]
+    with open_world(scene) as world:
+        found = [MapMaker(world).explain(None, None, Cell(*cell)) for cell in cells]
+    assert [e.rests_on for e in found] == [m.rests_on(Cell(*cell)) for cell in cells]
+    assert len({e.rests_on for e in found}) == 3
+    assert f"\nrests on {found[1].rests_on}" in str(found[1])
+    with open_world(scene.with_settings(redundancy=6)) as world:
+        sampled = MapMaker(world).explain(None, None, Cell(*cells[1]))
+    assert sampled.rests_on == "6 redundancy samples"
+
+
+def test_scenes_search_all_of_the_redundancy_unless_they_say_otherwise():
+    """Of the shipped ones, all but that whose arm of five joints is sampled; and Algorithm 1 has a number."""
+    content = Scene.load("bottle_on_table").content
+    content["map"] = {"heights": 6, "angles": 12}
+    scene = Scene.from_content(content)
+    assert scene.settings.redundancy == MapSettings().redundancy == "auto"
+    assert create_map(scene).resolution > 0
+    plain = create_map(scene, method="reference")
+    assert (len(plain.phi), plain.resolution) == (AUTO_SAMPLES, 0.0)
+    assert len(create_map(scene.with_settings(redundancy=5), method="reference").phi) == 5
+    asked = {name: Scene.load(name).settings.redundancy for name in SHIPPED}
+    assert {name for name, redundancy in asked.items() if redundancy != "auto"} == {"so101_jar"}
 
 
 def test_other_words_are_refused():

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from app.html.readout import comparison_html, grasp_html, notes_html, solution_html, status_html
 from app.state import changes, job_changes
 from app.state.plans import plan_changes
@@ -46,8 +48,24 @@ def test_the_readout_says_how_and_why_not():
     assert "Joints" in held
     missed = changes.choose_cell(state, *cells[False])
     assert "panda cannot hold it here: " + missed.map.why(missed.cell) in grasp_html(missed)
+    assert "Rests on" not in held
+    assert "Rests on 6 redundancy samples." in grasp_html(missed)
     assert "waits for the map" in grasp_html(changes.moved(missed, x=0.5))
     assert "No grasp picked" in grasp_html(state)
+
+
+def test_the_readout_says_what_it_rests_on_that_a_cell_is_infeasible():
+    """Of a map for which all of the redundancy was searched: a proof, or a search to so many radians."""
+    state = changes.choose_cell(opened(), 3, 4)
+    proven = np.zeros_like(state.map.proven)
+    proven[state.cell] = True
+    for found, expected in (
+        (replace(state.map, resolution=1e-4), "a search of the redundancy to 1e-04 rad"),
+        (replace(state.map, resolution=1e-4, proven=proven), "a proof"),
+    ):
+        shown = job_changes.map_arrived(state, 0, MapResult(state.request, found, ()))
+        assert not shown.map.feasible[shown.cell]
+        assert f"Rests on {expected}." in grasp_html(shown)
 
 
 def test_the_hint_follows_what_is_shown():
