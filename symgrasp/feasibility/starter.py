@@ -44,6 +44,9 @@ ENOUGH = 0.3
 COARSE = (4, 16)
 """Heights and angles of that map."""
 
+FEW = 8
+"""Number of redundancy samples of it: where the can stands best is told by few."""
+
 
 def robot_content(
     name: str, urdf: str, arms: Sequence[FoundArm], reading: Mapping[str, Any] | None = None
@@ -70,7 +73,7 @@ def scene_content(robot: dict[str, Any], arm: FoundArm) -> dict[str, Any]:
         "robots": [robot],
         "object": {"name": "can", "profile": [[0.0, radius], [height, radius]]},
         "tasks": [{"name": "hold", "arms": [arm.name], "pose": {"position": [FAR, 0.0, 0.0]}}],
-        "map": {"heights": 12, "angles": 36, "redundancy": 8},
+        "map": {"heights": 12, "angles": 36},
     }
 
 
@@ -96,7 +99,7 @@ def starter_scene(
     if home is not None:
         content["robots"][0]["home"] = dict(home) if isinstance(home, dict) else list(home)
     best, place = 0, None
-    with open_world(scene) as world:
+    with open_world(scene.with_settings(redundancy=FEW)) as world:
         maker, arm = MapMaker(world), scene.arm(arms[0].name)
         grid = Manifold(scene.profile, *COARSE)
         for position in _places(arm, scene.profile):

@@ -28,6 +28,7 @@ def test_the_scene_has_feasible_cells(name, tmp_path, capsys):
     scene = Scene.load(out)
     assert [robot.urdf for robot in scene.file.robots] == [CATALOGUED[name].urdf]
     assert list(scene.arms) == [arm.name for arm in CATALOGUED[name].arms]
+    assert scene.settings.redundancy == "auto"
     assert create_map(scene).feasible.any()
 
 
