@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 
 from symgrasp.bench.guarantee import REFUTED, _arms, _measured, _random, _refuted, summary
-from symgrasp.bench.random_scenes import KINDS
+from symgrasp.bench.random_scenes import KINDS, random_scene, scene_of_kind
+from symgrasp.engine.checks import HIT_BAND
 from symgrasp.feasibility.candidates import CandidateChecker
-from symgrasp.feasibility.create import create_map
+from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.ik import solver_for
 from symgrasp.poses import inverse, translation
 from symgrasp.reason import Reason
 from symgrasp.scene.parts import Task
 from symgrasp.scene.scene import Scene
 from symgrasp.world import open_world
+from tests.ik.eaik import EaikIK
 
 
 def small() -> Scene:
@@ -77,3 +79,35 @@ def test_a_rounded_hand_that_just_touches_a_mesh_refutes_no_cell():
         checker = CandidateChecker(world, arm, ik, 0.0, holders=task.arms)
         depths = [c.collision.depth for c in checker.candidates(T, opening) if c.collision]
         assert min(depths) == pytest.approx(3e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize("first", range(0, 100, 20))
+def test_no_infeasible_cell_of_random_scenes_is_free_for_other_libraries(first, tmp_path):
+    """By EAIK's configurations at 256 samples, and Pinocchio and Coal, in 100 scenes of every kind."""
+    brute = pytest.importorskip("symgrasp.bench.brute")
+    kinds = ("", *KINDS)
+    tried = reached = asked = 0
+    for seed in range(first, first + 20):
+        kind = kinds[seed % len(kinds)]
+        content = scene_of_kind(kind, seed, tmp_path) if kind else random_scene(seed)
+        plain = Scene.from_content(content)
+        scene = plain.with_settings(redundancy="auto", margin=0.0, approach=0.0)
+        task, rng = scene.task(), np.random.default_rng(seed)
+        arm = scene.arm(task.arms[0])
+        tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(scene.manifold, task.T_world_object)
+        with open_world(scene) as world:
+            m = MapMaker(world).map()
+            ik = EaikIK(arm, 256)
+            assert ik.knows_arm
+            others = brute.BruteForce(world, arm, ik, task.T_world_object)
+            others.keep(HIT_BAND)
+            infeasible = rng.permutation(np.argwhere(~m.feasible & (m.reason >= Reason.UNREACHABLE)))[:3]
+            for cell in map(tuple, infeasible.tolist()):
+                tried += 1
+                why = f"{content['name']}, {cell}: {m.why(cell)}, by {m.rests_on(cell)}"
+                assert not others.feasible(tools[cell], float(m.opening[cell[1]])), why
+            for cell in map(tuple, rng.permutation(np.argwhere(m.feasible))[:1].tolist()):
+                asked += 1
+                reached += others.feasible(tools[cell], float(m.opening[cell[1]]))
+    assert tried > 30
+    assert reached > 0.7 * asked > 3  # what is free between samples alone is not met

@@ -14,7 +14,8 @@ from symgrasp.feasibility.create import MapMaker, create_map, explain
 from symgrasp.feasibility.exact import engine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import CompiledIK
-from symgrasp.object.manifold import ROLLS
+from symgrasp.ik.retreat import retreated
+from symgrasp.object.manifold import ROLLS, wrap
 from symgrasp.poses import from_position_rpy, inverse, pose_error, rotation_z, translation
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
@@ -195,6 +196,34 @@ def test_a_retreat_turns_no_joint_faster_than_it_can(method):
         assert slow.feasible.sum() < fast.feasible.sum()
     assert not found[-1].feasible.any()
     assert (found[-1].reason[found[0].feasible] == Reason.APPROACH_BLOCKED).all()
+
+
+def test_joints_of_witnesses_are_fast_enough_for_the_hand_on_the_retreat():
+    """Followed millimetre by millimetre by another solver, at 0.1 m/s; without the limit some are not."""
+    content = Scene.load("bottle_on_table").content
+    content["map"] = {"heights": 6, "angles": 12, "redundancy": 4, "approach": 0.05}
+    limit, fastest = 0.4, {}
+    for velocity in (None, limit):
+        content["robots"][0]["velocity"] = velocity
+        scene = Scene.from_content(content)
+        m, arm = create_map(scene), scene.arm()
+        tools = inverse(arm.robot.T_world_base) @ arm.hand.tool_poses(m.manifold, m.T_world_object)
+        speeds = []
+        for index in np.argwhere(m.feasible).tolist():
+            witness = m.witness(Cell(*index))
+            assert witness is not None
+            ik, way = EaikIK(arm, 1).at(np.array([witness.phi])), [witness.q]
+            for distance in np.linspace(0.001, 0.05, 50):
+                q = ik.solve(retreated(tools[tuple(index)], distance)).q
+                away = np.abs(wrap(q - way[-1]))
+                near = away.max(axis=1).argmin()
+                assert away[near].max() < 0.2
+                way.append(way[-1] + wrap(q[near] - way[-1]))
+            steps = np.diff(np.array(way)[::10], axis=0)  # one for each pose that is checked
+            speeds.append(np.abs(steps).max() / (0.01 / 0.1))
+        fastest[velocity] = max(speeds)
+        assert len(speeds) > 5
+    assert fastest[limit] <= limit + 1e-6 < fastest[None]
 
 
 def test_a_margin_can_only_block(bottle_map):

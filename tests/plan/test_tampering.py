@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 
+import numpy as np
 import pytest
 
 from symgrasp.errors import PlanError, SceneError
@@ -13,10 +14,13 @@ from symgrasp.plan.plan import Plan
 from symgrasp.plan.report import Report
 from symgrasp.plan.verify import verify
 from symgrasp.planners.planning import plan_bimanual, plan_handover, plan_sequential
+from symgrasp.robot.posture import conditioning, limit_slack
+from symgrasp.scene.balance import support_margins
 from symgrasp.scene.scene import Scene
 from tests.conftest import load_small
 from tests.plan.tampering import caught, changed, is_harmless, nodes, tamperings
 from tests.plan.test_plan import bimanual, handover, low_and_high, sequential
+from tests.plan.test_proven_margins import one_hand as proven
 from tests.plan.test_torso import content as two_arms
 from tests.planners.test_pitched import LEANING, UPRIGHT
 from tests.planners.test_pitched import scene_of as so101_scene
@@ -44,7 +48,23 @@ def balanced() -> Plan:
     return plan_bimanual(Scene.from_content(content))
 
 
-EVERY = {sequential: 9, bimanual: 11, handover: 17, regrasped: 41, balanced: 23, pitched: 23}
+@cache
+def retreating() -> Plan:
+    """A plan whose hand has a straight retreat, for which all of the redundancy is searched."""
+    scene = load_small("pick_pour_place", 8, 24)
+    return plan_sequential(scene.with_settings(redundancy="auto", approach=0.05))
+
+
+EVERY = {
+    sequential: 9,
+    bimanual: 11,
+    handover: 17,
+    regrasped: 41,
+    balanced: 23,
+    pitched: 23,
+    retreating: 61,
+    proven: 29,
+}
 """How many of the changes of a plan are tried: one in so many."""
 
 
@@ -125,6 +145,7 @@ def around(content: dict) -> None:
         (sequential, around, ["tasks[0] (pick): bottle is", "mm inside post"]),
         (sequential, lowered, ["tasks[0] (pick): nothing holds the object up before it is held"]),
         (sequential, lowered, ["tasks[2] (place): nothing holds the object up after it was held"]),
+        (regrasped, lowered, ["tasks[2] (place): the object is let go where nothing holds it up"]),
         (
             bimanual,
             lambda c: scene_of(c)["tasks"][0].pop("supported"),
@@ -223,6 +244,31 @@ def test_plans_hold_strictly(make):
     assert plan.tasks[0].holds[0].clearance < measured
     assert verify(over)
     assert not verify(over, strict=True)
+
+
+@pytest.mark.parametrize("make", [sequential, bimanual, balanced, proven])
+def test_strictly_no_number_is_overstated_at_all(make):
+    """Beyond what it is by what rounding could explain, each of them is let pass unless strict."""
+    plan, content, tried, missed = make(), document(make), 0, []
+    scene = Scene.from_content(plan.scene.content)
+    for k, task in enumerate(plan.tasks[:1]):
+        arms = [(scene.arm(hold.arm), np.array([*hold.joints.values()]), hold.opening) for hold in task.holds]
+        real: dict[tuple, float] = {
+            ("balance", robot): margin + 5e-7
+            for robot, margin in support_margins(scene, task.object_pose_turned.array(), arms).items()
+        }
+        for j, (hold, (arm, q, _)) in enumerate(zip(task.holds, arms, strict=True)):
+            real["holds", j, "limit_slack"] = float(limit_slack(arm, q)) + 5e-7
+            real["holds", j, "conditioning"] = float(conditioning(arm, q)) + 5e-7
+            for name in ("margin_along", "margin_around"):  # which are stated as they are
+                real["holds", j, name] = getattr(hold, name) + 5e-10
+        for path, over in real.items():
+            changed_plan = Plan.model_validate(changed(content, ("tasks", k, *path), over))
+            if not verify(changed_plan) or verify(changed_plan, strict=True):
+                missed.append((k, *path))
+        tried += len(real)
+    assert missed == []
+    assert tried >= 4
 
 
 def test_planners_say_where_nothing_holds_the_object_up():
