@@ -281,11 +281,11 @@ def test_methods():
     assert plan_sequential(scene, maps=maps, method="regrasp").tasks == best.tasks  # none is needed
 
 
-def low_and_high():
-    """Return a scene and its maps, where picking is feasible only low on the bottle and pouring only high."""
-    scene = load_small("pick_pour_place", 12, 24, 8)
+def low_and_high(approach: float = 0.0, row: int = 6):
+    """Return a scene and its maps, where picking is feasible below a row alone, and pouring above it."""
+    scene = load_small("pick_pour_place", 12, 24, 8).with_settings(approach=approach)
     maps = {(task, "panda"): create_map(scene, task=task) for task in scene.tasks}
-    for task, rows in (("pick", slice(0, 6)), ("pour", slice(6, 12))):
+    for task, rows in (("pick", slice(0, row)), ("pour", slice(row, 12))):
         m = maps[task, "panda"]
         reason = np.full_like(m.reason, Reason.UNREACHABLE)
         reason[:, rows] = m.reason[:, rows]

@@ -39,13 +39,17 @@ def pitched() -> Plan:
     return plan_sequential(so101_scene(UPRIGHT, LEANING))
 
 
-@cache
-def balanced() -> Plan:
-    """A plan of a body that has to stay upright, with a torso."""
+def standing() -> dict:
+    """The content of a scene with a body that has to stay upright, with a torso."""
     content = two_arms()
     content["robots"][0]["support"] = [[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]
     content["object"]["mass"] = 1.0
-    return plan_bimanual(Scene.from_content(content))
+    return content
+
+
+@cache
+def balanced() -> Plan:
+    return plan_bimanual(Scene.from_content(standing()))
 
 
 @cache
