@@ -18,14 +18,14 @@ __all__ = ["cell_colors", "colored_map"]
 
 @cached_with_first
 def colored_map(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy = ColorBy.REASON) -> ColoredMap:
-    """Colour the cells (H, A) of a map.
+    """Colour the cells (H, A) of a map; those not proven to hold as a whole are lighter, where that is known.
 
     Args:
         m: the map.
         roll: which rolls are shown.
         color_by: what the colours stand for.
     """
-    return color_map(color_by, roll.reason(m), roll.values(m, color_by))
+    return color_map(color_by, roll.reason(m), roll.values(m, color_by), roll.certified(m))
 
 
 def cell_colors(state: State, m: FeasibilityMap) -> np.ndarray:

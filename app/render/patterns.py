@@ -26,8 +26,15 @@ _OF_REASONS = {
 }
 
 
-def cell_patterns(color_by: ColorBy) -> list[str]:
-    """Return the names of the patterns of the first indices of a `ColoredMap`; any further index has none."""
+def cell_patterns(color_by: ColorBy, *, lighter: bool = False) -> list[str]:
+    """Return the names of the patterns of the first indices of a `ColoredMap`; any further index has none.
+
+    Args:
+        color_by: what its colours stand for.
+        lighter: whether lighter colours for what is not proven follow, which have the same patterns.
+    """
+    if lighter and color_by in (ColorBy.REASON, ColorBy.FEASIBLE):
+        return 2 * cell_patterns(color_by)
     if color_by is ColorBy.REASON:
         return [_OF_REASONS[reason] for reason in Reason]
     return ["rising", PLAIN]  # what is not feasible

@@ -86,7 +86,7 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | 
         "reasons": [reason.legend for reason in Reason],
         "feasible": int(Reason.FEASIBLE),
         "profile": grid.profile.points.tolist(),
-        "patterns": cell_patterns(color_by),
+        "patterns": cell_patterns(color_by, lighter=m.certified is not None),
     }
     if layer is not None:
         head["layer"] = layer
@@ -185,7 +185,7 @@ def _look(state: State) -> dict[str, Any]:
         look["legend"] = [list(swatch) for swatch in colored.swatches]
         indices = {_hex(color): k for k, color in reversed(list(enumerate(colored.colors)))}
         patterns = dict(enumerate(cell_patterns(state.map_view.color_by)))
-        look["patterns"] = [patterns.get(indices[swatch.color], PLAIN) for swatch in colored.swatches]
+        look["patterns"] = [patterns.get(indices.get(swatch.color, -1), PLAIN) for swatch in colored.swatches]
         look["counted"] = _counted(state.base_map, state.map_view.roll)
         look["places"] = state.base_map.reason[0].size
         if colored.scale:

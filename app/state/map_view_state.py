@@ -52,6 +52,18 @@ class RollChoice(Enum):
         """Return the values (H, A) of a colouring that are shown, in `ColorBy.unit`."""
         return self.of(m, m.values(color_by))
 
+    def certified(self, m: FeasibilityMap) -> np.ndarray | None:
+        """Return which cells (H, A) are proven to hold as a whole; None where the map does not know.
+
+        Of either roll, none is feasible anywhere in a cell that both are proven infeasible in.
+        """
+        if m.certified is None:
+            return None
+        shown = self.of(m, m.certified)
+        if self is RollChoice.EITHER:
+            shown &= self.of(m, m.feasible) | m.certified.all(axis=0)
+        return shown
+
     def of(self, m: FeasibilityMap, cells: np.ndarray) -> np.ndarray:
         """Select from cells (R, H, A) of both rolls those (H, A) that are shown."""
         return np.take_along_axis(cells, self.rolls(m)[None], axis=0)[0]

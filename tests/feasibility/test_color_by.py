@@ -155,3 +155,19 @@ def test_an_svg_holds_the_cells_themselves(bottle_map, color_by, delta, pieces):
     drawn = [np.asarray(Image.open(io.BytesIO(base64.b64decode(h))).convert("RGB")) for h in hrefs]
     for cells in found.colors[found.index]:
         assert any(np.array_equal(image, cells) for image in drawn)
+
+
+def test_parts_of_split_cells_are_drawn_lighter_where_nothing_is_proven():
+    """Of a scene that asks for a resolution, pictures show its parts, not the cells."""
+    scene = load_small("soda_can", 6, 12, 4).with_settings(resolution={"mm": 15, "deg": 10})  # pyright: ignore[reportArgumentType]
+    m = create_map(scene)
+    assert m.refined is not None
+    parts = m.refined
+    assert parts.reason.shape[1:] > m.reason.shape[1:]
+    assert 0 < parts.certified.mean() < 1
+    hrefs = re.findall(rb"base64,([^\"]+)", pictures.to_svg(m.plot()))
+    drawn = [np.asarray(Image.open(io.BytesIO(base64.b64decode(h))).convert("RGB")) for h in hrefs]
+    whole = color_map(ColorBy.REASON, parts.reason, np.full(parts.reason.shape, np.nan))
+    for proven, colors in zip(parts.certified, whole.colors[whole.index], strict=True):
+        (image,) = (i for i in drawn if i.shape == colors.shape and (i[proven] == colors[proven]).all())
+        assert (image[~proven].sum(axis=-1, dtype=int) > colors[~proven].sum(axis=-1, dtype=int)).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +13,12 @@ from hypothesis import strategies as st
 from app.html.map import sample_columns
 from app.render.cell_colors import colored_map
 from app.render.palette import faded
+from app.render.patterns import cell_patterns
 from app.render.prints import shown_prints
 from app.shell.map_parts import UNKNOWN, map_parts
-from app.state import changes
+from app.state import changes, job_changes
 from app.state.map_view_state import RollChoice
+from app.state.requests import MapResult
 from app.state.state import State
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.reason import Reason
@@ -35,6 +38,36 @@ def test_the_page_shows_the_shifted_map_in_its_colours(steps, roll, color_by):
     picture = shown(state).picture()
     assert picture is not None
     assert np.array_equal(picture, expected)
+
+
+@pytest.mark.parametrize("roll", RollChoice)
+def test_what_is_not_proven_to_hold_as_a_whole_is_lighter(roll):
+    """Of both rolls, an infeasible cell is proven where both are, a feasible one where the shown one is."""
+    plain = opened()
+    assert plain.map
+    certified = np.random.default_rng(0).random(plain.map.reason.shape) < 0.5
+    known = replace(plain.map, certified=certified)
+    state = job_changes.map_arrived(plain, 0, MapResult(plain.request, known, ()))
+    before, after = (
+        shown(replace(s, map_view=replace(s.map_view, roll=roll))).picture() for s in (plain, state)
+    )
+    assert before is not None and after is not None
+    if roll is RollChoice.EITHER:
+        one = np.take_along_axis(certified, roll.rolls(known)[None], axis=0)[0]
+        proven = np.where(known.feasible.any(axis=0), one, certified.all(axis=0))
+    else:
+        proven = certified[list(RollChoice).index(roll) - 1]
+    proven = proven[::-1, sample_columns(known.manifold)]
+    assert (after[proven] == before[proven]).all()
+    assert (after[~proven].astype(int).sum(axis=-1) > before[~proven].astype(int).sum(axis=-1)).all()
+    message = map_parts(state)["cells"]
+    head = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+    half = len(head["colors"]) // 2
+    assert head["patterns"] == 2 * cell_patterns(ColorBy.REASON)
+    assert len(head["patterns"]) == 2 * half
+    assert state.map_view.color_by is ColorBy.REASON
+    look = map_parts(state)["look"]
+    assert "lighter: not proven as a whole" in look[4:].decode()
 
 
 def test_a_turn_changes_nothing_but_the_look():
