@@ -49,7 +49,6 @@ def snapshot_html(state: State, camera: Camera, fov: float) -> str:
         )
         view.camera = camera
         view.show(show_position(state, 0.0) if motion_state(state) else state, move_gizmo=True)
-        assert view.flat_map
         start = server.initial_camera
         start.position, start.look_at, start.fov = np.array(camera[:3]), np.array(camera[3:]), fov
         start.up = (0.0, 0.0, 1.0)
