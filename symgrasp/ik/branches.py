@@ -14,7 +14,16 @@ import numpy as np
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.ik.arcs import ARCS, HALVINGS
 from symgrasp.ik.chain import COSINE_TOLERANCE, THREE_PARALLEL, Chain
-from symgrasp.ik.joints import BLURS_SLIGHTLY, FAMILY, misses, onto_limits, settle, within
+from symgrasp.ik.joints import (
+    BLURS_SLIGHTLY,
+    FAMILY,
+    all_within,
+    is_known,
+    misses,
+    onto_limits,
+    settle,
+    within,
+)
 from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.ik.pair.polynomial import POLYNOMIAL_NUMBERS
@@ -22,7 +31,7 @@ from symgrasp.ik.pair.solver import PAIR_BRANCHES, pair_branches
 from symgrasp.ik.pair.starts import STARTS
 from symgrasp.ik.pair.zeros import VIEWS
 from symgrasp.ik.parallel import parallel_branches
-from symgrasp.ik.self_motion import CLOSE, PULLS, VERY_CLOSE, into_limits
+from symgrasp.ik.self_motion import CLOSE, PULLS, VERY_CLOSE, barely_into_limits, into_limits
 from symgrasp.ik.spherical import spherical_branches
 from symgrasp.ik.vectors import STRICT
 from symgrasp.poses import Array
@@ -35,6 +44,16 @@ CLOSED_FORM_BRANCHES = 8
 
 MEMBERS = 16
 """Members of a family of configurations from which one inside the limits is sought."""
+
+LISTED_MEMBERS, MOST_LISTED = 64, 128
+"""Members of a family that are listed of an arm without redundancy, and of all families together at most:
+which of them collide is not known here."""
+
+STRIDE = 39
+"""By how many members the next one is apart from the one before: a golden section of them."""
+
+SAME_MEMBER = 1e-6
+"""Largest difference (rad) of the joints of members that count as one: those of branches that coincide."""
 
 
 class Memory(NamedTuple):
@@ -52,6 +71,7 @@ class Memory(NamedTuple):
         starts: (2, STARTS, n) joint values, inside the limits and outside, from which Newton's method starts.
         counts: (2,) how many.
         row: (n,) joint values.
+        pinned: (n,) which joints keep their values.
         near: (6, n) limits around a configuration, see `Chain`.
         missing: (B,) why a branch does not exist, where the last closed form was solved outside the limits
             too: the radicand (at least -9) of its root that is negative, less 10 times the root's number;
@@ -74,6 +94,7 @@ class Memory(NamedTuple):
     starts: Array
     counts: np.ndarray
     row: Array
+    pinned: np.ndarray
     near: Array
     missing: Array
     free: Array
@@ -95,6 +116,7 @@ def new_memory(joints: int) -> Memory:
         np.empty((2, STARTS, joints)),
         np.empty(2, dtype=np.int64),
         np.empty(joints),
+        np.empty(joints, dtype=bool),
         np.empty((6, joints)),
         np.zeros(PAIR_BRANCHES),
         np.zeros(2),
@@ -107,7 +129,9 @@ def new_memory(joints: int) -> Memory:
 @njit(**STRICT)
 def branch_count(chain):
     """Return how many branches an arm's inverse kinematics may have."""
-    return PAIR_BRANCHES if chain.joint[8] == MEETING_PAIR else CLOSED_FORM_BRANCHES
+    if chain.joint[8] == MEETING_PAIR:
+        return PAIR_BRANCHES
+    return CLOSED_FORM_BRANCHES + (MOST_LISTED if chain.joint[6] < 0 else 0)
 
 
 @njit(**ENTRY)
@@ -128,7 +152,9 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         T: tool pose (4, 4) in the base.
         inside_only: leave out branches outside the limits as early as possible; those that remain are
             bit for bit the same.
-        q: (B, n) receives the joint values of the B = `branch_count` branches.
+        q: (B, n) receives the joint values of the B = `branch_count` branches. Those after the ones of a
+            closed form are members of families inside the limits, at singular poses of arms without
+            redundancy.
         exists: (B,) receives which branches reach the pose.
         inside: (B,) receives which branches reach it inside the limits.
         memory: see `Memory`.
@@ -140,6 +166,7 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
     for b in range(exists.shape[0]):
         exists[b] = False
         inside[b] = False
+    for b in range(memory.missing.shape[0]):
         memory.missing[b] = 0.0
     if joint[8] == MEETING_PAIR:
         solvable = pair_branches(chain, k, T, inside_only, q, exists, inside, memory)
@@ -152,20 +179,41 @@ def branches_at(chain, k, T, inside_only, q, exists, inside, memory):
         return solvable and some
     memory.free[0], memory.free[1] = math.nan, 0.0
     solvable = _closed_form(g, joint, limits, T, inside_only, q, exists, inside, memory)
-    for b in range(exists.shape[0]):
-        if exists[b] and joint[9]:
-            exists[b] = polish_in(chain.forward, chain.fixed, q[b], T, memory.J, memory.A)
-            # Inside the leeway before, too: so an answer does not depend on what was left out early.
-            inside[b] = settle(chain.limits, q[b]) and inside[b]
-        elif exists[b]:
-            exists[b] = not misses(chain.forward, q[b], T)
-        inside[b] = inside[b] and exists[b]
-        exists[b] = exists[b] and _in_cell(chain, q[b])
-        if inside[b]:
-            onto_limits(chain.limits, q[b])
+    for b in range(CLOSED_FORM_BRANCHES):
+        if exists[b]:
+            exists[b], inside[b] = _end_branch(chain, T, q[b], inside[b], memory)
     if memory.free[1] != 0.0:
         _move_inside(chain, g, T, q, exists, inside, memory)
+    if memory.free[1] == FAMILY and joint[6] < 0:
+        _list_members(chain, g, T, q, exists, inside, memory)
     return solvable
+
+
+@njit(**STRICT)
+def _end_branch(chain, T, row, fits, memory):
+    """Polish or check what the closed form found.
+
+    Args:
+        chain, T, memory: see `branches_at`.
+        row: (n,) joint values, changed in place.
+        fits: whether they are inside the leeway.
+
+    Returns:
+        Whether they reach the pose, and whether inside the limits.
+    """
+    if chain.joint[9]:
+        reaches = polish_in(chain.forward, chain.fixed, row, T, memory.J, memory.A)
+        settle(chain.limits, row)
+    else:
+        reaches = not misses(chain.forward, row, T)
+    # Inside the leeway before, too: so an answer does not depend on what was left out early.
+    fits = reaches and fits
+    if fits and not all_within(chain.limits, row):
+        fits = barely_into_limits(chain, row, T, memory)
+    reaches = reaches and _in_cell(chain, row)
+    if fits:
+        onto_limits(chain.limits, row)
+    return reaches, fits
 
 
 @njit(**STRICT)
@@ -190,12 +238,12 @@ def _move_inside(chain, g, T, q, exists, inside, memory):
     """
     close = VERY_CLOSE if memory.free[1] == BLURS_SLIGHTLY else CLOSE
     for i in range(MEMBERS if memory.free[1] == FAMILY else 1):
-        for b in range(exists.shape[0]):
+        for b in range(CLOSED_FORM_BRANCHES):
             memory.exists[b] = False
         memory.free[0] = 2.0 * math.pi * i / MEMBERS
         _closed_form(g, chain.joint, chain.leeway, T, False, memory.q, memory.exists, memory.inside, memory)
         left = False
-        for b in range(exists.shape[0]):
+        for b in range(CLOSED_FORM_BRANCHES):
             if inside[b] or not memory.exists[b]:
                 continue
             left = True
@@ -206,6 +254,30 @@ def _move_inside(chain, g, T, q, exists, inside, memory):
                 exists[b] = inside[b] = True
         if not left:
             break
+
+
+@njit(**STRICT)
+def _list_members(chain, g, T, q, exists, inside, memory):
+    """Write members of families inside the limits after the branches of the closed form."""
+    found = CLOSED_FORM_BRANCHES
+    for i in range(LISTED_MEMBERS):
+        for b in range(CLOSED_FORM_BRANCHES):
+            memory.exists[b] = False
+        # In an order that spreads evenly, should there be more of them than are listed.
+        memory.free[0] = 2.0 * math.pi * ((STRIDE * i) % LISTED_MEMBERS + 0.5) / LISTED_MEMBERS
+        _closed_form(g, chain.joint, chain.leeway, T, True, memory.q, memory.exists, memory.inside, memory)
+        for b in range(CLOSED_FORM_BRANCHES):
+            if not (memory.exists[b] and memory.inside[b]) or found == exists.shape[0]:
+                continue
+            row = memory.q[b]
+            reaches, fits = _end_branch(chain, T, row, True, memory)
+            if not (reaches and fits):
+                continue
+            for j in range(row.shape[0]):
+                q[found, j] = row[j]
+            if not is_known(q, CLOSED_FORM_BRANCHES, found, SAME_MEMBER):
+                exists[found] = inside[found] = True
+                found += 1
 
 
 @njit(**STRICT)

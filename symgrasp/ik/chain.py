@@ -49,7 +49,7 @@ class Chain(NamedTuple):
             -1), outside of whose limits the grasp is that of another cell.
         limits: (6, n) lower limit, upper limit, middle of the range, cosine and sine of the middle, and
             the cosine of half the range, less `COSINE_TOLERANCE`.
-        leeway: (6, n) the same limits for the closed form: of a rounded arm they are wider.
+        leeway: (6, n) the same limits, wider, for the closed form: of a rounded arm by more than of others.
         forward: (2 n + 5, 3) for forward kinematics: H (n rows), P (n + 1), R0 (3) of the arm, and the
             tolerances (m, rad, unused).
         fixed: (n,) which joints are locked.

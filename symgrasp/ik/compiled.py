@@ -12,6 +12,7 @@ from symgrasp.ik.branches import branch_count, new_memory, solve_range
 from symgrasp.ik.chain import COSINE_TOLERANCE, Chain
 from symgrasp.ik.families import EXACT, chain_geometries
 from symgrasp.ik.pair.geometry import MEETING_PAIR
+from symgrasp.ik.self_motion import BARELY
 from symgrasp.poses import Array
 from symgrasp.robot.robot import AZIMUTH, Arm
 
@@ -121,7 +122,7 @@ class CompiledIK(ArmIK):
                 ]
             ),
             limits=_limits(arm, 0.0),
-            leeway=_limits(arm, LEEWAY if rounded or not closed_form else 0.0),
+            leeway=_limits(arm, LEEWAY if rounded or not closed_form else BARELY),
             forward=np.concatenate([arm.H, arm.P, arm.R0, [tolerance]]),
             fixed=np.arange(arm.dof) == locked,
         )

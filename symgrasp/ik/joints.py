@@ -30,6 +30,8 @@ __all__ = [
     "FAMILY",
     "ROOT_TOLERANCE",
     "aligned_below",
+    "all_within",
+    "is_known",
     "miss",
     "misses",
     "nearest_turn",
@@ -163,6 +165,15 @@ def within(limits, joint, value):
 
 
 @njit(**STRICT)
+def all_within(limits, row):
+    """Whether all joint values (n,) are inside their limits, or beyond them by at most `LIMIT_TOLERANCE`."""
+    fits = True
+    for k in range(row.shape[0]):
+        fits = fits and within(limits, k, row[k])
+    return fits
+
+
+@njit(**STRICT)
 def onto_limits(limits, row):
     """Move joint values (n,) that are beyond their limits onto them."""
     for k in range(row.shape[0]):
@@ -181,6 +192,26 @@ def settle(limits, row):
         row[k] = nearest_turn(limits, k, row[k])
         fits = fits and within(limits, k, row[k])
     return fits
+
+
+@njit(**STRICT)
+def is_known(q, first, found, same):
+    """Whether the configuration in a row of q (m, n) is that of a row before it, up to full turns.
+
+    Args:
+        q: configurations (rad).
+        first: the first row that is compared.
+        found: the row.
+        same: largest difference (rad) of joints that are the same.
+    """
+    for i in range(first, found):
+        largest = 0.0
+        for j in range(q.shape[1]):
+            d = q[i, j] - q[found, j]
+            largest = max(largest, abs(d - 2.0 * math.pi * math.floor(d / (2.0 * math.pi) + 0.5)))
+        if largest < same:
+            return True
+    return False
 
 
 @njit(**STRICT)
@@ -266,7 +297,4 @@ def write_branch(joint, limits, phi, values, row):
         row[joint[k]] = values[k]
     if joint[6] >= 0:
         row[joint[6]] = nearest_turn(limits, joint[6], phi)
-    fits = True
-    for k in range(row.shape[0]):
-        fits = fits and within(limits, k, row[k])
-    return fits
+    return all_within(limits, row)

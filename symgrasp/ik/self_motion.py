@@ -26,7 +26,15 @@ from symgrasp.ik.newton import (
 )
 from symgrasp.ik.vectors import STRICT
 
-__all__ = ["CLOSE", "PULLS", "VERY_CLOSE", "family_into_limits", "into_limits"]
+__all__ = [
+    "BARELY",
+    "CLOSE",
+    "PULLS",
+    "VERY_CLOSE",
+    "barely_into_limits",
+    "family_into_limits",
+    "into_limits",
+]
 
 WEIGHT2 = 1e-6
 """Square of the weight w (m/rad, or none)."""
@@ -56,6 +64,10 @@ MEMBERS = 16
 
 SINGULAR2 = 1e-8
 """Square of the singular value (m/rad, or none) of J below which there is a family."""
+
+BARELY = 1e-5
+"""How far (rad) beyond its limits a joint may be that the rounding of a pose has put there: poses of maps are
+rounded to 1e-9 rad (see `symgrasp.object.manifold`), and joints change by more beside singular poses."""
 
 LEAST_GAIN, WAITS = 0.9, 3
 """Where the largest way back does not shrink to this share in a step, from this step on, there is none."""
@@ -107,6 +119,32 @@ def into_limits(chain, q, T, steps, close, J, A):
                 q[j] += A[k, free]
                 k += 1
     return False
+
+
+@njit(**STRICT)
+def barely_into_limits(chain, q, T, memory):
+    """Move an arm of which joints are barely outside their limits onto them, with the tool at a pose.
+
+    Args:
+        chain: the arm.
+        q: (n,) joint values (rad) at which the tool is at the pose; changed in place if they can be moved.
+        T: tool pose (4, 4) in the base.
+        memory: `symgrasp.ik.branches.Memory`.
+
+    Returns:
+        Whether they were: all joints are inside the limits, and the tool is within `POLISHED` of the pose.
+    """
+    limits, row = chain.limits, memory.row
+    for j in range(q.shape[0]):
+        row[j] = min(max(q[j], limits[0, j]), limits[1, j])
+        if not abs(row[j] - q[j]) <= BARELY:
+            return False
+        memory.pinned[j] = chain.fixed[j] or row[j] != q[j]
+    if not (polish_in(chain.forward, memory.pinned, row, T, memory.J, memory.A) and settle(limits, row)):
+        return False
+    for j in range(q.shape[0]):
+        q[j] = row[j]
+    return True
 
 
 @njit(**STRICT)

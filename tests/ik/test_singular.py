@@ -13,6 +13,7 @@ from symgrasp.compiling import ENTRY, njit
 from symgrasp.errors import InputError
 from symgrasp.ik import ArmIK, CompiledIK, solver_for
 from symgrasp.ik.branches import branch_count, branches_at, new_memory
+from symgrasp.poses import pose_error, rotation_about
 from symgrasp.references import resolve
 from symgrasp.robot.catalogue import CATALOGUE
 from tests.ik.redundancy import solve_at
@@ -128,6 +129,41 @@ def test_a_straight_elbow_by_the_kinematics_of_pinocchio(elbow):
             assert ((q >= arm.lower) & (q <= arm.upper)).all()
             pinocchio.framesForwardKinematics(model, data, q)
             np.testing.assert_allclose(data.oMf[tool].homogeneous, T, atol=1e-6)
+
+
+def test_all_of_a_family_is_listed_of_an_arm_without_redundancy():
+    """Whichever angle joint 6 has, which shares a turn with joints 2, 3 and 4, a configuration is near it."""
+    ik = solver_of("ur5")
+    q = np.array([3.056229498575579, -1.208625756800063, 1.837573042928109, -2.343996598569206, 0.0, 0.0])
+    T = ik.arm.tool_pose(q)
+    found = ik.solve(T)
+    assert found.inside.all()
+    position, rotation = pose_error(ik.arm.tool_pose(found.q), T)
+    assert max(position.max(), rotation.max()) < 1e-6
+    of_family = found.q[np.abs(found.q[:, 4]) < 1e-6]
+    elbow_up = of_family[of_family[:, 2] > 0]
+    angles = np.sort(np.mod(elbow_up[:, 5], 2 * np.pi))
+    assert np.diff(angles, append=angles[0] + 2 * np.pi).max() < np.radians(12)
+
+
+@pytest.mark.parametrize("off", [1e-10, -1e-10, 5e-10, -5e-10])
+@pytest.mark.parametrize("name", ["z1", "j2s6", "xarm6"])
+def test_a_joint_at_a_limit_whose_pose_is_rounded(name, off):
+    """Each joint at each limit: the pose turned by what maps round it by is reached inside the limits."""
+    ik = solver_of(name)
+    arm = ik.arm
+    kind, rows = list(configuration_sets(arm, 1, 5, 5))[-1]
+    assert kind == "one at a limit"
+    turn = np.eye(4)
+    turn[:3, :3] = rotation_about(np.array([0.0, 0.6, 0.8]), off)
+    for q in rows:
+        T = arm.tool_pose(q) @ turn
+        found = ik.solve(T)
+        inside = found.q[found.inside]
+        assert len(inside), q.tolist()
+        assert ((inside >= arm.lower) & (inside <= arm.upper)).all()
+        position, rotation = pose_error(arm.tool_pose(inside), T)
+        assert max(position.max(), rotation.max()) < 1e-6
 
 
 @pytest.mark.parametrize("name", ["pr2", "romeo", "ur5", "z1", "xarm7", "tiago_pro", "alex"])

@@ -34,15 +34,13 @@ below is q4, and inner q1.
 
 from __future__ import annotations
 
-import math
-
 from symgrasp.compiling import njit
-from symgrasp.ik.joints import misses, nearest_turn, settle, spread_in, tool_motion
+from symgrasp.ik.joints import is_known, misses, nearest_turn, settle, spread_in, tool_motion
 from symgrasp.ik.newton import polish_in
 from symgrasp.ik.pair.geometry import PAIR_PHI, SHIFTED
 from symgrasp.ik.pair.polynomial import equations_of, may_reach
 from symgrasp.ik.pair.zeros import search_turn
-from symgrasp.ik.self_motion import CLOSE, PULLS, family_into_limits, into_limits
+from symgrasp.ik.self_motion import CLOSE, PULLS, barely_into_limits, family_into_limits, into_limits
 from symgrasp.ik.vectors import STRICT
 
 __all__ = ["PAIR_BRANCHES", "pair_branches"]
@@ -109,6 +107,8 @@ def _add_branches(chain, T, q, exists, inside, memory, starts, found, singular):
             row[j] = start[j]
         reaches = polish_in(chain.forward, chain.fixed, row, T, memory.J, memory.A)
         fits = reaches and settle(chain.limits, row) and not beyond
+        if reaches and not (fits or beyond):
+            fits = barely_into_limits(chain, row, T, memory)
         if singular and not fits:
             for j in range(row.shape[0]):
                 memory.row[j] = start[j]
@@ -118,7 +118,7 @@ def _add_branches(chain, T, q, exists, inside, memory, starts, found, singular):
                     row[j] = memory.row[j]
             elif family_into_limits(chain, row, T, memory.q, memory.J, memory.A):
                 reaches = fits = True
-        if not reaches or misses(chain.forward, row, T) or _is_known(q, found):
+        if not reaches or misses(chain.forward, row, T) or is_known(q, 0, found, SAME):
             continue
         exists[found], inside[found] = True, fits
         found += 1
@@ -140,16 +140,3 @@ def _search_everywhere(chain, g, T, q, exists, inside, memory, found):
             exists[found] = inside[found] = True
             return found + 1
     return found
-
-
-@njit(**STRICT)
-def _is_known(q, found):
-    """Whether the configuration in a row is that of a row before it, up to full turns."""
-    for i in range(found):
-        largest = 0.0
-        for j in range(q.shape[1]):
-            d = q[i, j] - q[found, j]
-            largest = max(largest, abs(d - 2.0 * math.pi * math.floor(d / (2.0 * math.pi) + 0.5)))
-        if largest < SAME:
-            return True
-    return False
