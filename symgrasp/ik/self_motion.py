@@ -33,6 +33,7 @@ __all__ = [
     "VERY_CLOSE",
     "barely_into_limits",
     "family_into_limits",
+    "find_free_way",
     "into_limits",
 ]
 
@@ -167,7 +168,7 @@ def family_into_limits(chain, q, T, rows, J, A):
     for j in range(q.shape[0]):
         member[j], free_way[j] = q[j], 1.0 + 0.1 * j
     for _ in range(MEMBERS - 1):
-        if not _find_free_way(chain, member, T, free_way, J, A):
+        if not find_free_way(chain, member, T, free_way, SINGULAR2, J, A):
             return False
         for j in range(q.shape[0]):
             member[j] += 2.0 * math.pi / MEMBERS * free_way[j]
@@ -183,11 +184,16 @@ def family_into_limits(chain, q, T, rows, J, A):
 
 
 @njit(**STRICT)
-def _find_free_way(chain, q, T, way, J, A):
+def find_free_way(chain, q, T, way, singular2, J, A):
     """Turn a way (n,) in joint space into the one that moves the tool least, of largest part 1.
 
+    Args:
+        chain, q, T, J, A: see `into_limits`.
+        way: (n,) any way, receives the one.
+        singular2: square of the singular value of J (m/rad, or none) below which the tool stays.
+
     Returns:
-        Whether the tool is within `CLOSE` of the pose, and J singular, so that it stays there.
+        Whether the tool is within `CLOSE` of the pose, and stays there.
     """
     for _ in range(2):  # inverse iteration
         free, move, turn, twist = linearise(chain.forward, chain.fixed, q, T, J)
@@ -210,7 +216,7 @@ def _find_free_way(chain, q, T, way, J, A):
             along += part * way[j]
             way[j] = part
             most = max(most, abs(part))
-        if not most * SINGULAR2 > before:
+        if not most * singular2 > before:
             return False
         for j in range(q.shape[0]):
             way[j] *= math.copysign(1.0 / most, along)

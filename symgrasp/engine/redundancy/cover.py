@@ -37,6 +37,7 @@ from symgrasp.engine.redundancy.cover_types import (
     Nodes,
     new_nodes,
 )
+from symgrasp.engine.redundancy.crossings import SWING_STEPS, begin_swing, crosses, next_of_swing
 from symgrasp.engine.redundancy.exclusion import EXCLUDED, TOUCHING, what_is_known
 from symgrasp.engine.redundancy.undecided import new_undecided, note_undecided
 from symgrasp.engine.retreat_search import copy_row, tool_clearance, tool_retreats
@@ -50,6 +51,7 @@ from symgrasp.engine.search_types import (
     new_branches,
 )
 from symgrasp.engine.threads import in_parallel
+from symgrasp.ik.at_phi import geometry_at
 from symgrasp.ik.branches import branch_count
 from symgrasp.ik.chain import Chain
 from symgrasp.ik.spans import prepare_spans
@@ -63,6 +65,9 @@ FINEST = 1e-4
 COARSE = 3e-3
 """The same where a pair of pieces is excluded all along the part, but overlaps by so little that PyBullet may
 call it free: PyBullet is not asked more often."""
+
+ROOTS = 3
+"""Roots of the closed form of arms with a spherical triple; each tells two branches apart."""
 
 MOST_VISITED = 20_000
 """Values of φ of a cell after which the search gives up."""
@@ -196,11 +201,60 @@ def _cover_parts(
                     continue
                 if not ends or known != TOUCHING:
                     result.left[i] = max(result.left[i], width)
+            if covered.locked.spherical:
+                free = _search_crossings(
+                    nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run,
+                    those, left, right,
+                )  # fmt: skip
             nodes.used[left] = False
             left = right
             count -= 1
     if not free:
         result.left[i] = max(result.left[i], result.undecided.spacing[i])
+
+
+@njit(**STRICT)
+def _search_crossings(
+    nodes, scratch, branches, moving, pieces, tree, inputs, balance, covered, result, run, those, left, right
+):
+    """Check candidates on swings of branches between two slots; return whether one is free, like `_visit`.
+
+    The arguments are those of `_visit`; the left slot is not needed any more.
+    """
+    i, T, row, hand, tool = those
+    locked, memory, joint = covered.locked, branches.memory, nodes.chain.joint[6]
+    low, high = nodes.phi[left], nodes.phi[right]
+    for b in range(len(branches.exists[0])):
+        for k in range(ROOTS):
+            if not crosses(nodes, left, right, b, k):
+                continue
+            begin_swing(nodes, left, b)
+            for step in range(SWING_STEPS):
+                goes_on, fits = next_of_swing(nodes, memory, joint, T, step, low, high)
+                if not goes_on:
+                    break
+                if not fits:
+                    continue
+                q = branches.q[0][b]
+                copy_row(memory.row, q)
+                branches.inside[0][b] = True
+                gap = arm_gap(
+                    nodes, scratch, branches, moving, pieces, tree, inputs, balance, T, row, hand, left, b
+                )
+                if gap == -math.inf:
+                    continue
+                geometry_at(locked, q[joint], nodes.chain.geometry[0])
+                gap = retreat_gap(
+                    nodes, scratch, branches, moving, pieces, tree, inputs, balance, run, T, row, tool, gap,
+                    left, b,
+                )  # fmt: skip
+                if gap in (-math.inf, UNDECIDED):
+                    continue
+                result.found[i], result.phi[i], result.branch[i] = True, q[joint], b
+                result.clearance[i] = max(0.0, gap - FREE_BAND)
+                copy_row(q, result.q[i])
+                return True
+    return False
 
 
 @njit(**STRICT)

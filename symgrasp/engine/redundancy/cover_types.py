@@ -121,6 +121,7 @@ class Nodes(NamedTuple):
         end: (2, 12) poses of a pair of pieces at the other end of a part.
         placed: (2, 12) where the pieces of a pair were before it was looked at.
         half: (n,) joint values half way, or where Newton's method is.
+        way: (n,) the way on from there.
         unlocked: (n,) that no joint is locked.
         middle: (12,) pose of a piece there.
     """
@@ -148,6 +149,7 @@ class Nodes(NamedTuple):
     end: Array
     placed: Array
     half: Array
+    way: Array
     unlocked: np.ndarray
     middle: Array
 
@@ -178,6 +180,7 @@ def new_nodes(chain: Chain, locked: Locked, branches: int, joints: int) -> Nodes
         end=np.empty((2, 12)),
         placed=np.empty((2, 12)),
         half=np.empty(joints),
+        way=np.empty(joints),
         unlocked=np.zeros(joints, dtype=bool),
         middle=np.empty(12),
     )
