@@ -127,7 +127,7 @@ def test_how_probable_grasps_are_is_computed_cancelled_and_read_out(open_page, b
     expect(page.text("Stopped.")).to_be_visible()
     page.number("Off by (mm)", 1)  # another question is asked at once
     expect(page.text("Computing how probable grasps are")).to_be_visible()
-    expect(page.legend).not_to_contain_text("not computed yet", timeout=240_000)
+    expect(page.legend).not_to_contain_text("not computed yet", timeout=600_000)
     expect(page.text("Ready.")).to_be_visible()
     page.tab("Grasp")
     expect(page.text("of 100 poses (")).to_be_visible()
