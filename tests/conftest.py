@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,10 +33,35 @@ PLAIN = [name for name, path in shipped_scenes().items() if extra_of(path) is No
 """Those whose robots come with PyBullet: what is slow is done for these alone."""
 
 
+def some(count: int, values: Iterable[Any]) -> list[Any]:
+    """Return parameters of which every run takes the first so many, and a thorough one all."""
+    rows = [value if isinstance(value, tuple) else (value,) for value in values]
+    return [
+        pytest.param(*row, marks=[pytest.mark.thorough] if k >= count else []) for k, row in enumerate(rows)
+    ]
+
+
+@pytest.fixture
+def thorough(pytestconfig: pytest.Config) -> bool:
+    """Whether the run asks of all cases."""
+    return bool(pytestconfig.getoption("thorough"))
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what only a thorough run asks of; pytest says how many tests were deselected."""
+    if not config.getoption("thorough"):
+        left = [item for item in items if item.get_closest_marker("thorough")]
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if not item.get_closest_marker("thorough")]
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add what `tests/fuzz` tries."""
+    """Add how much is asked, and what `tests/fuzz` tries."""
+    parser.addoption(
+        "--thorough", action="store_true", help="ask of every case, where other runs ask of some"
+    )
     group = parser.getgroup("fuzz", "damaged input, see tests/fuzz")
-    group.addoption("--fuzz-cases", type=int, default=50, help="number of cases of each kind of input")
+    group.addoption("--fuzz-cases", type=int, default=15, help="number of cases of each kind of input")
     group.addoption("--fuzz-first", type=int, default=0, help="number of the first case")
     group.addoption("--fuzz-seed", type=int, default=0, help="seed of all cases")
 

@@ -22,6 +22,7 @@ from symgrasp.motion.exports import MOTION_EXPORTS
 from symgrasp.object.library import load_object
 from symgrasp.plan.exports import EXPORTS
 from symgrasp.plan.plan import Plan, plan_schema
+from symgrasp.plan.writing import LAST_DIGIT
 from symgrasp.planners.planning import plan_sequential
 from symgrasp.scene.scene import Scene
 from tests.conftest import SHIPPED, write_scene
@@ -420,7 +421,7 @@ def test_verify_pins_a_scene_and_lets_no_number_be_overstated(can_plan, tmp_path
     assert main(["verify", str(plan), "--scene", "soda_can"]) == 1
     assert f"scene: map.heights is 6, but 24 in {Scene.load('soda_can').source}" in _printed(capsys)
     over = copy.deepcopy(can_plan)
-    over["tasks"][0]["holds"][0]["limit_slack"] += 1e-7
+    over["tasks"][0]["holds"][0]["limit_slack"] += 2 * LAST_DIGIT  # it is rounded down to at least one below
     plan.write_text(json.dumps(over))
     assert main(["verify", str(plan)]) == 0
     assert main(["verify", str(plan), "--strict"]) == 1

@@ -65,6 +65,7 @@ def test_maps_and_plans_show_pictures_and_the_3d_view(executed):
     assert "__VISER_EMBED_DATA__" in frame
 
 
+@pytest.mark.thorough
 def test_the_atlas_shows_every_object_of_the_library(tmp_path):
     done = execute(ROOT / "docs/atlas.ipynb", tmp_path)
     assert not printed(done, "stderr")
@@ -74,6 +75,7 @@ def test_the_atlas_shows_every_object_of_the_library(tmp_path):
     assert kinds(cell_with(done, "feasible angles")) == ["image/png"]
 
 
+@pytest.mark.thorough
 def test_one_of_two_grippers_is_chosen(tmp_path):
     done = execute(ROOT / "docs/grippers.ipynb", tmp_path)
     assert not printed(done, "stderr")

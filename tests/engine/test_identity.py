@@ -18,7 +18,7 @@ from symgrasp.poses import translation
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
 from symgrasp.world import BulletWorld
-from tests.conftest import PLAIN
+from tests.conftest import PLAIN, some
 from tests.engine.identity import assert_same, assert_true
 from tests.engine.random_scenes import ARMS, random_pitched_scene, random_scene, random_torso_scene
 
@@ -41,7 +41,7 @@ def test_shipped_scenes_have_the_same_maps_at_full_grid(name):
                 assert_true(world, scene, scene.arm(arm), exact, cells)
 
 
-@pytest.mark.parametrize("first", range(0, SEEDS, AT_ONCE))
+@pytest.mark.parametrize("first", some(3, range(0, SEEDS, AT_ONCE)))
 def test_random_scenes_have_the_same_maps(first, tmp_path_factory):
     for seed in range(first, first + AT_ONCE):
         content = random_scene(seed)
@@ -110,14 +110,14 @@ def test_robots_that_may_fall_have_the_same_maps():
     assert fallen[Reason.OUT_OF_BALANCE] > 20
 
 
-def test_among_meshes_the_maps_are_the_same(tmp_path):
+def test_among_meshes_the_maps_are_the_same(tmp_path, thorough):
     """Fine flat faces, one with a hole, and a surface that is flat nowhere."""
     meshes = {"ball": icosphere(3, 0.1), "ring": annulus(0.05, 0.12, 0.1), "block": box((0.1, 0.15, 0.2))}
     meshes["block"] = meshes["block"].subdivide().subdivide().subdivide()
     for name, mesh in meshes.items():
         mesh.export(tmp_path / f"{name}.stl")
     blocked = feasible = 0
-    for seed in range(12):
+    for seed in range(12 if thorough else 4):
         content = random_scene(seed)
         for obstacle, name in zip(content["obstacles"], itertools.cycle(meshes), strict=False):
             for shape in ("box", "cylinder", "sphere"):
@@ -126,14 +126,14 @@ def test_among_meshes_the_maps_are_the_same(tmp_path):
         counts = np.zeros(len(Reason), dtype=int)
         feasible += check(content, counts)
         blocked += counts[Reason.SCENE_COLLISION]
-    assert feasible > 50
-    assert blocked > 50
+    assert feasible > 15
+    assert blocked > 15
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_scenes_of_other_kinds_have_the_same_maps(kind, tmp_path):
+def test_scenes_of_other_kinds_have_the_same_maps(kind, tmp_path, thorough):
     """Obstacles of meshes; objects with a cusp, or longer, wider or flatter than any hand is."""
-    feasible = sum(check(scene_of_kind(kind, seed, tmp_path)) for seed in range(8))
+    feasible = sum(check(scene_of_kind(kind, seed, tmp_path)) for seed in range(8 if thorough else 3))
     assert feasible > 0
 
 

@@ -68,9 +68,14 @@ def least_singular_value(arm: Arm, q: np.ndarray, locked: int | None) -> float:
 
 
 def found(ik: CompiledIK, q: np.ndarray) -> bool:
+    """Whether a solution is there, as exactly as one that misses the pose by 1e-8 (m, rad) can be.
+
+    Beside singular poses joints move by much more than the tool does.
+    """
     phi = 0.0 if ik.locked is None else float(q[ik.locked])
     solutions = solve_at(ik, ik.arm.tool_pose(q), phi)
-    return bool(distance(solutions.q[solutions.inside], q).min(initial=np.inf) < 1e-5)
+    away = distance(solutions.q[solutions.inside], q).min(initial=np.inf)
+    return bool(away < 1e-5 or away < 1e-8 / least_singular_value(ik.arm, q, ik.locked))
 
 
 @settings(deadline=None, max_examples=40)

@@ -13,13 +13,14 @@ from symgrasp.plan.verify import verify
 from symgrasp.planners.conflicts import ConflictError
 from symgrasp.planners.planning import plan_sequential, regrasp_plans, sequential_maps
 from symgrasp.scene.scene import Scene
+from tests.conftest import some
 
 DATA = Path(__file__).parent.parent / "data"
 
 
 @pytest.mark.parametrize(
     ("name", "arms", "redundancy"),
-    [("log_two_humanoids", 4, "auto"), ("log_two_gr3", 4, 16), ("tiago_dual_tray", 2, 16)],
+    some(1, [("log_two_humanoids", 4, "auto"), ("log_two_gr3", 4, 16), ("tiago_dual_tray", 2, 16)]),
 )
 def test_all_hands_of_humanoids_take_an_object_together_and_lift_it(name, arms, redundancy):
     """The plans are the best ones of shipped scenes, whose maps take long.

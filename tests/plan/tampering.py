@@ -132,6 +132,8 @@ def _without(plan: Plan) -> dict:
         for hold in task["holds"]:
             for name in ("tool_pose", *LESS):
                 del hold[name]
+            # Of a joint at zero rounding leaves some 1e-16, of either sign.
+            hold["joints"] = {joint: round(value, 12) for joint, value in hold["joints"].items()}
     return content
 
 

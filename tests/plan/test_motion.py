@@ -130,7 +130,7 @@ def pass_over_unchanged(content: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.usefixtures("only_changed_states")
 @pytest.mark.parametrize("step", [1e-3, -1e-3])
-def test_every_changed_number_is_caught(step, content, world):
+def test_every_changed_number_is_caught(step, content, world, thorough):
     """Clearances are what was proven, and may be larger in truth: they are changed by more."""
     changed = copy.deepcopy(content)
     every = list(numbers(changed))
@@ -139,6 +139,8 @@ def test_every_changed_number_is_caught(step, content, world):
     missed = []
     for k, (node, key) in enumerate(every):
         if k % 2 == (step > 0) and key != "clearance":  # every other number is made larger, the rest smaller
+            continue
+        if not thorough and k // 2 % 3:
             continue
         was = node[key]
         node[key] += 100 * abs(step) if key == "clearance" else step

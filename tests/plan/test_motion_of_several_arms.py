@@ -173,12 +173,13 @@ def test_an_arm_that_never_takes_the_object_is_caught(case, content):
     assert missed(content, case, {f"{name} idle": idle}) == []
 
 
-def test_changed_numbers_are_caught(case, content):
+def test_changed_numbers_are_caught(case, content, thorough):
     """Clearances may be larger in truth, see the motions of one arm."""
     name, plan, world = case
     changed = copy.deepcopy(content)
-    every = [entry for entry in numbers(changed) if entry[1] != "clearance"][:: EVERY[name]]
-    assert len(every) > 200
+    every = [entry for entry in numbers(changed) if entry[1] != "clearance"]
+    every = every[:: EVERY[name] if thorough else 3 * EVERY[name] + 2]
+    assert len(every) > 60
     passed = []
     for k, (node, key) in enumerate(every):
         was = node[key]

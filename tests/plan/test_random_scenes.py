@@ -16,7 +16,7 @@ FEW = {"heights": 8, "angles": 24, "redundancy": 8}
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_plans_hold(kind, tmp_path):
+def test_plans_hold(kind, tmp_path, thorough):
     held = 0
     for seed in range(12):
         content = scene_of_kind(kind, seed, tmp_path)
@@ -35,6 +35,8 @@ def test_plans_hold(kind, tmp_path):
         report = verify(Plan.parse(plan.to_json(), "plan"), strict=True)
         assert report.failures == []
         held += 1
+        if held == 2 and not thorough:
+            break
     assert held > 0
 
 

@@ -69,7 +69,7 @@ EVERY = {
     retreating: 61,
     proven: 29,
 }
-"""How many of the changes of a plan are tried: one in so many."""
+"""How many of the changes of a plan a thorough run tries: one in so many; others try a third of them."""
 
 
 @pytest.fixture
@@ -94,14 +94,15 @@ def document(make) -> dict:
 
 
 @pytest.mark.parametrize("make", EVERY)
-def test_every_change_is_caught_or_harmless(make, quick):
+def test_every_change_is_caught_or_harmless(make, quick, thorough):
     """Value by value: left out, of another type, larger, smaller, negated, reordered, repeated."""
-    tried = [t for k, t in enumerate(tamperings(document(make))) if k % EVERY[make] == 0]
+    every = EVERY[make] if thorough else 3 * EVERY[make] + 2
+    tried = [t for k, t in enumerate(tamperings(document(make))) if k % every == 0]
     passed = [t for t in tried if not caught(t[2])]
     missed = [(p, v) for p, v, c in passed if not is_harmless(make(), Plan.parse(json.dumps(c), "plan"))]
     assert missed == []
-    assert len(tried) > 100
-    assert len(passed) < 0.12 * len(tried)
+    assert len(tried) > (60 if thorough else 18)
+    assert len(passed) < 0.12 * len(tried) + 1
 
 
 @pytest.mark.parametrize("make", EVERY)

@@ -134,6 +134,7 @@ def test_others_are_answered_while_one_floods(port, what):
 
 
 @pytest.mark.soak
+@pytest.mark.thorough
 def test_a_turn_is_answered_while_twenty_drag(port):
     """A turn needs no computing; those who drag get their maps in turn."""
     stop = threading.Event()

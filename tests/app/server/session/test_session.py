@@ -64,8 +64,8 @@ class Left:
         return cls(objects, threading.active_count(), len(processes()), megabytes())
 
 
-def before_and_after_a_hundred_sessions() -> tuple[Left, Left]:
-    """Run in a process of its own: what other tests leave would blur the memory."""
+def before_and_after_sessions(rounds: int) -> tuple[Left, Left]:
+    """Let ten at once come and go, so many times; in a process of its own: other tests blur the memory."""
     with start_server() as server, ThreadPoolExecutor(10) as people:
 
         def come_and_go(k: int) -> None:
@@ -81,15 +81,15 @@ def before_and_after_a_hundred_sessions() -> tuple[Left, Left]:
 
         ten_at_once(0)
         before = Left.now()
-        for round_ in range(1, 11):
+        for round_ in range(1, 1 + rounds):
             ten_at_once(round_)
         return before, Left.now()
 
 
 @pytest.mark.soak
-def test_a_hundred_sessions_come_and_go_and_leave_nothing():
+def test_sessions_come_and_go_and_leave_nothing(thorough):
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as alone:
-        before, after = alone.submit(before_and_after_a_hundred_sessions).result()
+        before, after = alone.submit(before_and_after_sessions, 10 if thorough else 3).result()
     assert after.objects == before.objects == [0, 0, 0]
     assert after.threads <= before.threads + 32  # viser's pool grows up to this many
     assert after.processes == 1  # the one that is kept for the next
