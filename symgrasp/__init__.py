@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from symgrasp.feasibility.create import create_map, explain
     from symgrasp.feasibility.map import FeasibilityMap
     from symgrasp.feasibility.object_report import describe_object as measure_object
+    from symgrasp.feasibility.self_motion import self_motion
     from symgrasp.hands.measure import measure_hand
     from symgrasp.object.manifold import Manifold
     from symgrasp.object.profile import Profile
@@ -48,6 +49,7 @@ __all__ = [
     "plan_bimanual",
     "plan_handover",
     "plan_sequential",
+    "self_motion",
     "verify",
 ]
 
@@ -68,6 +70,7 @@ _ORIGINS = {
     "plan_bimanual": "symgrasp.planners.planning:plan_bimanual",
     "plan_handover": "symgrasp.planners.planning:plan_handover",
     "plan_sequential": "symgrasp.planners.planning:plan_sequential",
+    "self_motion": "symgrasp.feasibility.self_motion:self_motion",
     "verify": "symgrasp.plan.verify:verify",
 }
 """Public name → the module and the name in it that it stands for."""

@@ -19,6 +19,7 @@ from tests.conftest import SHIPPED, load_small
 
 NAMES = {
     "load_scene", "create_map", "plan_sequential", "plan_bimanual", "plan_handover", "verify", "explain",
+    "self_motion",
     "measure_object", "measure_hand", "list_scenes", "Profile", "Manifold", "FeasibilityMap", "Reason",
     "Scene", "Plan", "SymgraspError",
 }  # fmt: skip

@@ -6,7 +6,9 @@ four bytes, and arrays. Its ``kind`` says what it is about:
 ``cells``
     the map that was computed, before it is shifted by δ. Arrays over its grid (rows from the lowest height):
     clearance in 0.1 mm (uint16, `UNKNOWN` where there is none), then as uint8 the index of the colour, the
-    reason and the roll that is shown, and which rolls are feasible (bit r for roll r).
+    reason and the roll that is shown, and which rolls are feasible (bit r for roll r). Where the scene
+    asks for a resolution, ``parts`` says into how many the grid is split, and the last array, over them, is
+    the index of the colour of each.
 ``prints``
     the cells under the hands, in the frame of the turned object: the index of the colour (uint8).
 ``look``
@@ -23,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.feasibility.color_by import ColorBy, color_map
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import wrap
 from symgrasp.reason import Reason
@@ -91,6 +93,11 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | 
     if layer is not None:
         head["layer"] = layer
     rolls = np.packbits(m.feasible, axis=0, bitorder="little")[0]
+    parts: list[np.ndarray] = []
+    if m.refined is not None and color_by in (ColorBy.REASON, ColorBy.FEASIBLE):
+        reason, certified = roll.parts(m.refined)
+        head["parts"] = list(reason.shape)
+        parts.append(color_map(color_by, reason, np.full(reason.shape, np.nan), certified).index)
     return _message(
         "cells",
         head,
@@ -99,6 +106,7 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | 
         roll.reason(m).astype(np.uint8),
         roll.rolls(m).astype(np.uint8),
         rolls,
+        *parts,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.refined import Refined
 from symgrasp.survey.success import PoseNoise
 
 from .requests import (
@@ -42,7 +43,7 @@ class RollChoice(Enum):
         """Return the index (H, A) of the roll shown: of either, the one with the furthest reason."""
         if self is RollChoice.EITHER:
             return (m.reason + np.nan_to_num(m.clearance)).argmax(axis=0)
-        return np.full(m.reason.shape[1:], 0 if self is RollChoice.ZERO else 1)
+        return self._rolls(m.reason.shape)
 
     def reason(self, m: FeasibilityMap) -> np.ndarray:
         """Return the reasons (H, A) that are shown."""
@@ -57,20 +58,35 @@ class RollChoice(Enum):
 
         Of either roll, none is feasible anywhere in a cell that both are proven infeasible in.
         """
-        if m.certified is None:
-            return None
-        shown = self.of(m, m.certified)
+        return None if m.certified is None else self._certified(self.rolls(m), m.feasible, m.certified)
+
+    def parts(self, parts: Refined) -> tuple[np.ndarray, np.ndarray]:
+        """Return the reasons (H, A) that are shown of the parts of cells, and which of them are proven."""
+        rolls = parts.reason.argmax(axis=0) if self is RollChoice.EITHER else self._rolls(parts.reason.shape)
+        return _taken(rolls, parts.reason), self._certified(rolls, parts.feasible, parts.certified)
+
+    def _certified(self, rolls: np.ndarray, feasible: np.ndarray, certified: np.ndarray) -> np.ndarray:
+        shown = _taken(rolls, certified)
         if self is RollChoice.EITHER:
-            shown &= self.of(m, m.feasible) | m.certified.all(axis=0)
+            shown &= _taken(rolls, feasible) | certified.all(axis=0)
         return shown
+
+    def _rolls(self, shape: tuple[int, ...]) -> np.ndarray:
+        """Return the index (H, A) of the one roll that is chosen, for cells (R, H, A)."""
+        return np.full(shape[1:], 0 if self is RollChoice.ZERO else 1)
 
     def of(self, m: FeasibilityMap, cells: np.ndarray) -> np.ndarray:
         """Select from cells (R, H, A) of both rolls those (H, A) that are shown."""
-        return np.take_along_axis(cells, self.rolls(m)[None], axis=0)[0]
+        return _taken(self.rolls(m), cells)
 
     def roll(self, m: FeasibilityMap, row: int, column: int) -> int:
         """Return the index of the roll that is shown at a cell."""
         return int(self.rolls(m)[row, column])
+
+
+def _taken(rolls: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Select from cells (R, H, A) those (H, A) of the given rolls."""
+    return np.take_along_axis(cells, rolls[None], axis=0)[0]
 
 
 @dataclass(frozen=True)

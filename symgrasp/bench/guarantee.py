@@ -1,8 +1,8 @@
 """How many feasible cells maps miss: with redundancy samples, and where all of the redundancy is searched.
 
 The truth is a map at 2,048 uniform samples, or half or a quarter where a map may not have so many candidates.
-Pinocchio and Coal tell of some of the cells that are called
-infeasible whether one of those samples is free.
+Pinocchio and Coal tell of some of the cells that are called infeasible whether one of those samples is free,
+in the scene without its margin and retreat, which are not theirs to know.
 """
 
 from __future__ import annotations
@@ -65,7 +65,8 @@ class Guarantee:
             feasible: each is a fault.
         refuted: number of cells that it calls infeasible, but not proven, and Pinocchio and Coal find free
             at a sample.
-        tried: number of cells for which those were asked; 0 where they are not installed.
+        tried: number of cells for which those were asked; 0 where they are not installed, of arms on a torso
+            and of robots that may fall.
         refuted_proven: the same of cells that it says to be proven infeasible: each is a fault.
         tried_proven: number of those for which those were asked.
         ratio: processor time of the map, divided by that of one at 32 samples.
@@ -182,7 +183,12 @@ def _measured(scene: Scene, task: Task, name: str) -> Guarantee:
     searched, after = _timed(scene.with_settings(redundancy="auto"), task, name)
     truth, samples = _truth(scene, task, name)
     missed = truth & ~searched.feasible
-    refuted = _refuted(scene, task, name, searched)
+    plain = scene.with_settings(redundancy="auto", margin=0.0, approach=0.0)
+    without = searched
+    if scene.settings.margin or scene.settings.approach:
+        with open_world(plain) as world:
+            without = MapMaker(world).map(name, task)
+    refuted = _refuted(plain, task, name, without)
     return Guarantee(
         scene.name, task.name, name, samples, int(truth.sum()), int((truth & ~sampled.feasible).sum()),
         int(missed.sum()), int((searched.feasible & ~truth).sum()), int((~searched.feasible).sum()),
@@ -216,6 +222,12 @@ def _truth(scene: Scene, task: Task, name: str) -> tuple[np.ndarray, int]:
 def _refuted(scene: Scene, task: Task, name: str, m: FeasibilityMap) -> tuple[int, int, int, int]:
     """Return how many infeasible cells Pinocchio and Coal find free at a sample, and how many they tried.
 
+    Args:
+        scene: without margin and retreat.
+        task: the task.
+        name: the arm.
+        m: its map.
+
     Returns:
         Both for cells that are not proven infeasible, then for those that are, where the hand fits.
     """
@@ -224,9 +236,7 @@ def _refuted(scene: Scene, task: Task, name: str, m: FeasibilityMap) -> tuple[in
     except ImportError:
         return 0, 0, 0, 0
     arm = scene.arm(name)
-    if arm.robot.torso is not None or arm.robot.support is not None or scene.settings.margin:
-        return 0, 0, 0, 0
-    if scene.settings.approach:
+    if arm.robot.torso is not None or arm.robot.support is not None:
         return 0, 0, 0, 0
     rng = np.random.default_rng(0)
     fits = ~m.feasible & (m.reason != Reason.HAND_TOO_SMALL) & (m.reason != Reason.SURFACE_TOO_STEEP)

@@ -93,14 +93,17 @@ class ShownMap:
             return None
         size = head["heights"] * head["angles"]
         data = np.frombuffer(self._data[kind], np.uint8)
-        assert len(data) == 6 * size
+        heights, angles = head.get("parts", (0, 0))
+        assert len(data) == 6 * size + heights * angles
         index = data[2 * size : 3 * size].reshape(head["heights"], head["angles"])
+        if heights:
+            index = data[6 * size :].reshape(heights, angles)
         theta = -np.pi + (np.arange(COLUMNS) + 0.5) * (2 * np.pi / COLUMNS) + look["delta"]
         share = np.mod(theta - head["start"], 2 * np.pi) / (2 * np.pi)
         colors = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in head["colors"]])
         if look["stale"]:
             colors = np.round(0.3 * colors + 0.7 * GREY)
-        columns = np.floor(share * head["angles"]).astype(int) % head["angles"]
+        columns = np.floor(share * index.shape[1]).astype(int) % index.shape[1]
         return colors.astype(np.uint8)[index[::-1, columns]]
 
 

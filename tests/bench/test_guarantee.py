@@ -39,6 +39,14 @@ def test_a_map_of_all_of_the_redundancy_misses_nothing():
     assert not others
 
 
+def test_other_libraries_are_asked_without_margin_and_retreat():
+    pytest.importorskip("coal")
+    scene = small().with_settings(margin=0.01, approach=0.05)
+    found = _measured(scene, next(iter(scene.tasks.values())), "panda")
+    assert found.tried + found.tried_proven > 0
+    assert (found.refuted, found.refuted_proven) == (0, 0)
+
+
 def test_random_scenes_are_of_every_kind_with_arms_of_seven_joints(tmp_path):
     scene = small()
     found = list(_random(2 * (len(KINDS) + 2), [(scene, *own) for own in _arms(scene)], tmp_path))

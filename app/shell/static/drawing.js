@@ -56,8 +56,9 @@ export function layout(pane) {
 /** The colours that have a pattern, each with its cells as a picture. */
 export function masks(cells) {
   return (cells.patterns ?? []).flatMap((name, k) => {
-    if (!name || !cells.index.includes(k)) return [];
-    return [{ name, color: cells.colors[k], cells: texture(cells, cells.index.map((value) => Number(value === k)), ["#000000", "#000000"], 254) }];
+    const drawn = cells.parts ?? cells;
+    if (!name || !drawn.index.includes(k)) return [];
+    return [{ name, color: cells.colors[k], cells: texture(drawn, drawn.index.map((value) => Number(value === k)), ["#000000", "#000000"], 254) }];
   });
 }
 

@@ -59,9 +59,14 @@ export class MapPane {
         roll: new Uint8Array(data, 4 * size, size),
         rolls: new Uint8Array(data, 5 * size, size),
       } : null;
+      if (head.parts) {
+        const [heights, angles] = head.parts;
+        this.cells.parts = { heights, angles, index: new Uint8Array(data, 6 * size, heights * angles) };
+      }
       this.awaited = null;
       if (this.cells) {
-        this.picture = texture(this.cells, this.cells.index, this.cells.colors);
+        const drawn = this.cells.parts ?? this.cells;
+        this.picture = texture(drawn, drawn.index, this.cells.colors);
         this.masks = masks(this.cells);
       }
     } else if (head.kind === "prints") {

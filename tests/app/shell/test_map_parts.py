@@ -20,7 +20,9 @@ from app.state import changes, job_changes
 from app.state.map_view_state import RollChoice
 from app.state.requests import MapResult
 from app.state.state import State
-from symgrasp.feasibility.color_by import ColorBy
+from symgrasp.feasibility.color_by import ColorBy, color_map
+from symgrasp.feasibility.refined import Refined
+from symgrasp.object.manifold import Manifold
 from symgrasp.reason import Reason
 from tests.app.shown_map import shown
 from tests.app.state.states import opened, with_plan
@@ -68,6 +70,45 @@ def test_what_is_not_proven_to_hold_as_a_whole_is_lighter(roll):
     assert state.map_view.color_by is ColorBy.REASON
     look = map_parts(state)["look"]
     assert "lighter: not proven as a whole" in look[4:].decode()
+
+
+@pytest.mark.parametrize("roll", RollChoice)
+@pytest.mark.parametrize("color_by", [ColorBy.REASON, ColorBy.FEASIBLE])
+def test_split_cells_are_drawn_part_by_part(roll, color_by):
+    """Where either roll is shown, a part is feasible where one is, and proven infeasible where both are."""
+    plain = opened()
+    assert plain.map
+    rng, grid = np.random.default_rng(0), plain.map.manifold
+    fine = Manifold(grid.profile, 3 * grid.heights, 2 * grid.angles)
+    shape = (2, fine.heights, fine.angles)
+    reason = rng.choice([Reason.JOINT_LIMITS, Reason.FEASIBLE], shape).astype(np.uint8)
+    known = replace(
+        plain.map,
+        certified=rng.random(plain.map.reason.shape) < 0.5,
+        refined=Refined(fine, reason, rng.random(shape) < 0.7),
+    )
+    state = changes.turn(job_changes.map_arrived(plain, 0, MapResult(plain.request, known, ())), 0.3)
+    state = replace(state, map_view=replace(state.map_view, roll=roll, color_by=color_by))
+    assert state.map
+    parts = state.map.refined
+    assert parts
+    rows = [0, 1] if roll is RollChoice.EITHER else [list(RollChoice).index(roll) - 1]
+    feasible, proven = parts.feasible[rows], parts.certified[rows]
+    some_hold, none_do = np.logical_or.reduce(feasible & proven), np.logical_and.reduce(~feasible & proven)
+    picture = shown(state).picture()
+    assert picture is not None
+    columns = sample_columns(parts.manifold)
+    assert picture.shape[:2] == (parts.manifold.heights, len(columns)) != state.map.reason[0].shape
+    # The proven colours of what is feasible are those of nothing else.
+    colored = color_map(color_by, np.array([[Reason.FEASIBLE]]), np.zeros((1, 1)), np.ones((1, 1), bool))
+    holds = (picture == colored.colors[colored.index[0, 0]]).all(axis=-1)
+    assert not holds[none_do[::-1, columns]].any()
+    if roll is not RollChoice.EITHER:
+        assert np.array_equal(holds, some_hold[::-1, columns])
+    assert holds[some_hold[::-1, columns]].any()
+    clearance = replace(state, map_view=replace(state.map_view, color_by=ColorBy.CLEARANCE))
+    whole = shown(clearance).picture()
+    assert whole is not None and len(whole) == state.map.manifold.heights
 
 
 def test_a_turn_changes_nothing_but_the_look():
