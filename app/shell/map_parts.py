@@ -94,7 +94,7 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | 
         head["layer"] = layer
     rolls = np.packbits(m.feasible, axis=0, bitorder="little")[0]
     parts: list[np.ndarray] = []
-    if m.refined is not None and color_by in (ColorBy.REASON, ColorBy.FEASIBLE):
+    if m.refined is not None and _shows_parts(m, color_by):
         reason, certified = roll.parts(m.refined)
         head["parts"] = list(reason.shape)
         parts.append(color_map(color_by, reason, np.full(reason.shape, np.nan), certified).index)
@@ -194,7 +194,7 @@ def _look(state: State) -> dict[str, Any]:
         indices = {_hex(color): k for k, color in reversed(list(enumerate(colored.colors)))}
         patterns = dict(enumerate(cell_patterns(state.map_view.color_by)))
         look["patterns"] = [patterns.get(indices.get(swatch.color, -1), PLAIN) for swatch in colored.swatches]
-        look["counted"] = _counted(state.base_map, state.map_view.roll)
+        look["counted"] = _counted(state.base_map, state.map_view.roll, state.map_view.color_by)
         look["places"] = state.base_map.reason[0].size
         if colored.scale:
             scale = colored.scale
@@ -233,11 +233,17 @@ def _age(state: State) -> str:
     return "of an earlier pose" if state.result and not state.is_fresh else ""
 
 
-def _counted(m: FeasibilityMap, roll: RollChoice) -> str:
+def _counted(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy) -> str:
     """Say what the legend counts."""
     rolls, heights, angles = m.reason.shape
     which = f"the better of its {rolls} rolls" if roll is RollChoice.EITHER else f"roll {roll.value}"
-    return f"{heights * angles} places on the object, each with {which}"
+    said = f"{heights * angles} places on the object, each with {which}"
+    return f"{said}; drawn are the parts that they are split into" if _shows_parts(m, color_by) else said
+
+
+def _shows_parts(m: FeasibilityMap, color_by: ColorBy) -> bool:
+    """Whether parts of cells are drawn: their reasons are known, but no values."""
+    return m.refined is not None and color_by in (ColorBy.REASON, ColorBy.FEASIBLE)
 
 
 def _hex(color: np.ndarray) -> str:

@@ -106,7 +106,9 @@ def test_split_cells_are_drawn_part_by_part(roll, color_by):
     if roll is not RollChoice.EITHER:
         assert np.array_equal(holds, some_hold[::-1, columns])
     assert holds[some_hold[::-1, columns]].any()
+    assert "drawn are the parts" in map_parts(state)["look"].decode(errors="ignore")
     clearance = replace(state, map_view=replace(state.map_view, color_by=ColorBy.CLEARANCE))
+    assert "drawn are the parts" not in map_parts(clearance)["look"].decode(errors="ignore")
     whole = shown(clearance).picture()
     assert whole is not None and len(whole) == state.map.manifold.heights
 
