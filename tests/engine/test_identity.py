@@ -126,8 +126,8 @@ def test_among_meshes_the_maps_are_the_same(tmp_path, thorough):
         counts = np.zeros(len(Reason), dtype=int)
         feasible += check(content, counts)
         blocked += counts[Reason.SCENE_COLLISION]
-    assert feasible > 15
-    assert blocked > 15
+    assert feasible > 10
+    assert blocked > 10
 
 
 @pytest.mark.parametrize("kind", KINDS)
