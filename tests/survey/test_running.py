@@ -248,7 +248,7 @@ def test_a_killed_scheduler_leaves_a_good_store(survey, file, one_go, tmp_path, 
     assert content(out) == content(one_go)
 
 
-@pytest.mark.parametrize("workers", [1, 2, 8])
+@pytest.mark.parametrize("workers", [1, 2, 4])
 def test_any_number_of_workers_writes_the_same(survey, one_go, tmp_path, workers):
     cluster: Any = LocalCluster(n_workers=workers, threads_per_worker=1, **THREADS)
     with cluster:
