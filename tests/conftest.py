@@ -61,7 +61,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--thorough", action="store_true", help="ask of every case, where other runs ask of some"
     )
     group = parser.getgroup("fuzz", "damaged input, see tests/fuzz")
-    group.addoption("--fuzz-cases", type=int, default=15, help="number of cases of each kind of input")
+    group.addoption(
+        "--fuzz-cases", type=int, help="number of cases of each kind of input; 15, or 50 with --thorough"
+    )
     group.addoption("--fuzz-first", type=int, default=0, help="number of the first case")
     group.addoption("--fuzz-seed", type=int, default=0, help="seed of all cases")
 

@@ -94,7 +94,7 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | 
         head["layer"] = layer
     rolls = np.packbits(m.feasible, axis=0, bitorder="little")[0]
     parts: list[np.ndarray] = []
-    if m.refined is not None and _shows_parts(m, color_by):
+    if m.refined is not None and color_by.has_parts:
         reason, certified = roll.parts(m.refined)
         head["parts"] = list(reason.shape)
         parts.append(color_map(color_by, reason, np.full(reason.shape, np.nan), certified).index)
@@ -238,12 +238,8 @@ def _counted(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy) -> str:
     rolls, heights, angles = m.reason.shape
     which = f"the better of its {rolls} rolls" if roll is RollChoice.EITHER else f"roll {roll.value}"
     said = f"{heights * angles} places on the object, each with {which}"
-    return f"{said}; drawn are the parts that they are split into" if _shows_parts(m, color_by) else said
-
-
-def _shows_parts(m: FeasibilityMap, color_by: ColorBy) -> bool:
-    """Whether parts of cells are drawn: their reasons are known, but no values."""
-    return m.refined is not None and color_by in (ColorBy.REASON, ColorBy.FEASIBLE)
+    split = m.refined is not None and color_by.has_parts
+    return f"{said}; drawn are the parts that they are split into" if split else said
 
 
 def _hex(color: np.ndarray) -> str:

@@ -29,6 +29,11 @@ class ColorBy(StrEnum):
     WINDOW = "elbow window"
 
     @property
+    def has_parts(self) -> bool:
+        """Whether it colours reasons, which are known of the parts of cells too, and no values."""
+        return self in (ColorBy.REASON, ColorBy.FEASIBLE)
+
+    @property
     def unit(self) -> str:
         """Unit of its values, empty where it shows none."""
         return _UNITS.get(self, "")

@@ -19,7 +19,7 @@ from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.pitch_maps import at_pitches
 from symgrasp.feasibility.splitting import refined
-from symgrasp.feasibility.torso_maps import at_torso, merged
+from symgrasp.feasibility.torso_maps import at_torso, merged, torso_sample
 from symgrasp.ik import Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold, wrap
 from symgrasp.progress import Progress, part_of
@@ -220,9 +220,7 @@ class MapMaker:
         cells = np.asarray(cells, dtype=np.int64).reshape(-1, 3)
         torso, at = arm.robot.torso, np.zeros(len(cells), dtype=int)
         if torso is not None:
-            count = len(torso.joint_names)
-            for k, cell in enumerate(map(tuple, cells)):
-                at[k] = torso.samples_at(m.q[cell][:count].tolist())[0] if m.feasible[cell] else -1
+            at = np.array([torso_sample(m, torso, cell) for cell in map(tuple, cells)], dtype=int)
         found: list[tuple[Window, ...]] = [()] * len(cells)
         values = [t for t in np.unique(at).tolist() if t >= 0]
         for k, t in enumerate(values):

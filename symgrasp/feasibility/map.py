@@ -315,7 +315,7 @@ class FeasibilityMap:
         title = f"{self.scene} · {self.task} · {self.arm}"
         if self.preliminary:
             title += " · coarse, preliminary"
-        parts = self.refined if self.refined and color_by in (ColorBy.REASON, ColorBy.FEASIBLE) else self
+        parts = self.refined if self.refined and color_by.has_parts else self
         coloured = color_map(color_by, parts.reason, self.values(color_by), parts.certified)
         heights = (m.profile.h_min, m.profile.h_max)
         return pictures.draw_map(coloured, heights, m.theta_start, title, ("roll 0°", "roll 180°"), marks)

@@ -7,8 +7,10 @@ import numpy as np
 from symgrasp.errors import InputError, SymgraspError
 from symgrasp.feasibility.cell import Cell, Window
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.torso_maps import torso_sample
 from symgrasp.ik import ArmIK, solver_for
 from symgrasp.poses import Array, inverse
+from symgrasp.robot.limits import LIMIT_TOLERANCE, values_inside
 
 __all__ = ["self_motion"]
 
@@ -44,8 +46,10 @@ def self_motion(
     cell = Cell(*cell)
     arm = m.shown_in.arm(m.arm)
     if arm.robot.torso is not None:
-        values = m.q[cell][: len(arm.robot.torso.joint_names)].tolist()
-        arm = arm.at(arm.robot.torso.samples_at(values)[0])
+        sample = torso_sample(m, arm.robot.torso, cell)
+        if sample < 0:
+            raise SymgraspError(f"the cell {tuple(cell)} is infeasible, and has no windows")
+        arm = arm.at(sample)
     solver = solver_for(arm, 1)
     assert isinstance(solver, ArmIK)  # other arms have no windows
     phi = np.linspace(window.low, window.high, 1 + max(1, int(np.ceil(window.width / step))))
@@ -55,16 +59,16 @@ def self_motion(
     if not np.array_equal(found.sample[own], np.arange(len(phi))):
         raise SymgraspError(f"the window of branch {window.branch} is not one of the cell {tuple(cell)}")
     q = np.unwrap(found.q[own], axis=0)
-    q += _turn_inside(q, arm.lower, arm.upper)
-    if ((q < arm.lower) | (q > arm.upper)).any():
+    # Turns are continued over half a turn, and then may be inside the limits by other full turns.
+    below, above = arm.lower - q.min(axis=0), q.max(axis=0) - arm.upper
+    q += 2 * np.pi * (_turns(below) - _turns(above))
+    if not values_inside(q, arm.lower, arm.upper).all():
         raise SymgraspError(
             f"branch {window.branch}: a joint would have to go back by a full turn along the window"
         )
-    return q
+    return q.clip(arm.lower, arm.upper)
 
 
-def _turn_inside(q: Array, lower: Array, upper: Array) -> Array:
-    """Return the full turns (n,) (rad) that bring each joint's values (k, n) above its lower limit."""
-    turns = np.ceil(np.where(np.isfinite(lower), lower - q.min(axis=0), 0.0) / (2 * np.pi) - 1e-9)
-    back = 2 * np.pi * turns
-    return np.where((q.min(axis=0) >= lower) & (q.max(axis=0) <= upper), 0.0, back)
+def _turns(outside: Array) -> Array:
+    """Return how many full turns (n,) bring joints back that are outside of a limit by so much (rad)."""
+    return np.ceil(np.where(outside > LIMIT_TOLERANCE, outside, 0.0) / (2 * np.pi))

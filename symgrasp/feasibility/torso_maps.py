@@ -11,8 +11,9 @@ import numpy as np
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.refined import merged_parts
 from symgrasp.robot.robot import Arm
+from symgrasp.robot.torso import Torso
 
-__all__ = ["at_torso", "merged"]
+__all__ = ["at_torso", "merged", "torso_sample"]
 
 
 def at_torso(m: FeasibilityMap, arm: Arm, sample: int, count: int) -> FeasibilityMap:
@@ -31,6 +32,11 @@ def at_torso(m: FeasibilityMap, arm: Arm, sample: int, count: int) -> Feasibilit
     samples = np.where(m.feasible, own, -1)
     q = np.where(m.feasible[..., None], arm.with_torso(sample, m.q), np.nan)
     return replace(m, q=q, sample=samples, phi=np.append(np.tile(m.phi[:count], torso), m.phi[count:]))
+
+
+def torso_sample(m: FeasibilityMap, torso: Torso, cell: tuple[int, int, int]) -> int:
+    """Return the sample of the torso at which the witness of a cell is; -1 where the cell is infeasible."""
+    return torso.samples_at(m.q[cell][: len(torso.joint_names)].tolist())[0] if m.feasible[cell] else -1
 
 
 def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:

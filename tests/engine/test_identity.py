@@ -117,7 +117,8 @@ def test_among_meshes_the_maps_are_the_same(tmp_path, thorough):
     for name, mesh in meshes.items():
         mesh.export(tmp_path / f"{name}.stl")
     blocked = feasible = 0
-    for seed in range(12 if thorough else 4):
+    seeds, least = (12, 50) if thorough else (4, 10)
+    for seed in range(seeds):
         content = random_scene(seed)
         for obstacle, name in zip(content["obstacles"], itertools.cycle(meshes), strict=False):
             for shape in ("box", "cylinder", "sphere"):
@@ -126,8 +127,8 @@ def test_among_meshes_the_maps_are_the_same(tmp_path, thorough):
         counts = np.zeros(len(Reason), dtype=int)
         feasible += check(content, counts)
         blocked += counts[Reason.SCENE_COLLISION]
-    assert feasible > 10
-    assert blocked > 10
+    assert feasible > least
+    assert blocked > least
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -74,9 +74,11 @@ def plan(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_any_input_ends_in_plain_words(
-    kind: str, runner: Runner, plan: bytes, tmp_path: Path, pytestconfig: pytest.Config
+    kind: str, runner: Runner, plan: bytes, tmp_path: Path, pytestconfig: pytest.Config, thorough: bool
 ) -> None:
-    first, count, seed = (whole_option(pytestconfig, f"fuzz_{name}") for name in ("first", "cases", "seed"))
+    first, seed = (whole_option(pytestconfig, f"fuzz_{name}") for name in ("first", "seed"))
+    asked = pytestconfig.getoption("fuzz_cases")
+    count = (50 if thorough else 15) if asked is None else int(asked)
     faults, statuses = [], {0: 0, 1: 0, 2: 0}
     cpu, peak = 0.0, 0
     for k in range(first, first + count):

@@ -66,7 +66,7 @@ EVERY = {
     regrasped: 41,
     balanced: 23,
     pitched: 23,
-    retreating: 61,
+    retreating: 31,
     proven: 29,
 }
 """How many of the changes of a plan a thorough run tries: one in so many; others try a third of them."""
@@ -96,13 +96,13 @@ def document(make) -> dict:
 @pytest.mark.parametrize("make", EVERY)
 def test_every_change_is_caught_or_harmless(make, quick, thorough):
     """Value by value: left out, of another type, larger, smaller, negated, reordered, repeated."""
-    every = EVERY[make] if thorough else 3 * EVERY[make] + 2
+    every, least = (EVERY[make], 100) if thorough else (3 * EVERY[make] + 2, 30)
     tried = [t for k, t in enumerate(tamperings(document(make))) if k % every == 0]
     passed = [t for t in tried if not caught(t[2])]
     missed = [(p, v) for p, v, c in passed if not is_harmless(make(), Plan.parse(json.dumps(c), "plan"))]
     assert missed == []
-    assert len(tried) > (60 if thorough else 18)
-    assert len(passed) < 0.12 * len(tried) + 1
+    assert len(tried) > least
+    assert len(passed) < 0.12 * len(tried)
 
 
 @pytest.mark.parametrize("make", EVERY)
