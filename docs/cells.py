@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from docs.pages import put_between
-from symgrasp.bench.cells import FACTORS, CellShares, measure_cells
 from symgrasp.bench.figures import with_machine
+from symgrasp.bench.maps.cells import FACTORS, CellShares, measure_cells
 from symgrasp.files import write_atomically
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes

@@ -12,7 +12,7 @@ import numpy as np
 
 from docs.pages import put_between
 from symgrasp.bench.figures import with_machine
-from symgrasp.bench.grids import Counts, GridResult, measure_grids
+from symgrasp.bench.maps.grids import Counts, GridResult, measure_grids
 from symgrasp.files import write_atomically
 from symgrasp.scene.scene import Scene
 from symgrasp.scene.shipped import shipped_scenes

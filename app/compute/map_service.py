@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from symgrasp.errors import InputError
-from symgrasp.feasibility.coarse import coarse_map, is_map_compiled
 from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.creation.coarse import coarse_map, is_map_compiled
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import rotation_z
 from symgrasp.progress import Progress

@@ -8,7 +8,7 @@ import threading
 import warnings
 
 from symgrasp.errors import InputError
-from symgrasp.feasibility.coarse import is_map_compiled
+from symgrasp.feasibility.creation.coarse import is_map_compiled
 
 from ..compute.cache import SharedCache
 from ..compute.warm_up import compute_first_map

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from symgrasp.bench import maps, planners, processes
+from symgrasp.bench import planners
 from symgrasp.bench.compare import read_run, slower
 from symgrasp.bench.figures import Figure, report
+from symgrasp.bench.maps import map_times, processes
 
 __all__ = ["Figure", "read_run", "report", "run", "slower"]
 
 
 def run() -> Iterator[Figure]:
     """Run all benchmarks and yield their figures as they are measured."""
-    yield from maps.run()
+    yield from map_times.run()
     yield from processes.run()
     yield from planners.run()

@@ -94,14 +94,14 @@ def _surveys(args: argparse.Namespace) -> dict[str, Any]:
 
 def _guarantee(args: argparse.Namespace) -> dict[str, Any]:
     """Measure what maps miss."""
-    from symgrasp.bench import guarantee
+    from symgrasp.bench.maps import guarantee
 
     return _summed_up("maps", guarantee.run(args.random), guarantee.summary)
 
 
 def _singular(args: argparse.Namespace) -> dict[str, Any]:
     """Measure which poses are reached inside the limits, singular ones and others."""
-    from symgrasp.bench import singular
+    from symgrasp.bench.arms import singular
 
     return _summed_up("arms", singular.run(args.poses), singular.summary)
 
@@ -123,9 +123,9 @@ def _summed_up(
 
 def _motion(args: argparse.Namespace) -> dict[str, Any]:
     """Measure how fast motions are planned."""
-    from symgrasp.bench import motion
+    from symgrasp.bench.motions import motion_times
 
-    return _told(motion.run(args.quick))
+    return _told(motion_times.run(args.quick))
 
 
 def _plans(args: argparse.Namespace) -> dict[str, Any]:
@@ -148,7 +148,7 @@ def _told(measured: Iterable[Figure]) -> dict[str, Any]:
 
 def _robots(args: argparse.Namespace) -> dict[str, Any]:
     """Measure the inverse kinematics of robots, or their maps."""
-    from symgrasp.bench import ik, robots
+    from symgrasp.bench.arms import ik, robots
     from symgrasp.bench.figures import with_machine
 
     name, measured = ("arms", ik.run) if args.what == "ik" else ("robots", robots.run)

@@ -19,7 +19,7 @@ from symgrasp.cli.shared import (
 )
 
 if TYPE_CHECKING:
-    from symgrasp.bench.grids import GridResult
+    from symgrasp.bench.maps.grids import GridResult
     from symgrasp.scene.scene import Scene
 
 __all__ = ["add_parser", "run"]
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     check_out(args.out, ENDINGS)
     scene = checked_scene(args.scene)
 
-    from symgrasp.bench.grids import HEADER, REFERENCE, coarsest, measure_grids
+    from symgrasp.bench.maps.grids import HEADER, REFERENCE, coarsest, measure_grids
 
     count = sum(len(task.arms) for task in scene.tasks.values())
     say(f"{scene.name}: {count} map{'s' if count > 1 else ''}, compared with those on {_size(*REFERENCE)}")
@@ -84,7 +84,7 @@ def _size(heights: int, angles: int) -> str:
 def _content(scene: Scene, results: list[GridResult], ending: str) -> bytes:
     """Return what a file of this ending holds."""
     from symgrasp.bench.figures import with_machine
-    from symgrasp.bench.grids import draw
+    from symgrasp.bench.maps.grids import draw
     from symgrasp.feasibility.pictures import to_png, to_svg
 
     if ending == ".json":

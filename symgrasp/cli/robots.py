@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _solver(robot: CatalogueRobot, arm: CatalogueArm) -> str:
     """Return how the configurations of an arm are found, and whether all of them are."""
-    from symgrasp.bench.ik import bare_arm
+    from symgrasp.bench.arms.ik import bare_arm
     from symgrasp.ik import ArmIK, PitchedIK, solver_for
 
     try:

@@ -11,15 +11,15 @@ from typing import Literal
 import numpy as np
 
 from symgrasp.errors import InputError
-from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.cell import Cell, Window
+from symgrasp.feasibility.creation.algorithm1 import create_map_reference
+from symgrasp.feasibility.creation.pitch_maps import at_pitches
+from symgrasp.feasibility.creation.splitting import refined
+from symgrasp.feasibility.creation.torso_maps import at_torso, merged, torso_sample
 from symgrasp.feasibility.exact.certified import LEVELS
 from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.feasibility.explain import Explanation, explain_cell
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.feasibility.pitch_maps import at_pitches
-from symgrasp.feasibility.splitting import refined
-from symgrasp.feasibility.torso_maps import at_torso, merged, torso_sample
 from symgrasp.ik import Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold, wrap
 from symgrasp.progress import Progress, part_of

@@ -12,8 +12,8 @@ import numpy as np
 
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Cell, rests_on_samples
+from symgrasp.feasibility.creation.map_draft import without_candidates
 from symgrasp.feasibility.fit import fit
-from symgrasp.feasibility.map_draft import without_candidates
 from symgrasp.ik import Solver
 from symgrasp.ik.retreat import retreated
 from symgrasp.object.manifold import Manifold

@@ -6,8 +6,8 @@ import numpy as np
 
 from symgrasp.errors import InputError, SymgraspError
 from symgrasp.feasibility.cell import Cell, Window
+from symgrasp.feasibility.creation.torso_maps import torso_sample
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.feasibility.torso_maps import torso_sample
 from symgrasp.ik import ArmIK, solver_for
 from symgrasp.poses import Array, inverse
 from symgrasp.robot.limits import LIMIT_TOLERANCE, values_inside

@@ -11,7 +11,7 @@ import numpy as np
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker
-from symgrasp.feasibility.torso_maps import merged
+from symgrasp.feasibility.creation.torso_maps import merged
 from symgrasp.ik import redundancy_of, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold, wrap
 from symgrasp.plan.check_holds import tool_of

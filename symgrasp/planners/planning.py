@@ -15,9 +15,9 @@ import numpy as np
 
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.creation.pitch_maps import common_pitches
+from symgrasp.feasibility.creation.torso_maps import merged
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.feasibility.pitch_maps import common_pitches
-from symgrasp.feasibility.torso_maps import merged
 from symgrasp.plan.plan import Plan, Planner
 from symgrasp.plan.writing import write_plan
 from symgrasp.planners.azimuths import bound_holds

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from symgrasp import bench
-from symgrasp.bench import maps, planners
-from symgrasp.bench.brute import BruteForce
+from symgrasp.bench import planners
+from symgrasp.bench.maps import map_times
+from symgrasp.bench.maps.brute import BruteForce
 from symgrasp.cli.main import main
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.ik import solver_for
@@ -53,26 +54,26 @@ def test_a_long_sequence_and_sampling_are_measured():
 
 
 def test_maps_are_measured_against_the_slow_ways(monkeypatch):
-    monkeypatch.setattr(maps, "GRID", {"heights": 6, "angles": 8, "redundancy": 4})
-    monkeypatch.setattr(maps, "SECONDS", dict.fromkeys(maps.SECONDS, 0.01))
-    found = figures(maps.against_others(["soda_can", "log_two_robots"], rounds=2))
+    monkeypatch.setattr(map_times, "GRID", {"heights": 6, "angles": 8, "redundancy": 4})
+    monkeypatch.setattr(map_times, "SECONDS", dict.fromkeys(map_times.SECONDS, 0.01))
+    found = figures(map_times.against_others(["soda_can", "log_two_robots"], rounds=2))
     assert len(found["map of soda_can"].values) == 2 * 2 * 3
-    for other in maps.SECONDS:
+    for other in map_times.SECONDS:
         (total,) = [f for name, f in found.items() if name == f"maps of all shipped scenes: {other} takes"]
         assert len(total.values) == 2
         assert min(total.values) > 0
 
 
 def test_every_arm_of_a_scene_and_the_approach(monkeypatch):
-    monkeypatch.setattr(maps, "GRID", {"heights": 6, "angles": 8, "redundancy": 4})
-    found = list(maps.every_arm(["soda_can", "log_iiwa_and_panda"], rounds=2))
+    monkeypatch.setattr(map_times, "GRID", {"heights": 6, "angles": 8, "redundancy": 4})
+    found = list(map_times.every_arm(["soda_can", "log_iiwa_and_panda"], rounds=2))
     assert [len(f.values) for f in found] == [2, 2, 2, 2]
     assert [len(f.cpu) for f in found] == [2, 2, 2, 0]
     assert sorted(found[-1].values)[0] == 1.0
     assert {f.name for f in found[1:3]} == {
         f"every arm: log_iiwa_and_panda, {arm}" for arm in ("panda", "iiwa")
     }
-    assert [len(f.values) for f in maps.approach(1)] == [1, 1]
+    assert [len(f.values) for f in map_times.approach(1)] == [1, 1]
 
 
 def test_four_hands_are_measured():
@@ -81,20 +82,20 @@ def test_four_hands_are_measured():
 
 
 def test_without_coal_the_bench_says_how_to_get_it(monkeypatch):
-    monkeypatch.setattr(maps, "GRID", {"heights": 4, "angles": 4, "redundancy": 2})
-    monkeypatch.setattr(maps, "SECONDS", dict.fromkeys(maps.SECONDS, 0.01))
-    monkeypatch.setattr(maps, "has_coal", lambda: False)
-    last = list(maps.against_others(["soda_can"], rounds=1))[-1]
+    monkeypatch.setattr(map_times, "GRID", {"heights": 4, "angles": 4, "redundancy": 2})
+    monkeypatch.setattr(map_times, "SECONDS", dict.fromkeys(map_times.SECONDS, 0.01))
+    monkeypatch.setattr(map_times, "has_coal", lambda: False)
+    last = list(map_times.against_others(["soda_can"], rounds=1))[-1]
     assert "pip install" in last.line()
     assert last.values == ()
 
 
 def test_growth_boxes_and_turning(monkeypatch):
-    monkeypatch.setattr(maps, "GRID", {"heights": 4, "angles": 8, "redundancy": 2})
-    monkeypatch.setattr(maps, "FINE", 48)
-    assert [len(figure.values) for figure in maps.boxes(rounds=2)] == [2, 2]
-    assert len(next(iter(maps.turning(3))).values) == 3
-    assert [len(figure.values) for figure in maps.growth(1)] == [1, 1]
+    monkeypatch.setattr(map_times, "GRID", {"heights": 4, "angles": 8, "redundancy": 2})
+    monkeypatch.setattr(map_times, "FINE", 48)
+    assert [len(figure.values) for figure in map_times.boxes(rounds=2)] == [2, 2]
+    assert len(next(iter(map_times.turning(3))).values) == 3
+    assert [len(figure.values) for figure in map_times.growth(1)] == [1, 1]
 
 
 @pytest.mark.parametrize("name", PLAIN)

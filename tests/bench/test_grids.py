@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from symgrasp.bench.grids import Counts, GridResult, coarsest, compare, measure_grids
+from symgrasp.bench.maps.grids import Counts, GridResult, coarsest, compare, measure_grids
 from symgrasp.cli.main import main
 from symgrasp.errors import Cancelled
 from symgrasp.feasibility.create import create_map

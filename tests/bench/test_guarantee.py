@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symgrasp.bench.guarantee import REFUTED, _arms, _measured, _random, _refuted, summary
-from symgrasp.bench.random_scenes import KINDS, random_scene, scene_of_kind
+from symgrasp.bench.maps.guarantee import REFUTED, _arms, _measured, _random, _refuted, summary
+from symgrasp.bench.maps.random_scenes import KINDS, random_scene, scene_of_kind
 from symgrasp.engine.checks import HIT_BAND
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.create import MapMaker, create_map
@@ -72,7 +72,7 @@ def test_cells_that_are_falsely_infeasible_are_refuted():
 
 def test_a_rounded_hand_that_just_touches_a_mesh_refutes_no_cell():
     # Coal has the hand without its rounding of 1 mm: 0.97 mm from the bowl, which it touches by 0.03 mm.
-    brute = pytest.importorskip("symgrasp.bench.brute")
+    brute = pytest.importorskip("symgrasp.bench.maps.brute")
     scene = Scene.load("pick_pour_place").with_settings(heights=8, angles=16)
     place = translation([0.4212612292191334, -0.1925591721155413, -0.04327858471825968])
     task, arm, cell = Task("place", ("panda",), place), scene.arm("panda"), (0, 3, 12)
@@ -93,7 +93,7 @@ def test_a_rounded_hand_that_just_touches_a_mesh_refutes_no_cell():
 @pytest.mark.parametrize("first", some(1, range(0, 100, 20)))
 def test_no_infeasible_cell_of_random_scenes_is_free_for_other_libraries(first, tmp_path):
     """By EAIK's configurations at 256 samples, and Pinocchio and Coal, in 100 scenes of every kind."""
-    brute = pytest.importorskip("symgrasp.bench.brute")
+    brute = pytest.importorskip("symgrasp.bench.maps.brute")
     kinds = ("", *KINDS)
     tried = reached = asked = 0
     for seed in range(first, first + 20):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symgrasp.bench import ik
+from symgrasp.bench.arms import ik
 from symgrasp.ik import CompiledIK
 from symgrasp.robot.catalogue import CATALOGUE
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from symgrasp.bench import motion
 from symgrasp.bench.figures import keyed
+from symgrasp.bench.motions import motion_times
 
 
 def test_free_motions_are_compared_with_other_planners_and_looked_at():
     kind = "between random boxes"
-    found = keyed([*motion.free_motions(kind, count=2), *motion.proofs(kind, count=3)])
+    found = keyed([*motion_times.free_motions(kind, count=2), *motion_times.proofs(kind, count=3)])
     own, rivals = f"free motion {kind}", ("RRT-Connect of OMPL with PyBullet", "roboplan")
     for rival in rivals:
         whole = found[f"{own}: {rival}, times as long"].values
@@ -20,5 +20,5 @@ def test_free_motions_are_compared_with_other_planners_and_looked_at():
         assert found[f"{own}: {rival}, found"].values == (1.0,)
     looked = f"3 free motions {kind}: found"
     assert found[looked].values == (1.0,)
-    assert found[f"{looked}: found by OMPL in {motion.LONGER} times the time"].values[0] > 0
+    assert found[f"{looked}: found by OMPL in {motion_times.LONGER} times the time"].values[0] > 0
     assert found[f"{looked}: share that touches something, by PyBullet"].values == (0.0,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from symgrasp.bench import processes
+from symgrasp.bench.maps import processes
 
 
 def test_a_command_is_timed_and_weighed():

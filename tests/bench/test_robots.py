@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symgrasp.bench import robots
-from symgrasp.bench.ik import bare_arm, random_configurations
-from symgrasp.bench.numerical import INSIDE, reach
+from symgrasp.bench.arms import robots
+from symgrasp.bench.arms.ik import bare_arm, random_configurations
+from symgrasp.bench.arms.numerical import INSIDE, reach
 from symgrasp.cli.main import main
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.create import create_map

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symgrasp.bench.ik import bare_arm
-from symgrasp.bench.singular import NEAR_ZERO, configuration_sets, measure, reached, summary
+from symgrasp.bench.arms.ik import bare_arm
+from symgrasp.bench.arms.singular import NEAR_ZERO, configuration_sets, measure, reached, summary
 from symgrasp.ik import ArmIK, solver_for
 from symgrasp.robot.catalogue import CATALOGUE
 

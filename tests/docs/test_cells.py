@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 from docs.cells import MEASURED, PAGE, table
-from symgrasp.bench.cells import CellShares, measure_cells
 from symgrasp.bench.figures import with_machine
+from symgrasp.bench.maps.cells import CellShares, measure_cells
 from tests.conftest import SHIPPED, load_small
 
 ROWS = [CellShares(24, 48, 100, 40, 200, 150, 2.53), CellShares(48, 96, 400, 240, 800, 640, 3.0)]

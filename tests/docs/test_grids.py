@@ -6,7 +6,7 @@ import json
 
 from docs.grids import MEASURED, PAGE, read, table
 from symgrasp.bench.figures import with_machine
-from symgrasp.bench.grids import Counts, GridResult
+from symgrasp.bench.maps.grids import Counts, GridResult
 from tests.conftest import SHIPPED
 
 COUNTS = Counts(cells=1000, truly=200, called=190, missed=30, overstated=20, coarse=19, mixed=4)

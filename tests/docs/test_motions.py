@@ -7,9 +7,9 @@ import json
 import numpy as np
 
 from docs.motions import BEGIN, END, MEASURED, PAGE, table
-from symgrasp.bench import motion
 from symgrasp.bench.figures import Figure, keyed
-from symgrasp.bench.free_problems import PROBLEMS
+from symgrasp.bench.motions import motion_times
+from symgrasp.bench.motions.free_problems import PROBLEMS
 
 
 def test_the_page_says_what_was_measured():
@@ -27,18 +27,20 @@ def measured() -> dict[str, Figure]:
 def test_what_was_measured_is_what_the_benchmark_measures():
     """With as many runs, under the names that it has now."""
     found = measured()
-    for name in motion.WHOLE:
+    for name in motion_times.WHOLE:
         times = found[f"{name}: motion, once the maps exist"].values
         assert len(times) == 20
     for kind in PROBLEMS:
         assert len(found[f"free motion {kind}"].values) == 20
-        assert f"150 free motions {kind}: found: found by OMPL in {motion.LONGER} times the time" in found
-    assert len(found) == 2 * len(motion.WHOLE) + len(PROBLEMS) * (2 + 2 * 4 + 3)
+        assert (
+            f"150 free motions {kind}: found: found by OMPL in {motion_times.LONGER} times the time" in found
+        )
+    assert len(found) == 2 * len(motion_times.WHOLE) + len(PROBLEMS) * (2 + 2 * 4 + 3)
 
 
 def test_motions_are_found_fast_and_none_touches_anything():
     found = measured()
-    for name in motion.WHOLE:
+    for name in motion_times.WHOLE:
         own = f"{name}: motion, once the maps exist"
         assert max(found[own].values) <= 3.0
         assert found[f"{own}: found"].values == (1.0,)
@@ -49,5 +51,5 @@ def test_motions_are_found_fast_and_none_touches_anything():
             assert np.median(bullet) >= 20
             assert np.median(found[f"{own}: roboplan, times as long{part}"].values) > 1
         assert found[f"{looked}: share that touches something, by PyBullet"].values == (0.0,)
-        theirs = found[f"{looked}: found by OMPL in {motion.LONGER} times the time"].values
+        theirs = found[f"{looked}: found by OMPL in {motion_times.LONGER} times the time"].values
         assert found[looked].values >= theirs

@@ -8,8 +8,8 @@ from dataclasses import asdict
 import pytest
 
 from docs.robots import BEGIN, END, MEASURED, PAGE, table, write
+from symgrasp.bench.arms.robots import Check, RobotRow
 from symgrasp.bench.figures import with_machine
-from symgrasp.bench.robots import Check, RobotRow
 from symgrasp.robot.catalogue import CATALOGUE
 
 GOOD = RobotRow(

@@ -21,7 +21,7 @@ NAMING = ("Figure", "against", "ratios", "times")
 def patterns() -> list[str]:
     """Return what the benchmark's figures may be called, as regular expressions."""
     found = []
-    for path in Path(bench.__file__).parent.glob("*.py"):
+    for path in Path(bench.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") in NAMING:
                 name = node.args[0]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from symgrasp.bench import random_scenes
+from symgrasp.bench.maps import random_scenes
 
 ARMS = {
     "three_parallel": [0.0, -1.2, -1.5, -0.4, 1.5, 0.0],
@@ -20,7 +20,7 @@ ARMS = {
 
 
 def random_scene(seed: int, arm: str = "") -> dict[str, Any]:
-    """Return a scene as `symgrasp.bench.random_scenes` draws them.
+    """Return a scene as `symgrasp.bench.maps.random_scenes` draws them.
 
     Args:
         seed: of everything in it.

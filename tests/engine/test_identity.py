@@ -11,7 +11,7 @@ import pytest
 import yaml
 from trimesh.creation import annulus, box, icosphere
 
-from symgrasp.bench.random_scenes import KINDS, scene_of_kind
+from symgrasp.bench.maps.random_scenes import KINDS, scene_of_kind
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.poses import translation

@@ -9,15 +9,15 @@ import sys
 import numpy as np
 import pytest
 
-from symgrasp.feasibility.coarse import ANGLES, HEIGHTS, SAMPLES, coarse_map
 from symgrasp.feasibility.create import create_map
+from symgrasp.feasibility.creation.coarse import ANGLES, HEIGHTS, SAMPLES, coarse_map
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.world import open_world
 from tests.conftest import load_small
 
 PROGRAM = """
 from symgrasp.compiling import notify_on_compile
-from symgrasp.feasibility.coarse import coarse_map, is_map_compiled
+from symgrasp.feasibility.creation.coarse import coarse_map, is_map_compiled
 from symgrasp.world import open_world
 from tests.conftest import load_small
 

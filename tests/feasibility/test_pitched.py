@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symgrasp.bench import robots
+from symgrasp.bench.arms import robots
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import Manifold

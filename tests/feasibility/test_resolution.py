@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from symgrasp.bench.random_scenes import scene_of_kind
+from symgrasp.bench.maps.random_scenes import scene_of_kind
 from symgrasp.engine.redundancy.cover import FINEST
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.map import FeasibilityMap

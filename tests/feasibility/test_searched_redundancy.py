@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.bench.random_scenes import KINDS, scene_of_kind
+from symgrasp.bench.maps.random_scenes import KINDS, scene_of_kind
 from symgrasp.errors import Cancelled, SceneError
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell

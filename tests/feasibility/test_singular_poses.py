@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symgrasp.bench.singular import configuration_sets
+from symgrasp.bench.arms.singular import configuration_sets
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.starter import starter_scene

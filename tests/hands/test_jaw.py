@@ -12,8 +12,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from symgrasp.errors import UrdfError
-from symgrasp.feasibility.algorithm1 import create_map_reference
 from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.creation.algorithm1 import create_map_reference
 from symgrasp.feasibility.starter import starter_scene
 from symgrasp.found_arms import find_arms
 from symgrasp.hands.measure import measure_hand

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from symgrasp.bench.ik import bare_arm
+from symgrasp.bench.arms.ik import bare_arm
 from symgrasp.ik import CompiledIK
 from symgrasp.ik.at_phi import geometry_at, locked_joint
 from symgrasp.robot.catalogue import CATALOGUE

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symgrasp.bench.ik import random_configurations, recall, sampled_solver
-from symgrasp.bench.numerical import reach
+from symgrasp.bench.arms.ik import random_configurations, recall, sampled_solver
+from symgrasp.bench.arms.numerical import reach
 from symgrasp.errors import UrdfError
 from symgrasp.ik import ArmIK, CompiledIK, GridSolvers, PitchedIK, solver_for
 from symgrasp.ik.arm_ik import Lock

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symgrasp.bench.ik import bare_arm, sampled_solver
-from symgrasp.bench.singular import configuration_sets, reached
+from symgrasp.bench.arms.ik import bare_arm, sampled_solver
+from symgrasp.bench.arms.singular import configuration_sets, reached
 from symgrasp.compiling import ENTRY, njit
 from symgrasp.errors import InputError
 from symgrasp.ik import ArmIK, CompiledIK, solver_for

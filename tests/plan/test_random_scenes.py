@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from symgrasp.bench.random_scenes import KINDS, scene_of_kind
+from symgrasp.bench.maps.random_scenes import KINDS, scene_of_kind
 from symgrasp.errors import NoPlanError, SceneError
 from symgrasp.plan.plan import Plan
 from symgrasp.plan.verify import verify

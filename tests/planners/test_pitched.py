@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from symgrasp.bench.numerical import reach
+from symgrasp.bench.arms.numerical import reach
 from symgrasp.errors import NoPlanError, SceneError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.motion.planning import plan_motion

@@ -24,6 +24,8 @@ from symgrasp.engine.search_types import RowChecks
 from symgrasp.engine.threads import core_count
 from symgrasp.errors import InputError
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT, Window
+from symgrasp.feasibility.creation.map_draft import MapDraft
+from symgrasp.feasibility.creation.torso_maps import merged
 from symgrasp.feasibility.exact.batches import Batch, batches, compiled_parts
 from symgrasp.feasibility.exact.certified import LEVELS, CellProver
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
@@ -32,8 +34,6 @@ from symgrasp.feasibility.exact.redundancy_search import RedundancySearch
 from symgrasp.feasibility.exact.scene_bodies import FixedBodies, PieceBodies, SceneBodies
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.feasibility.map_draft import MapDraft
-from symgrasp.feasibility.torso_maps import merged
 from symgrasp.ik import GridSolvers, solver_for
 from symgrasp.ik.at_phi import Locked, locked_joint
 from symgrasp.ik.retreat import retreat_distances, retreat_turns

@@ -9,7 +9,7 @@ from symgrasp.engine.checks import FREE_BAND
 from symgrasp.engine.geometry import ArmGeometry
 from symgrasp.engine.kinematics import Scratch
 from symgrasp.feasibility.candidates import CandidateChecker
-from symgrasp.feasibility.map_draft import MapDraft
+from symgrasp.feasibility.creation.map_draft import MapDraft
 from symgrasp.ik import Solver
 from symgrasp.poses import Array
 from symgrasp.reason import Reason

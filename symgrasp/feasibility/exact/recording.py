@@ -7,8 +7,8 @@ import numpy as np
 from symgrasp.engine import search
 from symgrasp.engine.redundancy.cover import FINEST
 from symgrasp.engine.redundancy.cover_types import CoverResult
+from symgrasp.feasibility.creation.map_draft import MapDraft
 from symgrasp.feasibility.exact.scene_bodies import FixedBodies, PieceBodies
-from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.reason import Reason
 
 __all__ = ["record_cover", "record_search"]

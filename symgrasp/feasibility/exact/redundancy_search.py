@@ -19,10 +19,10 @@ from symgrasp.engine.redundancy.out_of_reach import out_of_reach
 from symgrasp.engine.redundancy.windows import windows
 from symgrasp.engine.search_types import RowChecks
 from symgrasp.feasibility.cell import Window
+from symgrasp.feasibility.creation.map_draft import MapDraft
 from symgrasp.feasibility.exact.batches import Batch
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
 from symgrasp.feasibility.exact.settling import settled
-from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.ik.at_phi import Locked
 from symgrasp.poses import Array
 from symgrasp.progress import Progress

@@ -9,7 +9,7 @@ import numpy as np
 from symgrasp.engine.checks import HIT_BAND
 from symgrasp.engine.geometry import ArmGeometry
 from symgrasp.feasibility.cell import CLEARANCE_LIMIT
-from symgrasp.feasibility.map_draft import MapDraft
+from symgrasp.feasibility.creation.map_draft import MapDraft
 from symgrasp.reason import Reason
 from symgrasp.robot.robot import Arm
 from symgrasp.world import BodyName, BulletWorld, Collision

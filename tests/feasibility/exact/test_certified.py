@@ -13,15 +13,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symgrasp.bench.random_scenes import KINDS, scene_of_kind
+from symgrasp.bench.maps.random_scenes import KINDS, scene_of_kind
 from symgrasp.engine.reach import arm_reach
 from symgrasp.errors import Cancelled, MapError, SceneError
 from symgrasp.feasibility.create import MapMaker, create_map
+from symgrasp.feasibility.creation.torso_maps import merged
 from symgrasp.feasibility.exact.cell_rows import new_rows
 from symgrasp.feasibility.fit import fit, fits_all, fits_none
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.margins import way_to_unproven
-from symgrasp.feasibility.torso_maps import merged
 from symgrasp.object.manifold import Manifold, wrap
 from symgrasp.object.profile import Profile
 from symgrasp.poses import from_position_rpy

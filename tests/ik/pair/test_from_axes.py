@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symgrasp.bench.ik import bare_arm
+from symgrasp.bench.arms.ik import bare_arm
 from symgrasp.ik import CompiledIK
 from symgrasp.ik.families import free_joints
 from symgrasp.ik.pair.from_axes import pair_geometry

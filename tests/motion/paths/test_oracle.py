@@ -6,8 +6,8 @@ from itertools import count, islice
 
 import numpy as np
 
-from symgrasp.bench.free_problems import Problem, between_boxes, between_compartments, touches
-from symgrasp.bench.rrt_connect import Found, rrt_connect
+from symgrasp.bench.motions.free_problems import Problem, between_boxes, between_compartments, touches
+from symgrasp.bench.motions.rrt_connect import Found, rrt_connect
 
 COUNT = 20
 ITERATIONS = 2_000

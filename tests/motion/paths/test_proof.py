@@ -12,7 +12,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from symgrasp.bench.random_scenes import KINDS, scene_of_kind
+from symgrasp.bench.maps.random_scenes import KINDS, scene_of_kind
 from symgrasp.errors import SceneError
 from symgrasp.motion.bodies.motion_scene import MotionScene
 from symgrasp.motion.bodies.situation import Situation

@@ -17,7 +17,7 @@ from time import process_time
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from symgrasp.bench.random_scenes import KINDS, random_scene, scene_of_kind
+from symgrasp.bench.maps.random_scenes import KINDS, random_scene, scene_of_kind
 from symgrasp.engine.checks import HIT_BAND
 from symgrasp.errors import SceneError
 from symgrasp.feasibility.cell import Cell
@@ -111,7 +111,7 @@ def run(random: int) -> Iterator[Guarantee]:
 
     Args:
         random: number of random scenes, of which one arm is measured: objects at random places of shipped
-            scenes in turns with scenes of each kind of `symgrasp.bench.random_scenes`.
+            scenes in turns with scenes of each kind of `symgrasp.bench.maps.random_scenes`.
     """
     scenes = [Scene.load(name) for name, path in shipped_scenes().items() if missing_extra(path) is None]
     arms = [(scene, task, name) for scene in scenes for task, name in _arms(scene)]
@@ -232,7 +232,7 @@ def _refuted(scene: Scene, task: Task, name: str, m: FeasibilityMap) -> tuple[in
         Both for cells that are not proven infeasible, then for those that are, where the hand fits.
     """
     try:
-        from symgrasp.bench.brute import BruteForce
+        from symgrasp.bench.maps.brute import BruteForce
     except ImportError:
         return 0, 0, 0, 0
     arm = scene.arm(name)

@@ -8,9 +8,9 @@ import numpy as np
 
 from symgrasp.feasibility.candidates import Candidate, CandidateChecker
 from symgrasp.feasibility.cell import Cell
+from symgrasp.feasibility.creation.map_draft import MapDraft
 from symgrasp.feasibility.fit import fit
 from symgrasp.feasibility.map import FeasibilityMap
-from symgrasp.feasibility.map_draft import MapDraft
 from symgrasp.ik import GridSolvers, Solver, solver_for
 from symgrasp.object.manifold import ROLLS, Manifold
 from symgrasp.poses import inverse

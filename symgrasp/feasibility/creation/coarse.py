@@ -8,7 +8,7 @@ import numpy as np
 
 from symgrasp.engine.redundancy.cover import is_cover_compiled
 from symgrasp.engine.search import is_search_compiled
-from symgrasp.feasibility.algorithm1 import create_map_reference
+from symgrasp.feasibility.creation.algorithm1 import create_map_reference
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import InterpretedIK
 from symgrasp.object.manifold import Manifold

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symgrasp.bench.ik import bare_arm, random_configurations, sampled_solver
+from symgrasp.bench.arms.ik import bare_arm, random_configurations, sampled_solver
 from symgrasp.ik import ArmIK, solver_for
 from symgrasp.poses import Array, pose_error
 from symgrasp.robot.catalogue import CATALOGUE, CatalogueArm, CatalogueRobot

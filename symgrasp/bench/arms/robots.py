@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from symgrasp.bench.ik import bare_arm, random_configurations, recall, sampled_solver
-from symgrasp.bench.numerical import reach
+from symgrasp.bench.arms.ik import bare_arm, random_configurations, recall, sampled_solver
+from symgrasp.bench.arms.numerical import reach
 from symgrasp.errors import InputError, SymgraspError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.exact.engine import ExactEngine

@@ -30,7 +30,7 @@ it has between fork and exec.
 
 COMPUTE = """
 import sys
-from symgrasp.bench.maps import GRID
+from symgrasp.bench.maps.map_times import GRID
 from symgrasp.bench.timing import time_of
 from symgrasp.engine.threads import use_cores
 from symgrasp.feasibility.create import MapMaker

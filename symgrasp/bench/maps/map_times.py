@@ -15,10 +15,10 @@ import yaml
 
 from symgrasp.bench.figures import Figure
 from symgrasp.bench.timing import Time, ratios, time_of, times
-from symgrasp.feasibility.algorithm1 import furthest
 from symgrasp.feasibility.candidates import CandidateChecker
 from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.create import MapMaker
+from symgrasp.feasibility.creation.algorithm1 import furthest
 from symgrasp.feasibility.exact.engine import ExactEngine
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.files import SCENES_DIR
@@ -150,7 +150,7 @@ def _slow_methods(world: BulletWorld, scene: Scene) -> Iterator[tuple[str, Decid
     checker = CandidateChecker(world, arm, ik, scene.settings.approach)
     yield "reference", lambda T, opening: furthest(checker.candidates(T, opening))
     if has_coal() and scene.settings.approach == scene.settings.margin == 0:
-        from symgrasp.bench.brute import BruteForce
+        from symgrasp.bench.maps.brute import BruteForce
 
         yield "Pinocchio and Coal", BruteForce(world, arm, ik, task.T_world_object).feasible
 

@@ -1,7 +1,7 @@
 """Motions: how long whole ones take to plan, and free ones against what people do today.
 
-Free motions are measured on random problems, see `symgrasp.bench.free_problems`. The others search the
-same ones: RRT-Connect of OMPL, which asks PyBullet or the checks of this project about every state, and
+Free motions are measured on random problems, see `symgrasp.bench.motions.free_problems`. The others search
+the same ones: RRT-Connect of OMPL, which asks PyBullet or the checks of this project about every state, and
 roboplan.
 """
 
@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symgrasp.bench.figures import Figure
-from symgrasp.bench.free_problems import PROBLEMS, Problem, touches
-from symgrasp.bench.rrt_connect import Found, rrt_connect
+from symgrasp.bench.motions.free_problems import PROBLEMS, Problem, touches
+from symgrasp.bench.motions.rrt_connect import Found, rrt_connect
 from symgrasp.bench.timing import Time, ratios, time_of, times
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.motion.choosing import best_motion

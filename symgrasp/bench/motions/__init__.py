@@ -1,0 +1,1 @@
+"""Benchmarks of motions, against what people plan them with today."""
