@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import re
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 import numpy as np
 from dask import config
-from distributed import Client, LocalCluster, as_completed
+from distributed import Client, LocalCluster
 from distributed.comm.core import CommClosedError
 from distributed.security import Security
 
@@ -36,6 +38,13 @@ ADDRESS = re.compile(r"(?P<protocol>tcp|tls)://([\w.-]+|\[[\da-fA-F:.]+\]):(?P<p
 
 FAILURES = 3
 """A batch that so many workers died of is given up."""
+
+
+LOOK = 10.0
+"""Time (s) without a result after which the workers are looked at."""
+
+IDLE = 60.0
+"""Time (s) after which a survey is given up whose workers all have nothing to do, or are gone."""
 
 
 class Done(NamedTuple):
@@ -88,7 +97,7 @@ def run_on(
         progress: called at the beginning and after every batch.
 
     Raises:
-        SurveyError: the store is another survey's, or the cluster was lost.
+        SurveyError: the store is another survey's, or the cluster was lost, or none of its workers computes.
     """
     path = Path(out).resolve()
     store = create_store(path, survey)
@@ -98,15 +107,22 @@ def run_on(
         progress(Done(total - left, total))
     known: Any = client  # whose methods are coroutines too, for those who ask for that
     threads = max(1, sum(known.nthreads().values()))
-    [shared] = known.scatter([(survey.to_dict(), str(path))], broadcast=True, hash=False)
-    waiting = (client.submit(run_batch, shared, batch, pure=False, retries=0) for batch in missing)
-    running = as_completed(list(islice(waiting, AHEAD * threads)), loop=client.loop)
-    for future in running:
+    # Every batch brings the survey along: what was scattered before would be lost with its workers.
+    text, results = json.dumps(survey.to_dict()), SimpleQueue()
+    waiting = (client.submit(run_batch, text, str(path), batch, pure=False, retries=0) for batch in missing)
+    running: set[Any] = set()  # a batch is given up when nobody holds its future
+    for future in islice(waiting, AHEAD * threads):
+        running.add(future)
+        future.add_done_callback(results.put)
+    while running:
+        future = _next(results, known)
+        running.remove(future)
         left -= _size(survey, _result(future))
         if progress:
             progress(Done(total - left, total))
         if following := next(waiting, None):
             running.add(following)
+            following.add_done_callback(results.put)
     store.remove_partial()  # what killed workers, and earlier runs that were killed, have left
 
 
@@ -128,6 +144,31 @@ def plan_margins_on(
     run_on(client, survey, out, progress)
     _, results = open_results(out)
     return results["plan_margin"].where(results["plan"]).values
+
+
+def _next(results: SimpleQueue[Any], client: Any) -> Any:
+    """Return the next batch that has ended.
+
+    Raises:
+        SurveyError: none ends, and no worker computes any: all are gone, or the scheduler gives them nothing.
+    """
+    idle = 0
+    while True:
+        try:
+            return results.get(timeout=LOOK)
+        except Empty:
+            idle = 0 if _computes(client) else idle + 1
+        if idle * LOOK >= IDLE:
+            expected = f"a worker that computes (none has for {IDLE:.0f} s); run it again"
+            raise SurveyError("scheduler", "workers", "idle", expected)
+
+
+def _computes(client: Any) -> bool:
+    """Return whether any worker of the cluster has something to compute."""
+    try:
+        return any(client.processing().values())
+    except (OSError, RuntimeError):  # the scheduler was lost: its futures come as such, or never
+        return False
 
 
 def _result(future: Any) -> int:
@@ -232,24 +273,24 @@ def _quiet() -> Iterator[None]:
 _own = threading.local()
 
 
-def run_batch(shared: tuple[Mapping[str, Any], str], batch: int) -> int:
+def run_batch(text: str, folder: str, batch: int) -> int:
     """Compute a batch and write it, on a worker; return its number.
 
     Worlds and engines stay between the batches of a thread. Maps are computed on one core: the others belong
     to other workers. A worker whose files or program are others than those of the store writes nothing.
 
     Args:
-        shared: the survey as plain data, and the folder of the store.
+        text: the survey as plain data in JSON.
+        folder: of the store.
         batch: the number of the batch.
     """
-    key = id(shared)
-    if getattr(_own, "key", None) != key:
+    if getattr(_own, "of", None) != (text, folder):
         use_cores(1)
         if hasattr(_own, "evaluator"):
             _own.evaluator.close()
-        survey = Survey.from_dict(shared[0])
-        _own.evaluator, _own.store = Evaluator(survey), SurveyStore(shared[1], survey)
-        _own.key, _own.shared = key, shared  # held, so that no other has its id
+        survey = Survey.from_dict(json.loads(text))
+        _own.evaluator, _own.store = Evaluator(survey), SurveyStore(folder, survey)
+        _own.of = text, folder
     evaluator: Evaluator = _own.evaluator
     _own.store.write(batch, {point: evaluator.point(point) for point in evaluator.survey.points_of(batch)})
     return batch

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import signal
@@ -10,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ from symgrasp.errors import SurveyError
 from symgrasp.feasibility.create import create_map
 from symgrasp.reason import Reason
 from symgrasp.scene.scene import Scene
+from symgrasp.survey import running
 from symgrasp.survey.evaluation import Evaluator, State
 from symgrasp.survey.results import feasible_cells, workspace
 from symgrasp.survey.running import Done, run_batch, run_survey
@@ -256,6 +259,46 @@ def test_any_number_of_workers_writes_the_same(survey, one_go, tmp_path, workers
     assert content(tmp_path / "b.zarr") == content(one_go)
 
 
+def test_a_cluster_without_workers_is_told(survey, tmp_path, monkeypatch):
+    monkeypatch.setattr(running, "LOOK", 0.01)
+    monkeypatch.setattr(running, "IDLE", 0.03)
+    none: Any = LocalCluster(n_workers=0, **THREADS)
+    with none as cluster, pytest.raises(SurveyError) as raised:
+        run_survey(survey, tmp_path / "b.zarr", scheduler=cluster.scheduler_address)
+    assert "scheduler: workers: 'idle': expected a worker that computes" in str(raised.value)
+    assert len(SurveyStore(tmp_path / "b.zarr", survey).missing()) == survey.batches
+
+
+class Workers:
+    """Workers of a cluster that compute, or do not, each time that they are looked at.
+
+    Args:
+        looks: whether they compute, look by look; the batch ends after the last.
+        results: where its future is put then.
+    """
+
+    def __init__(self, looks: list[bool], results: SimpleQueue[str]) -> None:
+        self.looks, self.results = looks, results
+
+    def processing(self) -> dict[str, list[str]]:
+        """Return what each worker computes."""
+        computes = self.looks.pop(0)
+        if not self.looks:
+            self.results.put("the batch")
+        return {"one": [], "other": ["run_batch"] if computes else []}
+
+
+@pytest.mark.parametrize("looks", [[True] * 30, [False, False, True] * 10])
+def test_a_batch_that_takes_long_is_waited_for(looks, monkeypatch):
+    """Workers have nothing for a moment while one that died is started again."""
+    monkeypatch.setattr(running, "LOOK", 0.001)
+    monkeypatch.setattr(running, "IDLE", 0.003)
+    results: SimpleQueue[str] = SimpleQueue()
+    assert running._next(results, Workers(list(looks), results)) == "the batch"
+    with pytest.raises(SurveyError, match="none has for"):
+        running._next(results, Workers([False] * 30, results))
+
+
 def test_the_workspace_of_a_grasp_is_what_the_maps_of_its_places_say(survey, one_go, tmp_path, capsys):
     """Where may the object stand, for a grasp at a height and roll? Against maps that are computed alone."""
     _, results = open_results(one_go)
@@ -329,5 +372,5 @@ def test_a_worker_with_other_files_writes_nothing(survey, tmp_path):
     description.write_text(description.read_text().replace(survey.sha256, "0" * 64))
     before = content(path)
     with pytest.raises(SurveyError, match="robots and program"):
-        run_batch((survey.to_dict(), str(path)), 0)
+        run_batch(json.dumps(survey.to_dict()), str(path), 0)
     assert content(path) == before
