@@ -365,7 +365,7 @@ class PlanService:
         plans: list[PlanResult] = []
         for plan in islice(self._not_listed(), PLANS_PER_BATCH):
             self._ahead.popleft()
-            plans.append(plan_result(plan, self._scene))
+            plans.append(plan_result(plan, self._scene, partial(self._progress, self._share)))
             self._listed += 1
             self._share = SEARCH + (1 - SEARCH) * len(plans) / PLANS_PER_BATCH
             self._progress(self._share)

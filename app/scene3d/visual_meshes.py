@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 from collections.abc import Callable, Mapping
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,8 @@ from trimesh.graph import smooth_shade
 from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from symgrasp.caching import kept
+from symgrasp.files import file_sha256
 from symgrasp.meshes import read_parts
 from symgrasp.progress import Progress, cached, part_of
 from symgrasp.scene.scene import Scene
@@ -35,7 +39,7 @@ MAX_TRIANGLES = 2000
 """Visuals with more triangles are simplified to this many, so that slow machines draw them smoothly."""
 
 DECIMATION_AGGRESSION = 3
-"""0 to 10: lower values keep closer to the shape, but with lengths in metres may stop early."""
+"""0 to 10: lower values keep closer to the shape, but leave more triangles."""
 
 CREASE = np.deg2rad(30)
 """Edges of simplified meshes with a larger angle (rad) between their faces are not smoothed."""
@@ -164,11 +168,27 @@ def _shapes(visual: yourdfpy.Visual, link: str, tell: Callable[[], None]) -> lis
 
 
 def _simplified(mesh: trimesh.Trimesh, share: float, tell: Callable[[], None]) -> trimesh.Trimesh:
-    """Return the shape of a mesh with this share of its triangles, or itself if that is all of them."""
+    """Return the shape of a mesh with this share of its triangles, or itself if that is all of them.
+
+    It is kept on the disk, as large meshes take up to a second each.
+    """
     if share >= 1.0:
         return mesh
     mesh.merge_vertices(merge_tex=True, merge_norm=True)  # where vertices are double, gaps would open
+
+    def compute() -> tuple[np.ndarray, ...]:
+        # What an edge may cost to collapse is a length of the library's own: so all have one size.
+        size = float(mesh.extents.max())
+        tell()
+        own = trimesh.Trimesh(mesh.vertices / size, mesh.faces, process=False)
+        simple = own.simplify_quadric_decimation(percent=1.0 - share, aggression=DECIMATION_AGGRESSION)
+        tell()
+        shaded = smooth_shade(simple, angle=CREASE)
+        return shaded.vertices * size, shaded.faces
+
+    content = hashlib.sha256(np.ascontiguousarray(mesh.vertices).tobytes())
+    content.update(np.ascontiguousarray(mesh.faces).tobytes())
+    program = file_sha256(Path(__file__)), version("fast_simplification")
+    vertices, faces = kept(("simplified", content.hexdigest(), share, *program), compute)
     tell()
-    simple = mesh.simplify_quadric_decimation(percent=1.0 - share, aggression=DECIMATION_AGGRESSION)
-    tell()
-    return smooth_shade(simple, angle=CREASE)
+    return trimesh.Trimesh(vertices, faces, process=False)

@@ -42,7 +42,7 @@ def solver_for(
         samples: number of redundancy samples; a 6-joint arm always has one.
         torso: the samples of the robot's torso to try; all of them if None.
         more: values of the redundancy (rad) that are tried after the samples; none of a pitched arm.
-        trying: called before the solver of every sample of the torso is made; may raise `Cancelled`.
+        trying: called while the solvers of every sample of the torso are made; may raise `Cancelled`.
 
     Raises:
         UrdfError: no inverse kinematics is known for the arm, whichever joint is locked.
@@ -53,6 +53,7 @@ def solver_for(
     def alone(own: Arm) -> CompiledIK:
         trying()
         ik = CompiledIK(own, samples)
+        trying()
         return ik.at(np.append(ik.phi, more)) if len(more) else ik
 
     return over_torso(arm, alone, torso)

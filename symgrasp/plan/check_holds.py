@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -25,7 +25,13 @@ CLEARANCE_TOLERANCE = 1e-5
 """By how much (m) a clearance may be overstated: PyBullet reads URDFs in single precision."""
 
 
-def check_holds(task: PlanTask, where: str, world: BulletWorld, report: Report) -> None:
+def check_holds(
+    task: PlanTask,
+    where: str,
+    world: BulletWorld,
+    report: Report,
+    trying: Callable[[], None] = lambda: None,
+) -> None:
     """Check grasps, joints, balance, collisions and clearances of a task; the object is in no obstacle.
 
     Args:
@@ -33,6 +39,7 @@ def check_holds(task: PlanTask, where: str, world: BulletWorld, report: Report) 
         where: what it is called in failures.
         world: a world of the scene; object and arms end where the plan puts them.
         report: where what is found is noted.
+        trying: called between the checks; may raise `Cancelled`.
     """
     scene = world.scene
     T = task.object_pose_turned.array()
@@ -64,12 +71,14 @@ def check_holds(task: PlanTask, where: str, world: BulletWorld, report: Report) 
         stated = task.balance.get(robot, margin)
         report.at_most(stated, margin, TOLERANCE, f"{text}, not {1e3 * stated:.3f} mm")
     arms = [arm for arm, *_ in configurations]
+    trying()
     for c in world.collisions(arms):
         report.expect(False, f"{where}: {c.a} and {c.b} are {1e3 * c.depth:.2f} mm too close")
     for c in world.object_contacts():
         text = f"{where}: {c.a} is {1e3 * c.depth:.2f} mm inside {c.b}"
         report.expect(c.depth <= RESTING_DEPTH, text)
     for hold, arm in zip(task.holds, arms, strict=True):
+        trying()
         real = world.clearance(arm, CLEARANCE_LIMIT, arms)
         text = f"{where}: {arm.name}: clearance is {1e3 * real:.3f} mm, not {1e3 * hold.clearance:.3f} mm"
         report.at_most(hold.clearance, real, CLEARANCE_TOLERANCE, text)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -110,7 +111,7 @@ class SegmentStates:
         off = [[float(error.max()) for error in pose_error(poses[0], other)] for other in poses]
         return poses[0], np.max(off, axis=0)
 
-    def between(self, step: float, most: int) -> Array | None:
+    def between(self, step: float, most: int, trying: Callable[[], None] = lambda: None) -> Array | None:
         """Return rows (m,), or what is between two, from each of which to the next nothing moves far.
 
         None if these are more than so many.
@@ -118,6 +119,7 @@ class SegmentStates:
         Args:
             step: the distance (m).
             most: most rows.
+            trying: called before the way of every link is looked at; may raise `Cancelled`.
         """
         rows = self.values(self.rows)
         turned = np.max([np.abs(np.diff(values, axis=0)).max(axis=1) for values in rows.values()], axis=0)
@@ -126,7 +128,8 @@ class SegmentStates:
             return None
         at = _divided(self.rows, parts)
         values = self.values(at)
-        parts = np.ceil(_largest_steps(self.scene, values, self.objects(values)[0]) / step).clip(1)
+        steps = _largest_steps(self.scene, values, self.objects(values)[0], trying)
+        parts = np.ceil(steps / step).clip(1)
         return None if parts.sum() >= most else _divided(at, parts)
 
     def on_line(self, values: Mapping[str, Array], objects: Array) -> dict[str, np.ndarray]:
@@ -181,13 +184,14 @@ def check_free(
     Returns:
         How many states were checked.
     """
-    segment = states.segment
+    segment, trying = states.segment, partial(progress or (lambda _: None), 0.0)
     expect(segment.clearance >= 0, f"{where}: clearance is {segment.clearance} m")
-    at = states.between(max(FINEST, segment.clearance), most)
+    at = states.between(max(FINEST, segment.clearance), most, trying)
     text = f"{where}: more than {MOST_STATES:,} states of the motion would have to be checked"
     if not expect(at is not None, text) or at is None:
         return 0
     fine = states.values(at)
+    trying()
     poses, (slip, twist) = states.objects(fine)
     text = f"{where}: the object slips by {1e3 * slip:.2f} mm and {np.rad2deg(twist):.2f}° in the hands"
     expect(slip <= RIGID[0] and twist <= RIGID[1], text)
@@ -197,9 +201,11 @@ def check_free(
         if segment.task_from == segment.task_to:  # as the task has it, it may be tilted further
             limit = max(limit, float(tilts[0]), float(tilts[-1]))
         expect(tilt <= limit + TILT_TOLERANCE, f"{where}: the object tilts by {tilt:.2f}°, not {limit:g}°")
+    trying()
     if not _check_balance(states, fine, poses, where, expect):
         return len(at)
-    near = _NearBodies(states, world, fine, poses)
+    trying()
+    near = _NearBodies(states, world, fine, poses, trying)
     for k, pose in enumerate(poses):
         if progress:
             progress(k / len(poses))
@@ -254,10 +260,16 @@ class _NearBodies:
         world: a world of the scene.
         values: robot → values (m, N) of its joints along the segment.
         objects: (m, 4, 4) poses of the object.
+        trying: called while links that are near each other are found; may raise `Cancelled`.
     """
 
     def __init__(
-        self, states: SegmentStates, world: BulletWorld, values: Mapping[str, Array], objects: Array
+        self,
+        states: SegmentStates,
+        world: BulletWorld,
+        values: Mapping[str, Array],
+        objects: Array,
+        trying: Callable[[], None],
     ) -> None:
         self._world, self._clearance = world, states.segment.clearance
         self._tolerance = 0.0 if states.strict else CLEARANCE_TOLERANCE
@@ -282,7 +294,7 @@ class _NearBodies:
 
         pairs = [(a, b) for a, b in world.link_pairs() if self._group[a] != self._group[b]]
         self._reach = self._clearance + world.margin
-        self._links = near_links(world, values, pairs, self._reach)
+        self._links = near_links(world, values, pairs, self._reach, trying)
 
     def too_close(self, k: int) -> Iterator[tuple[Collision, float]]:
         """Yield the pairs that are closer than they may be in state k, with their distance (m).
@@ -312,7 +324,9 @@ def _divided(at: Array, parts: Array) -> Array:
     return np.concatenate([at[:1], *between])
 
 
-def _largest_steps(scene: Scene, values: Mapping[str, Array], objects: Array) -> Array:
+def _largest_steps(
+    scene: Scene, values: Mapping[str, Array], objects: Array, trying: Callable[[], None]
+) -> Array:
     """Return how far (n - 1,) (m) any point of robots and object moves from row to row, at most."""
     profile = scene.profile
     r = float(profile.points[:, 1].max())
@@ -321,6 +335,7 @@ def _largest_steps(scene: Scene, values: Mapping[str, Array], objects: Array) ->
         model = scene.robots[name].model
         poses = model.forward(rows)
         for link in model.colliding_links():
+            trying()
             points = np.concatenate(model.hulls(link))
             corners = _corners(points.min(axis=0), points.max(axis=0))
             steps.append(_moves(poses[:, model.link_index(link)], corners))

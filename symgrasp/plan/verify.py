@@ -9,6 +9,7 @@ has one theme.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from symgrasp.feasibility.create import MapMaker
@@ -66,10 +67,10 @@ def verify(
         holds = [(k, task, hold) for k, task in enumerate(plan.tasks) for hold in task.holds]
         parts = len(plan.tasks) + len(holds) + (plan.motion is not None)
         for k, task in enumerate(plan.tasks):
-            if progress:
-                progress(k / parts)
+            trying = partial(progress or (lambda _: None), k / parts)
+            trying()
             if posed[k]:
-                check_holds(task, places[k], world, report)
+                check_holds(task, places[k], world, report, trying)
         if not report.failures:  # margins are those of grasps that hold
             maker = MapMaker(world)
             for done, (k, task, hold) in enumerate(holds, start=len(plan.tasks)):

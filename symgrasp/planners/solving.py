@@ -223,6 +223,8 @@ def holdings(
             offset = {run.arm: own for run, own in runs if k in run.tasks}
             held = [own._replace(offset=offset[own.configuration.arm.name]) for own in held]
             delta = float(wrap((step.turn + common) * grid.dtheta + more[k]))
+            if progress:
+                progress(0.0)  # writing measures distances
             entries.append(write_task(world, visit.task, delta, held))
         yield (
             entries,

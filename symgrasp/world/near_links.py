@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -19,7 +19,11 @@ Pair = tuple[BodyName, BodyName]
 
 
 def near_links(
-    world: BulletWorld, values: Mapping[str, Array], pairs: Iterable[Pair], distance: float
+    world: BulletWorld,
+    values: Mapping[str, Array],
+    pairs: Iterable[Pair],
+    distance: float,
+    trying: Callable[[], None] = lambda: None,
 ) -> list[list[Pair]]:
     """Return, for each of some states (m,), the pairs of links that can be within a distance.
 
@@ -30,12 +34,15 @@ def near_links(
         values: robot → values (m, N) of its joints.
         pairs: pairs of links of robots.
         distance: the distance (m).
+        trying: called before every robot and link; may raise `Cancelled`.
     """
     balls: dict[BodyName, tuple[Array, float]] = {}  # link → centre (m, 3) in the world, radius (m)
     for name, rows in values.items():
+        trying()
         robot = world.scene.robots[name]
         poses = robot.T_world_base @ robot.model.forward(rows)
         for link, shapes in world.shapes(name).items():
+            trying()
             corners = np.concatenate([shape.vertices for shape in shapes])
             middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
             radius = max(
@@ -46,6 +53,7 @@ def near_links(
             balls[BodyName(name, link)] = T[:, :3, :3] @ middle + T[:, :3, 3], radius
     found: list[list[Pair]] = [[] for _ in range(len(next(iter(values.values()))))]
     for a, b in pairs:
+        trying()
         if a in balls and b in balls:  # links without a shape meet nothing
             (here, own), (there, other) = balls[a], balls[b]
             near = np.linalg.norm(here - there, axis=1) <= own + other + distance + SLACK

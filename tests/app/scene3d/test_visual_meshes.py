@@ -13,6 +13,7 @@ import trimesh
 
 from app.scene3d import visual_meshes
 from app.scene3d.visual_meshes import MAX_TRIANGLES, link_visuals
+from symgrasp import caching
 from symgrasp.errors import SymgraspError
 from symgrasp.meshes import reading
 from symgrasp.robot.model import RobotModel
@@ -100,6 +101,30 @@ def test_a_fine_mesh_is_shown_with_fewer_triangles_in_the_same_place(tmp_path):
     points = trimesh.sample.sample_surface(fine, 2000, seed=1)[0]
     _, distance, _ = trimesh.proximity.closest_point(seen, points + np.array([0.0, 0.0, 0.5]))
     assert distance.max() < 0.001
+
+
+def test_a_small_fine_mesh_keeps_its_shape_too(tmp_path):
+    """What is lost is a share of the size, whatever that is."""
+    fine = trimesh.creation.torus(0.01, 0.003, major_sections=200, minor_sections=100)
+    fine.export(tmp_path / "m.stl")
+    seen = loaded(link_visuals(urdf(tmp_path, '<mesh filename="m.stl"/>'))["base"]).to_mesh()
+    points = trimesh.sample.sample_surface(fine, 2000, seed=1)[0] + np.array([0.0, 0.0, 0.5])
+    seen.apply_scale(10.0)  # trimesh is less exact at triangles as small as these
+    _, distance, _ = trimesh.proximity.closest_point(seen, 10.0 * points)
+    assert distance.max() < 0.001
+
+
+def test_a_mesh_is_simplified_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(caching, "_folder", lambda: tmp_path / "kept")
+    trimesh.creation.icosphere(subdivisions=5).export(tmp_path / "ball.stl")
+    mesh = '<mesh filename="ball.stl"/>'
+    first = link_visuals(urdf(tmp_path, mesh))
+    with monkeypatch.context() as none:
+        none.setattr(trimesh.Trimesh, "simplify_quadric_decimation", None)
+        assert link_visuals(urdf(tmp_path, f"{mesh} ")) == first
+    trimesh.creation.icosphere(subdivisions=5, radius=2.0).export(tmp_path / "ball.stl")
+    other = loaded(link_visuals(urdf(tmp_path, f" {mesh}"))["base"])
+    assert other.extents == pytest.approx([4.0] * 3, abs=0.02)
 
 
 def test_one_may_cancel_between_the_steps_of_every_mesh(tmp_path, monkeypatch):
