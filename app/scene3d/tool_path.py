@@ -61,8 +61,7 @@ def tool_lines(motion: Motion) -> tuple[Array, np.ndarray]:
             arm = motion.scene.arms[name]
             values = np.tile(arm.robot.home, (len(rows), 1))
             values[:, arm.indices] = rows
-            links = arm.robot.model.forward(values)[:, arm.robot.model.link_index(arm.tool)]
-            at = (arm.robot.T_world_base @ links)[:, :3, 3]
+            at = arm.tool_at(values)[:, :3, 3]
             points.append(np.stack([at[:-1], at[1:]], axis=1))
             colors.append(np.tile(clearance_color(segment.clearance), (len(at) - 1, 2, 1)))
     return np.concatenate(points), np.concatenate(colors)

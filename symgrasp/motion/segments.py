@@ -156,9 +156,7 @@ class Motion:
 
     def _tool(self, name: str, values: Mapping[str, Array]) -> Array:
         """Return ``T_world_tool`` (4, 4) of an arm."""
-        arm = self.scene.arms[name]
-        links = arm.robot.model.forward(values[arm.robot.name])
-        return arm.robot.T_world_base @ links[arm.robot.model.link_index(arm.tool)]
+        return self.scene.arms[name].tool_at(values[self.scene.arms[name].robot.name])
 
     @cached_property
     def _start_values(self) -> tuple[Mapping[str, Array], ...]:

@@ -112,8 +112,7 @@ def _check_arm(hold: Hold, arm: Arm, q: Array, who: str, report: Report) -> None
     )
     report.expect(same, f"{who}: hand joints {hold.hand_joints}, but the opening takes {expected}")
     if check_pose(hold.tool_pose, f"{who}: tool_pose", report):
-        links = arm.robot.model.forward(arm.robot_values(q))
-        reached = arm.robot.T_world_base @ links[arm.robot.model.link_index(arm.tool)]
+        reached = arm.tool_at(arm.robot_values(q))
         same_pose(reached, hold.tool_pose.array(), f"{who}: forward kinematics and tool_pose", report)
 
 

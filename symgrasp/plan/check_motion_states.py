@@ -159,8 +159,7 @@ class SegmentStates:
 def tool_pose(scene: Scene, name: str, values: Mapping[str, Array]) -> Array:
     """Return ``T_world_tool`` (..., 4, 4) of an arm for robot → values (..., N) of its joints."""
     arm = scene.arms[name]
-    links = arm.robot.model.forward(values[arm.robot.name])
-    return arm.robot.T_world_base @ links[..., arm.robot.model.link_index(arm.tool), :, :]
+    return arm.tool_at(values[arm.robot.name])
 
 
 def check_free(
@@ -333,7 +332,7 @@ def _largest_steps(
     steps = [_moves(objects, _corners([-r, -r, profile.h_min], [r, r, profile.h_max]))]
     for name, rows in values.items():
         model = scene.robots[name].model
-        poses = model.forward(rows)
+        poses = model.forward_rows(rows, trying)
         for link in model.colliding_links():
             trying()
             points = np.concatenate(model.hulls(link))

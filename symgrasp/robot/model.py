@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,9 @@ __all__ = ["RobotModel"]
 
 LARGEST_LIMIT = 1e4
 """A joint limit beyond this (rad or m) is none."""
+
+ROWS = 256
+"""Joint values that `RobotModel.forward_rows` takes at a time."""
 
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -93,6 +96,7 @@ class RobotModel:
         self.joints, self.link_names = self._build_tree(urdf, root)
         self._link_indices = {link: k for k, link in enumerate(self.link_names)}
         self._motions = JointMotions(self.joints)
+        self._to_link: dict[str, tuple[list[Joint], JointMotions]] = {}  # those that were asked for
         self._above = {joint.child: joint for joint in self.joints}
         mass, centre = zip(*(inertials[link] for link in self.link_names), strict=True)
         self._masses = np.array(mass), np.array(centre)
@@ -255,6 +259,42 @@ class RobotModel:
                 k += 1
             poses[..., joint.child, :, :] = pose
         return poses
+
+    def forward_rows(self, q: Array, trying: Callable[[], None]) -> Array:
+        """Return what `forward` does for many values (m, n), in parts.
+
+        Args:
+            q: values (m, n) of `joint_names`.
+            trying: called before every part; may raise `Cancelled`.
+        """
+        poses = np.empty((len(q), len(self.link_names), 4, 4))
+        for k in range(0, len(q), ROWS):
+            trying()
+            poses[k : k + ROWS] = self.forward(q[k : k + ROWS])
+        return poses
+
+    def link_pose(self, q: ArrayLike, link: str) -> Array:
+        """Return the pose (..., 4, 4) of one link in the root frame: what `forward` says of it.
+
+        Args:
+            q: values (..., n) of `joint_names`.
+            link: the link.
+
+        Raises:
+            UrdfError: there is no such link.
+        """
+        q = np.asarray(q, dtype=float)
+        if link not in self._to_link:
+            chain = self.chain(link)
+            self._to_link[link] = chain, JointMotions(chain)
+        chain, motions = self._to_link[link]
+        pose, moved, k = np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4)), motions.poses(q), 0
+        for joint in chain:
+            pose = pose @ joint.origin
+            if joint.source >= 0:
+                pose = pose @ moved[..., k, :, :]
+                k += 1
+        return pose
 
     def masses(self) -> tuple[Array, Array]:
         """Return the masses (links,) (kg), and the centres of mass (links, 3) in the link frames."""

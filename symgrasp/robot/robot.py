@@ -293,7 +293,7 @@ class Arm:
         if self.robot.torso is not None:
             values = np.broadcast_to(self.robot.home, (*q.shape[:-1], len(self.robot.home))).copy()
             values[..., self.indices] = q
-            return self.robot.model.forward(values)[..., self._tool_index, :, :]
+            return self.robot.model.link_pose(values, self.tool)
         rotation = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
         position = np.broadcast_to(self.P[0], (*q.shape[:-1], 3))
         for k, axis in enumerate(self.H):
@@ -304,6 +304,10 @@ class Arm:
     def world_tool_pose(self, q: ArrayLike) -> Array:
         """Return ``T_world_tool`` (..., 4, 4) for joint values (..., n)."""
         return self.robot.T_world_base @ self.tool_pose(q)
+
+    def tool_at(self, values: ArrayLike) -> Array:
+        """Return ``T_world_tool`` (..., 4, 4) for values (..., N) of all joints of its robot."""
+        return self.robot.T_world_base @ self.robot.model.link_pose(values, self.tool)
 
     def within_limits(self, q: ArrayLike) -> tuple[Array, np.ndarray]:
         """Add full turns to joint values (..., n) so that they are inside the limits, where possible.

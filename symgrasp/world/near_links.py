@@ -38,9 +38,8 @@ def near_links(
     """
     balls: dict[BodyName, tuple[Array, float]] = {}  # link → centre (m, 3) in the world, radius (m)
     for name, rows in values.items():
-        trying()
         robot = world.scene.robots[name]
-        poses = robot.T_world_base @ robot.model.forward(rows)
+        poses = robot.T_world_base @ robot.model.forward_rows(rows, trying)
         for link, shapes in world.shapes(name).items():
             trying()
             corners = np.concatenate([shape.vertices for shape in shapes])

@@ -41,6 +41,20 @@ def test_forward_kinematics_agrees_with_yourdfpy(path):
             np.testing.assert_allclose(poses[row, k], urdf.get_transform(link, model.root), atol=1e-9)
 
 
+@pytest.mark.parametrize("path", [PANDA, KUKA])
+def test_poses_of_one_link_and_in_parts_are_the_same(path):
+    model = RobotModel(path)
+    q = np.random.default_rng(2).uniform(model.lower, model.upper, (600, len(model.joint_names)))
+    poses, parts = model.forward(q), []
+    for k, link in enumerate(model.link_names):
+        assert np.array_equal(model.link_pose(q, link), poses[:, k])
+        assert np.array_equal(model.link_pose(q[0], link), poses[0, k])
+    assert np.array_equal(model.forward_rows(q, lambda: parts.append(None)), poses)
+    assert len(parts) == 3
+    with pytest.raises(UrdfError, match="no_such_link"):
+        model.link_pose(q, "no_such_link")
+
+
 def test_tool_pose_is_the_chain_read_off_the_urdf(panda):
     arm = make_arm(panda)
     q = np.random.default_rng(1).uniform(arm.lower, arm.upper, (50, 7))

@@ -41,5 +41,4 @@ class State:
 
     def tool(self, arm: Arm) -> Array:
         """Return ``T_world_tool`` (4, 4) of an arm."""
-        links = arm.robot.model.forward(self.values[arm.robot.name])
-        return arm.robot.T_world_base @ links[arm.robot.model.link_index(arm.tool)]
+        return arm.tool_at(self.values[arm.robot.name])

@@ -149,8 +149,7 @@ def _weights(motion: Motion, index: int, columns: list[Column]) -> Array:
     held: dict[str, dict[str, float]] = {}
     for name in segment.held_by:
         arm = scene.arms[name]
-        links = arm.robot.model.forward(state.values[arm.robot.name])
-        tool = arm.robot.T_world_base @ links[arm.robot.model.link_index(arm.tool)]
+        tool = arm.tool_at(state.values[arm.robot.name])
         ends = (corners @ (inverse(tool) @ state.T_world_object).T)[:, :3]
         radius = float(profile.points[:, 1].max())
         held.setdefault(arm.robot.name, {})[arm.tool] = float(np.linalg.norm(ends, axis=1).max()) + radius
