@@ -39,8 +39,11 @@ TANGENT = math.tan(0.5 * math.pi / ARCS)
 APART = 0.05
 """Least distance of two zeros that are taken for a double one, as a share of half the part of an arc."""
 
-STEPS, CLOSE = 30, 1e-9
+STEPS, CLOSE = 100, 1e-9
 """Steps, and width (of the arc), at which the search for a single zero ends."""
+
+SLOW = 2
+"""Steps that are to halve where a zero may be."""
 
 SECANT = 1e-3
 """How far from a place (of the arc) a slope is taken."""
@@ -130,14 +133,23 @@ def _value(c, u):
 
 @njit(**STRICT)
 def single_zero(c):
-    """Return the place, from 0 to 1, of the only zero (the Illinois method)."""
+    """Return the place, from 0 to 1, of the only zero, to within `CLOSE`.
+
+    By the Illinois method. Where the coefficients differ by many powers of ten it would creep, and its steps
+    be small far from the zero: where two of them have not halved what is left, that is halved.
+    """
     a, b, fa, fb = 0.0, 1.0, c[0], c[ARCS - 1]
-    u, side = 0.5, 0
+    side, taken, before = 0, 0, 1.0
     for _ in range(STEPS):
-        before, u = u, (a * fb - b * fa) / (fb - fa)
-        f = _value(c, u)
-        if f == 0.0 or abs(u - before) < CLOSE:
+        if b - a <= CLOSE:
             break
+        if taken == SLOW:
+            u, side, taken, before = 0.5 * (a + b), 0, 0, b - a
+        else:
+            u = min(max((a * fb - b * fa) / (fb - fa), a + 0.5 * CLOSE), b - 0.5 * CLOSE)
+        f = _value(c, u)
+        if f == 0.0:
+            return u
         if (f < 0.0) == (fb < 0.0):
             b, fb = u, f
             fa *= 0.5 if side > 0 else 1.0
@@ -146,7 +158,10 @@ def single_zero(c):
             a, fa = u, f
             fb *= 0.5 if side < 0 else 1.0
             side = -1
-    return u
+        taken += 1
+        if b - a < 0.5 * before:
+            taken, before = 0, b - a
+    return (a * fb - b * fa) / (fb - fa)
 
 
 @njit(**STRICT)

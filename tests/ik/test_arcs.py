@@ -127,3 +127,18 @@ def test_the_slope_at_a_zero():
     assert arcs.angle_in_arc(0, u) == pytest.approx(-0.05, abs=1e-9)
     low, high = (polynomial(roots, np.array(arcs.angle_in_arc(0, u + step))) for step in (-1e-6, 1e-6))
     assert slope_at_zero(c, u) == pytest.approx((high - low) / 2e-6, rel=0.1)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 15), st.sampled_from([0.3, 2.0, 6.0]))
+def test_a_single_zero_is_found_whatever_the_coefficients(seed, negative, powers):
+    """Against halving alone, with coefficients that differ by many powers of ten."""
+    c = 10.0 ** (powers * np.random.default_rng(seed).normal(size=arcs.ARCS))
+    c[:negative] *= -1.0
+    choose = [math.comb(arcs.ARCS - 1, j) for j in range(arcs.ARCS)]
+    first, last = 0.0, 1.0
+    while last - first > 1e-12:
+        u = 0.5 * (first + last)
+        value = sum(n * u**j * (1.0 - u) ** (arcs.ARCS - 1 - j) * c[j] for j, n in enumerate(choose))
+        first, last = (u, last) if value < 0.0 else (first, u)
+    assert single_zero(c) == pytest.approx(first, abs=2e-9)
