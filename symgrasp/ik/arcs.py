@@ -88,16 +88,25 @@ def angle_in_arc(arc, u):
 
 
 @njit(**STRICT)
-def zeros_within(c, noise):
-    """Return `NO_ZERO`, `ONE_ZERO` or more, for coefficients that are known up to some noise."""
-    least, most, changes = c[0], c[0], 0
+def zeros_within(c, noise, near):
+    """Return `NO_ZERO`, `ONE_ZERO`, or `MORE` where these cannot be told from it.
+
+    Args:
+        c: the coefficients.
+        noise: their error: those that are smaller may have either sign.
+        near: how close to zero they are at least where there is `NO_ZERO`; not less than the noise.
+    """
+    least, most, changes, possible, negative = c[0], c[0], 0, 0, c[0] < 0.0
     for j in range(1, ARCS):
         least, most = min(least, c[j]), max(most, c[j])
         if (c[j] < 0.0) != (c[j - 1] < 0.0):
             changes += 1
-    if least > noise or most < -noise:
+        if abs(c[j]) <= noise or (c[j] < 0.0) != negative:
+            possible += 1
+            negative = not negative
+    if least > near or most < -near:
         return NO_ZERO
-    return ONE_ZERO if changes == 1 else MORE
+    return ONE_ZERO if changes == possible == 1 else MORE
 
 
 @njit(**STRICT)

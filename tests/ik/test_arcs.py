@@ -32,7 +32,7 @@ def zeros(values: Array, noise: float) -> list[float]:
         parts = [(c, 0.0, 1.0)]
         while parts:
             c, first, last = parts.pop()
-            many = zeros_within(c, noise)
+            many = zeros_within(c, noise, noise)
             if many == arcs.ONE_ZERO:
                 places = [single_zero(c)]
             elif many == arcs.NO_ZERO:

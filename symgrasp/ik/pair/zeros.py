@@ -192,7 +192,7 @@ def _search_arc(chain, g, R, equations, memory, where, errors, count):
     while top >= 0:
         c, first, last = memory.coefficients[top], spans[top, 0], spans[top, 1]
         largest, share = largest_of(c), min(TOUCHING / ((last - first) * where[1]), CLOSEST)
-        zeros = zeros_within(c, max(near, share * share * largest))
+        zeros = zeros_within(c, noise, max(near, share * share * largest))
         faint = largest < FAINT * noise
         single, goes_on = zeros == ONE_ZERO and not faint, where[1] > LEAST_STRETCH and count < VIEWS
         u = single_zero(c) if single else 0.0
@@ -201,7 +201,7 @@ def _search_arc(chain, g, R, equations, memory, where, errors, count):
         touches = (
             zeros == MORE
             and (share == CLOSEST or largest < FAINT * near)
-            and zeros_within(c, noise) == NO_ZERO
+            and zeros_within(c, noise, noise) == NO_ZERO
         )
         if zeros == NO_ZERO:
             pass
