@@ -67,7 +67,8 @@ class Memory(NamedTuple):
             and of their error.
         coefficients: (HALVINGS + 2, ARCS) its coefficients on parts of an arc.
         spans: (HALVINGS + 2, 2) where these parts begin and end.
-        views: (VIEWS, 2) centres (rad) and stretches of the parts of a turn from which it is computed.
+        views: (VIEWS, 2) where the parts of a turn from which it is computed begin and end (rad), after the
+            centre of the whole turn.
         starts: (2, STARTS, n) joint values, inside the limits and outside, from which Newton's method starts.
         counts: (2,) how many.
         row: (n,) joint values.

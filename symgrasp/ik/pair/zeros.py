@@ -57,6 +57,10 @@ MARGIN = 4.0
 HOPELESS = 1e-4
 """Error of N, as a share of its largest value, from which on no zeros are sought."""
 
+UNCERTAIN, ASIDE = 1e-10, 0.1
+"""Error of N, as a share of its largest value, from which on the whole turn is tried with another centre
+(rad) than 0: N cannot be computed where the point is exactly on an axis, as it may be at one of them."""
+
 LEAST_ERROR = 1e-13
 """Value of N, as a share of the largest, that rounding of the pose may change it by."""
 
@@ -81,6 +85,8 @@ NARROW = 3e-4
 def search_turn(chain, g, R, equations, memory, beyond):
     """Find the zeros of N where the outer joint is inside the limits, or beyond them, in all views."""
     count, view = 1, 0
+    if not beyond:
+        memory.views[0, 0] = 0.0
     while view < count:
         count = _search_view(chain, g, R, equations, memory, view, count, beyond)
         view += 1
@@ -100,7 +106,7 @@ def _search_view(chain, g, R, equations, memory, view, count, beyond):
         The number of views now.
     """
     if view == 0:
-        centre, stretch, last = 0.0, 1.0, ARCS // 2
+        centre, stretch, last = memory.views[0, 0], 1.0, ARCS // 2
     else:  # shown from −90° to 90°
         first, width = memory.views[view, 0], memory.views[view, 1] - memory.views[view, 0]
         centre, stretch, last = first + 0.5 * width, math.tan(0.25 * width), ARCS // 4
@@ -110,6 +116,8 @@ def _search_view(chain, g, R, equations, memory, view, count, beyond):
         values[ARCS], values[ARCS + 1] = _compute_values(
             equations, centre, stretch, tests, memory.numbers, values
         )
+        if view == 0 and values[ARCS + 1] > UNCERTAIN * values[ARCS]:
+            centre = _look_aside(equations, tests, memory)
     largest, noise = values[ARCS], values[ARCS + 1]
     near = max(noise, LEAST_ERROR * memory.values[0, ARCS])
     if not largest > 0.0:
@@ -119,7 +127,7 @@ def _search_view(chain, g, R, equations, memory, view, count, beyond):
         memory.free[1] = 1.0
     outer = chain.joint[3] if g[OUTER_LAST] else chain.joint[0]
     for arc in range(-last, last + 1):
-        if view == 0 and _arc_outside(chain.leeway, outer, arc) != beyond:
+        if view == 0 and _arc_outside(chain.leeway, outer, arc, centre) != beyond:
             continue
         where = (centre, stretch, arc, view)
         if hopeless:
@@ -129,6 +137,18 @@ def _search_view(chain, g, R, equations, memory, view, count, beyond):
         bernstein(values, arc % ARCS, memory.coefficients[0])
         count = _search_arc(chain, g, R, equations, memory, where, (noise, near), count)
     return count
+
+
+@njit(**STRICT)
+def _look_aside(equations, tests, memory):
+    """Take the values of N about another centre of the whole turn if they are better; return the centre."""
+    values, others = memory.values[0], memory.values[1]
+    others[ARCS], others[ARCS + 1] = _compute_values(equations, ASIDE, 1.0, tests, memory.numbers, others)
+    if others[ARCS + 1] * values[ARCS] < values[ARCS + 1] * others[ARCS]:
+        memory.views[0, 0] = ASIDE
+        for i in range(ARCS + 2):
+            values[i] = others[i]
+    return memory.views[0, 0]
 
 
 @njit(**STRICT)
@@ -176,9 +196,9 @@ def _angle(where, u):
 
 
 @njit(**STRICT)
-def _arc_outside(limits, joint, arc):
-    """Whether an arc of the whole turn is outside the limits of a joint."""
-    middle, half = nearest_turn(limits, joint, angle_in_arc(arc, 0.5)), math.pi / ARCS
+def _arc_outside(limits, joint, arc, centre):
+    """Whether an arc of the whole turn, about a centre, is outside the limits of a joint."""
+    middle, half = nearest_turn(limits, joint, centre + angle_in_arc(arc, 0.5)), math.pi / ARCS
     beyond = half + LIMIT_TOLERANCE
     return middle + beyond < limits[0, joint] or middle - beyond > limits[1, joint]
 

@@ -207,6 +207,16 @@ def test_any_arm(arm, seed):
     assert distance(solver.solve(arm.tool_pose(q)).q, q).min(initial=np.inf) < 1e-5
 
 
+def test_a_point_on_an_axis_at_one_of_the_values_of_the_outer_joint():
+    """There N cannot be computed, and from a wrong value no zero can be found."""
+    z, y = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
+    P = [[0, 0, 0.4], [0, 0.4, 0], [0, 0, 0.4], [0, 0, 0], [0.4, 0, 0.4], [0, 0, 0], [0, 0, 0.4]]
+    arm = synthetic([z, z, [1.0, 0.0, 1.0], z, y, z], P)
+    for q in samples(arm, 20, seed=1):
+        found = solver_for(arm, 1).solve(arm.tool_pose(q)).q
+        assert distance(found, q).min(initial=np.inf) < 1e-5
+
+
 def least_singular_value(arm: Arm, q: np.ndarray) -> float:
     """Return that of the Jacobian, by differences."""
     step = 1e-6
