@@ -14,8 +14,9 @@ from symgrasp.ik.vectors import STRICT, perpendicular, rotate, subproblem1, time
 
 __all__ = ["STARTS", "add_starts"]
 
-STARTS = 128
-"""Joint values inside the limits from which Newton's method starts, at most, and as many outside."""
+STARTS = 2048
+"""Joint values inside the limits from which Newton's method starts, at most, and as many outside. About 140
+come of each view where N is all but zero throughout, as between two pairs of zeros that coincide."""
 
 NEARLY_ZERO, NEARLY_REAL = 0.02, 0.05
 """Residual, and imaginary part of angles (rad), up to which a zero of N is tried."""

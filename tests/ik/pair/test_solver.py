@@ -207,6 +207,20 @@ def test_any_arm(arm, seed):
     assert distance(solver.solve(arm.tool_pose(q)).q, q).min(initial=np.inf) < 1e-5
 
 
+def test_double_zeros_that_are_close_to_each_other():
+    """Joints 3 and 4 also do half a turn the other way: all zeros are double, and N is faint between them."""
+    z, y = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
+    P = [[0, 0, 0.4], [0, 0, 0.4], [0, 0.4, 0], [0, 0, 0.4], [0, 0, 0.4], [0, 0, 0], [0, 0, 0.4]]
+    arm = synthetic([z, y, z, y, y, z], P)
+    solver = solver_for(arm, 1)
+    for q in samples(arm, 200, seed=0):
+        found = solver.solve(arm.tool_pose(q)).q
+        assert distance(found, q).min() < 1e-5
+        twice = q + [0.0, 0.0, np.pi, 0.0, 0.0, np.pi]
+        twice[[3, 4]] *= -1.0
+        assert distance(found, twice).min() < 1e-5
+
+
 def test_a_point_on_an_axis_at_one_of_the_values_of_the_outer_joint():
     """There N cannot be computed, and from a wrong value no zero can be found."""
     z, y = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
