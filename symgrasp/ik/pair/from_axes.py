@@ -35,7 +35,7 @@ from symgrasp.ik.pair.geometry import (
     WRIST_POINT,
     PairGeometry,
 )
-from symgrasp.ik.vectors import STRICT, cross, dot, minus, plus, vec
+from symgrasp.ik.vectors import STRICT, cross, dot, minus, perpendicular, plus, vec
 from symgrasp.poses import Array
 
 __all__ = ["meeting_point", "pair_geometry", "write_pair"]
@@ -195,16 +195,16 @@ def _leading(g):
     """Return the size (m², or m) of the coefficients that tell the values of the inner joint apart."""
     a, s = g[LENGTH], g[SINE]
     if g[OUTER_LAST]:
-        # W has any distance from the axis of joint 1: 1 m stands for it.
+        # W has any distance from the axis of joint 1: 1 m stands for it. It turns in the plane of p and q.
         axis = vec(g, FIRST_AXIS)
-        moment = cross(axis, vec(g, FIRST_POINT))
-        along, square = math.hypot(axis[0], axis[1]), 2.0 * math.sqrt(dot(moment, moment))
-        general = max(abs(s) * square, 2.0 * a * along)
+        p = perpendicular(axis)
+        q, centre = cross(axis, p), vec(g, FIRST_POINT)
+        along1, square1 = complex(p[2], -q[2]), complex(2.0 * dot(centre, p), -2.0 * dot(centre, q))
     else:
         rest, c, t = vec(g, CHAIN_POINT), vec(g, CHAIN_POINT + 3), vec(g, CHAIN_POINT + 6)
         along1, square1 = complex(c[2], -t[2]), complex(2.0 * dot(rest, c), -2.0 * dot(rest, t))
-        along, square = abs(along1), abs(square1)
-        general = math.sqrt(abs((s * square1) * (s * square1) + (2.0 * a * along1) * (2.0 * a * along1)))
     if g[KIND] == MEETING:
-        return square
-    return along if g[KIND] == PARALLEL else general
+        return abs(square1)
+    if g[KIND] == PARALLEL:
+        return abs(along1)
+    return math.sqrt(abs((s * square1) * (s * square1) + (2.0 * a * along1) * (2.0 * a * along1)))

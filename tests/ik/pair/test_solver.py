@@ -207,6 +207,62 @@ def test_any_arm(arm, seed):
     assert distance(solver.solve(arm.tool_pose(q)).q, q).min(initial=np.inf) < 1e-5
 
 
+def along_axes(rng: np.random.Generator) -> Arm:
+    """Return six joints of which the last two meet, along the axes of the base or half way between them, with
+    offsets of a few lengths, as in drawings; either way round."""
+    ways = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 0], [0, 1, 1], [1, 1, 1]], float)
+    lengths = np.array([0.0, 0.0, 0.0, 0.0, 0.1, 0.25, -0.3, 0.4, -0.4])
+    H = [ways[rng.integers(7)] * rng.choice([1.0, 1.0, -1.0]) for _ in range(6)]
+    P = [rng.choice(lengths, 3) for _ in range(7)]
+    P[5] = rng.choice([0.0, 0.3]) * H[4] + rng.choice([0.0, 0.3]) * H[5]
+    if rng.random() < 0.3:
+        H, P = [-h for h in H[::-1]], [-p for p in P[::-1]]
+    return synthetic(H, P)
+
+
+def test_any_arm_along_axes():
+    """In such arms equations often vanish that in others do not, whatever the pose."""
+    rng, tried = np.random.default_rng(0), 0
+    while tried < 4000:
+        arm = along_axes(rng)
+        try:
+            solver = solver_for(arm, 1)
+        except UrdfError:
+            continue
+        for q in samples(arm, 10, int(rng.integers(1000))):
+            if least_singular_value(arm, q) > 3e-3:
+                assert distance(solver.solve(arm.tool_pose(q)).q, q).min(initial=np.inf) < 1e-5
+                tried += 1
+
+
+@pytest.mark.parametrize(
+    ("H", "P"),
+    [
+        (
+            ["z", "x", "z", "z", "xyz", "-y"],
+            [(0, -4, 1), (0, -4, 2.5), (0, -4, 1), (1, 0, 0), (2.5, 0, 1), (0, 0, 0), (0, -3, 0)],
+        ),
+        (
+            ["x", "z", "-y", "y", "xyz", "-z"],
+            [(0, 0, 0), (0, 4, -4), (4, -3, 4), (-4, 0, 4), (1, -4, 0), (0, 0, 0), (0, 0, 0)],
+        ),
+        (
+            ["z", "x", "y", "-y", "x", "z"],
+            [(4, -4, 4), (0, -4, -3), (0, 0, 4), (0, -3, 1), (-4, 1, 4), (3, 0, 3), (0, 0, -4)],
+        ),
+    ],
+)
+def test_an_inner_joint_that_moves_the_point_along_no_coordinate(H, P):
+    """The first joint changes both coordinates of the point, but not what is computed from both of them."""
+    ways = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "xyz": (-0.55, 0.65, -0.52)}
+    axes = [(-1.0 if "-" in name else 1.0) * np.array(ways[name.strip("-")], float) for name in H]
+    arm = synthetic(axes, [0.1 * np.array(p, float) for p in P])
+    solver = solver_for(arm, 1)
+    for q in samples(arm, 200, seed=3):
+        if least_singular_value(arm, q) > 3e-3:
+            assert distance(solver.solve(arm.tool_pose(q)).q, q).min(initial=np.inf) < 1e-5
+
+
 def test_double_zeros_that_are_close_to_each_other():
     """Joints 3 and 4 also do half a turn the other way: all zeros are double, and N is faint between them."""
     z, y = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
