@@ -272,7 +272,7 @@ def test_double_zeros_that_are_close_to_each_other():
     for q in samples(arm, 200, seed=0):
         found = solver.solve(arm.tool_pose(q)).q
         assert distance(found, q).min() < 1e-5
-        twice = q + [0.0, 0.0, np.pi, 0.0, 0.0, np.pi]
+        twice = q + np.array([0.0, 0.0, np.pi, 0.0, 0.0, np.pi])
         twice[[3, 4]] *= -1.0
         assert distance(found, twice).min() < 1e-5
 
