@@ -113,7 +113,7 @@ class ComputeProcess:
         """End the process; the next call starts another."""
         process, self._process = self._process, None
         if process:
-            process.end()
+            self._pool.end(process)
 
     def map(self, request: MapRequest, progress: Progress) -> MapResult:
         """Compute a map."""

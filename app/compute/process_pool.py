@@ -79,6 +79,11 @@ class WorkerProcess:
         with suppress(ProcessLookupError):  # it has died, which the next message from it says
             os.kill(self.pid, number)
 
+    def leave(self) -> None:
+        """Let it end by itself after what it does now: it notices at its next message that nobody listens."""
+        self.give_way()
+        self.channel.close()
+
     def end(self, grace: float = 0.0) -> str:
         """Kill the process.
 
@@ -111,6 +116,7 @@ class ProcessPool:
         self.turns = Turns()
         self._lock = threading.Lock()
         self._spare: WorkerProcess | None = None
+        self._compiling: WorkerProcess | None = None
         self._closed = False
 
     def prepare(self) -> None:
@@ -130,10 +136,24 @@ class ProcessPool:
         self.prepare()
         return process
 
+    def end(self, process: WorkerProcess) -> None:
+        """End a process that was taken.
+
+        One that compiles ends that first, as the next would have to begin it anew, but only one at a time.
+        """
+        with self._lock:
+            alone = self._compiling is None or not self._compiling.is_alive
+            if process.compiling and process.is_alive and alone and not self._closed:
+                self._compiling = process
+                process.leave()
+                return
+        process.end()
+
     def close(self) -> None:
-        """End the spare process."""
+        """End the spare process, and what still compiles."""
         with self._lock:
             self._closed = True
-            if self._spare:
-                self._spare.end()
-                self._spare = None
+            for process in (self._spare, self._compiling):
+                if process:
+                    process.end()
+            self._spare = self._compiling = None

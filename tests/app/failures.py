@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.extending import overload
 
 from app.compute import map_service
 from app.compute.limits import MEMORY_LIMIT
@@ -52,6 +54,28 @@ def serve_compiling(pipe: Connection, folders: tuple[Path, ...]) -> None:
         while True:
             progress(0.5)
             pipe.poll(REPORT_INTERVAL)  # until a cancel is there to be read
+
+    setattr(MapMaker, "map", compiles_first)  # noqa: B010
+    serve(pipe, folders)
+
+
+def _slow() -> int:
+    """Return 1; compiled code may call it."""
+    return 1
+
+
+def serve_slow_compiler(pipe: Connection, folders: tuple[Path, ...]) -> None:
+    """For any map, compile until the pipe ``go on`` is written to, and make the folder ``compiled``."""
+
+    @overload(_slow)
+    def compiled_slow() -> Callable[[], int]:
+        (folders[0] / "go on").read_text()
+        (folders[0] / "compiled").mkdir()
+        return lambda: 1
+
+    def compiles_first(*_: Any, progress: Any, **__: Any) -> None:
+        assert numba.njit(lambda: _slow())() == 1
+        progress(0.5)
 
     setattr(MapMaker, "map", compiles_first)  # noqa: B010
     serve(pipe, folders)

