@@ -191,7 +191,9 @@ class MapMaker:
         tell, rests_on = progress, None
         if self.scene.settings.redundancy == "auto":
             first, tell = part_of(progress, 0, 2), part_of(progress, 1, 2)
-            found = self.map(the_arm.name, the_task, manifold=grid, progress=first, certify=False)
+            only = np.zeros((len(ROLLS), grid.heights, grid.angles), dtype=bool)
+            only[where] = True
+            found = self.map(the_arm.name, the_task, manifold=grid, progress=first, certify=False, only=only)
             witness = found.witness(where)
             if witness is not None and not the_arm.pitched:
                 ik = solver_for(the_arm, self.scene.settings.samples, more=[witness.phi])

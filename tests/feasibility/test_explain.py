@@ -54,6 +54,22 @@ def test_the_best_candidate_is_the_reason_of_both_maps(name, approach):
                 assert_consistent(found, world, scene.arm(arm))
 
 
+@pytest.mark.parametrize("name", ["talos_bottle", "bottle_on_table"])
+def test_rests_on_what_the_map_says(name):
+    """Though the redundancy is searched for the cell alone, and at some values of a torso need not be."""
+    scene = load_small(name, 6, 12).with_settings(redundancy="auto")
+    task = list(scene.tasks.values())[-1]
+    with BulletWorld(scene) as world:
+        maker = MapMaker(world)
+        m = maker.map(None, task)
+        assert m.resolution
+        for cell in some_cells(m):
+            found = maker.explain(None, task, cell)
+            assert found.rests_on == m.rests_on(cell)
+            if m.reason[cell] not in COLLISIONS:
+                assert found.reason == m.reason[cell]
+
+
 def agrees_with_exact(found: Explanation, exact: FeasibilityMap, cell: Cell) -> None:
     """Among collisions the engine may name another stage, but what it names is in the list."""
     reason = Reason(int(exact.reason[cell]))

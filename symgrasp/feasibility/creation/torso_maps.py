@@ -73,6 +73,8 @@ def merged(maps: Sequence[FeasibilityMap]) -> FeasibilityMap:
         arrays["certified"] = np.logical_or.reduce(whole) | np.logical_and.reduce(none)
     parts = [m.refined for m in maps if m.refined is not None]
     refined = merged_parts(parts) if len(parts) == len(maps) else None
+    resolutions = [m.resolution for m in maps]
+    arrays["resolution"] = max(resolutions) if all(resolutions) else 0.0
     return replace(maps[0], refined=refined, **arrays, pair=pick(pairs), bodies=bodies, proven=proven)
 
 

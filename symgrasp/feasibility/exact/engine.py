@@ -20,6 +20,7 @@ from symgrasp.engine.balance import loaded
 from symgrasp.engine.clearance_bound import clearance_bound
 from symgrasp.engine.geometry import ArmGeometry, arm_geometry, supports
 from symgrasp.engine.kinematics import Scratch, copied, new_scratch
+from symgrasp.engine.redundancy.cover import FINEST
 from symgrasp.engine.search_types import RowChecks
 from symgrasp.engine.threads import core_count
 from symgrasp.errors import InputError
@@ -185,6 +186,7 @@ class ExactEngine:
         steps = parts + int(certify)
         for part in range(parts):
             draft = MapDraft(self.arm, grid, self._opening, self._solvers.at(0, 0))
+            draft.resolution = FINEST if self._searches_all else 0.0
             for row, misfit in enumerate(self._misfit):
                 if misfit is not None:
                     draft.reason[:, row], draft.proven[:, row] = misfit, True
@@ -344,6 +346,8 @@ class ExactEngine:
             by_tool = self._open.decide(draft, cell, T, batch.ik, listed)
             left[i] = not by_tool and draft.reason[cell] != Reason.FEASIBLE
             yield
+        if inputs.always_collides:
+            draft.proven[cells] = True
         if locked is None or inputs.always_collides:
             return
         draft.proven[tuple(part[found.proven] for part in cells)] = True

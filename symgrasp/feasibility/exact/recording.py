@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from symgrasp.engine import search
-from symgrasp.engine.redundancy.cover import FINEST
 from symgrasp.engine.redundancy.cover_types import CoverResult
 from symgrasp.feasibility.creation.map_draft import MapDraft
 from symgrasp.feasibility.exact.scene_bodies import FixedBodies, PieceBodies
@@ -62,4 +61,4 @@ def record_cover(draft: MapDraft, covered: CoverResult, cells: tuple[np.ndarray,
         covered.clearance[free],
     )
     draft.proven[tuple(part[covered.proven] for part in cells)] = True
-    draft.resolution = max(draft.resolution, FINEST, float(covered.left.max(initial=0.0)))
+    draft.resolution = max(draft.resolution, float(covered.left.max(initial=0.0)))

@@ -184,6 +184,13 @@ def test_a_map_put_together_is_certified_only_if_all_its_parts_are():
     assert np.array_equal(both.certified, m.certified)  # what either can hold counts
 
 
+def test_a_map_put_together_is_searched_as_finely_as_the_least_of_its_parts():
+    m = create_map(Scene.load("soda_can").with_settings(heights=6, angles=12, redundancy=4))
+    fine, coarse = replace(m, resolution=1e-4), replace(m, resolution=2e-4)
+    assert merged([fine, coarse]).resolution == merged([coarse, fine]).resolution == 2e-4
+    assert merged([fine, m]).resolution == merged([m, fine]).resolution == 0.0
+
+
 def test_pitched_maps_are_put_together_whatever_resolution_the_scene_asks_for():
     scene = so101("upright").with_settings(resolution={"mm": 10, "deg": 5})
     with open_world(scene) as world:
