@@ -48,8 +48,8 @@ def joint_to_lock(arm: Arm) -> int | None:
             arm.robot.model.path,
             f"arm {arm.name}",
             list(arm.joint_names),
-            "two axes at one end of the arm that meet in a point whose distances from other axes change, or "
-            "three parallel ones that begin with the second or the third, with any joint of seven locked",
+            "two axes at one end of the arm that meet in a point, or three parallel ones that begin with the "
+            "second or the third, with any joint of seven locked",
         )
     return choices[kinds.index(min(kinds))]
 

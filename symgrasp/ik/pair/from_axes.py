@@ -40,6 +40,10 @@ from symgrasp.poses import Array
 
 __all__ = ["meeting_point", "pair_geometry", "write_pair"]
 
+BESIDE = np.array([1.1e-5, -0.7e-5, 0.9e-5])
+"""How far (m) from its place the axis of joint 1 is taken to be where the equations vanish there. Newton's
+method on the arm itself mends that."""
+
 
 def pair_geometry(
     backwards: bool, h: Array, o: Array, R0: Array, p0: Array, W: Array, phi: float
@@ -56,14 +60,18 @@ def pair_geometry(
         phi: value of the locked joint (rad).
 
     Returns:
-        None where joints 2 and 3 have the same axis, or neither joint 1 nor joint 4 can be the inner one.
+        None where joints 2 and 3 have the same axis, or neither joint 1 nor joint 4 can be the inner one, not
+        even if the first axis is moved by `BESIDE`.
     """
     row = np.zeros(SIZE)
     row[:WRIST_POINT] = np.concatenate([h.ravel(), R0.ravel(), p0])
     row[PAIR_PHI] = phi
-    # Interpreted it takes as long as a few calls of numpy, with nothing to compile.
-    found = interpreted(write_pair)(row, [tuple(point) for point in o], tuple(W))
-    return PairGeometry(backwards, row) if found else None
+    # Interpreted it takes as long as a few calls of numpy, with nothing to compile. Where no joint can be the
+    # inner one, which is rare, one can as soon as the first axis is elsewhere by little.
+    for first in (o[0], o[0] + BESIDE):
+        if interpreted(write_pair)(row, [tuple(point) for point in (first, *o[1:])], tuple(W)):
+            return PairGeometry(backwards, row)
+    return None
 
 
 @njit(**STRICT)
