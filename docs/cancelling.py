@@ -73,7 +73,8 @@ class Gap:
         work: what was computed.
         total: how long it took (s).
         clock: longest time (s) between two calls of its progress, or before the first or after the last.
-        cpu: the same in processor time of the process.
+        cpu: the same without what other programs took of the processor: as long as it took, but at most the
+            processor time of all threads.
         compiled: the longest of those times (s) in which something was compiled, which nothing can interrupt;
             they do not count for the others.
         first: whether nothing was kept on the disk of what is computed once for a robot.
@@ -132,7 +133,8 @@ class Meter:
         if self._compiles:
             self.compiled = max(self.compiled, wall - self._wall)
         else:
-            self.clock, self.cpu = max(self.clock, wall - self._wall), max(self.cpu, cpu - self._cpu)
+            clock = wall - self._wall
+            self.clock, self.cpu = max(self.clock, clock), max(self.cpu, min(clock, cpu - self._cpu))
         self._wall, self._cpu, self._compiles = time.perf_counter(), time.process_time(), False
 
 
