@@ -30,6 +30,7 @@ from symgrasp.ik.pair.geometry import (
     SINE,
     SIZE,
     SPECIAL,
+    TILT,
     VARIES,
     WORTH,
     WRIST_POINT,
@@ -39,6 +40,13 @@ from symgrasp.ik.vectors import STRICT, cross, dot, minus, perpendicular, plus, 
 from symgrasp.poses import Array
 
 __all__ = ["meeting_point", "pair_geometry", "write_pair"]
+
+NEARLY, LEAST_NORMAL = 0.02, 1e-3
+"""Sine of the angle of axes from which on the feet of their common normal are near enough, and least distance
+(m) of nearly parallel ones: closer ones all but meet there, so that these feet are near, too."""
+
+NORMAL = 1e-9
+"""Cosine of an angle below which it is a right one."""
 
 BESIDE = np.array([1.1e-5, -0.7e-5, 0.9e-5])
 """How far (m) from its place the axis of joint 1 is taken to be where the equations vanish there. Newton's
@@ -87,21 +95,18 @@ def write_pair(g, points, W):
         Whether there is such a geometry; see `pair_geometry`.
     """
     k, m, a, b = vec(g, AXES + 3), vec(g, AXES + 6), points[1], points[2]
-    known, shoulder, elbow, n, length, s = _common_normal(k, a, m, b)
+    known, feet, s = _common_normal(k, a, m, b)
     if not known:
         return False
-    kind = MEETING if length < SPECIAL else PARALLEL if s < SPECIAL else GENERAL
     _put(g, WRIST_POINT, W)
-    _put(g, SHOULDER_POINT, shoulder)
-    g[LENGTH] = 0.0 if kind == MEETING else length
-    g[COSINE], g[SINE] = dot(k, m), 0.0 if kind == PARALLEL else dot(n, cross(k, m))
-    g[COSINE_56], g[KIND] = dot(vec(g, AXES + 12), vec(g, AXES + 15)), kind
-    _write_frames(g, points, W, n, shoulder, elbow, -1.0)
+    g[COSINE_56] = dot(vec(g, AXES + 12), vec(g, AXES + 15))
+    near = s < NEARLY
+    _write_frames(g, points, W, _feet(g, points, feet, -1.0, near), -1.0)
     last = _leading(g)
-    _write_frames(g, points, W, n, shoulder, elbow, 1.0)
+    _write_frames(g, points, W, _feet(g, points, feet, 1.0, near), 1.0)
     first = _leading(g)
     if last > WORTH * first:
-        _write_frames(g, points, W, n, shoulder, elbow, -1.0)
+        _write_frames(g, points, W, _feet(g, points, feet, -1.0, near), -1.0)
         return last > VARIES
     return first > VARIES
 
@@ -136,8 +141,8 @@ def _common_normal(k, a, m, b):
         b: point (3,) on it.
 
     Returns:
-        Whether there is one, which is not so where both are the same line; its feet (3,) on them; its
-        direction (3,) and length; and the sine of the angle.
+        Whether there is one, which is not so where both are the same line; its feet (3,) on them and its
+        direction (3,); and the sine of the angle.
     """
     normal, d = cross(k, m), minus(b, a)
     s = math.sqrt(dot(normal, normal))
@@ -145,12 +150,37 @@ def _common_normal(k, a, m, b):
         d = _along(d, -dot(k, d), k)
         length = math.sqrt(dot(d, d))
         n = _along((0.0, 0.0, 0.0), 1.0 / max(length, SPECIAL), d)
-        return length >= SPECIAL, a, plus(a, d), n, length, s
+        return length >= SPECIAL, (a, plus(a, d), n), s
     n = (normal[0] / s, normal[1] / s, normal[2] / s)
     x, y, length = dot(d, cross(m, n)) / s, dot(d, cross(k, n)) / s, dot(d, n)
     if length < 0.0:
         n = (-n[0], -n[1], -n[2])
-    return True, _along(a, x, k), _along(b, y, m), n, abs(length), s
+    return True, (_along(a, x, k), _along(b, y, m), n), s
+
+
+@njit(**STRICT)
+def _feet(g, points, feet, way, near):
+    """Return points on the axes of joints 2 and 3, and the direction from one to the other.
+
+    Args:
+        g: (`SIZE`,) a packed geometry, of which the axes are read.
+        points: six points (3,), one on each axis.
+        feet: those of the common normal, and its direction from joint 2 to joint 3.
+        way: 1 where joint 1 is the outer joint, -1 where joint 4 is.
+        near: whether the axes are nearly parallel, so that these are far away.
+    """
+    k, m, a, b = vec(g, AXES + 3), vec(g, AXES + 6), points[1], points[2]
+    if not near:
+        return feet
+    if way > 0.0:
+        b = _along(b, dot(minus(a, b), m), m)
+    else:
+        a = _along(a, dot(minus(b, a), k), k)
+    d = minus(b, a)
+    length = math.sqrt(dot(d, d))
+    if length < LEAST_NORMAL:
+        return feet
+    return a, b, (d[0] / length, d[1] / length, d[2] / length)
 
 
 @njit(**STRICT)
@@ -160,12 +190,25 @@ def _along(a, x, k):
 
 
 @njit(**STRICT)
-def _write_frames(g, points, W, n, shoulder, elbow, way):
+def _write_frames(g, points, W, feet, way):
     """Write the parts that are seen in the frames of joints 2 and 3, turned around if ``way`` is -1."""
     k, m, h4, h5 = vec(g, AXES + 3), vec(g, AXES + 6), vec(g, AXES + 9), vec(g, AXES + 12)
-    x = (way * n[0], way * n[1], way * n[2])
-    F = (x, cross(k, n), (way * k[0], way * k[1], way * k[2]))
-    E = (x, cross(m, n), (way * m[0], way * m[1], way * m[2]))
+    shoulder, elbow, n = feet
+    e = (way * n[0], way * n[1], way * n[2])
+    k, m = (way * k[0], way * k[1], way * k[2]), (way * m[0], way * m[1], way * m[2])
+    outer, inner = (k, m) if way > 0.0 else (m, k)
+    between, side = minus(elbow, shoulder), cross(inner, e)
+    length, sine, tilt = abs(dot(between, n)), dot(outer, side), dot(outer, e)
+    kind = MEETING if length < SPECIAL else PARALLEL if abs(sine) < SPECIAL else GENERAL
+    g[LENGTH], g[KIND] = 0.0 if kind == MEETING else length, kind
+    g[COSINE], g[SINE] = dot(outer, inner), 0.0 if kind == PARALLEL else sine
+    g[TILT] = tilt if abs(tilt) > NORMAL else 0.0
+    x = _along(e, -g[TILT], outer)
+    size = math.sqrt(dot(x, x))
+    x = (x[0] / size, x[1] / size, x[2] / size)
+    of_outer, of_inner = (x, cross(outer, x), outer), (e, side, inner)
+    F, E = (of_outer, of_inner) if way > 0.0 else (of_inner, of_outer)
+    _put(g, SHOULDER_POINT, shoulder)
     for i in range(3):
         _put(g, FRAME + 3 * i, F[i])
     _put(g, FIRST_AXIS, _seen(F, vec(g, AXES)))
@@ -213,6 +256,9 @@ def _leading(g):
         along1, square1 = complex(c[2], -t[2]), complex(2.0 * dot(rest, c), -2.0 * dot(rest, t))
     if g[KIND] == MEETING:
         return abs(square1)
+    Q1 = g[COSINE] * along1
+    if g[TILT] != 0.0:
+        Q1 -= 0.5 * g[TILT] / a * square1
     if g[KIND] == PARALLEL:
-        return abs(along1)
-    return math.sqrt(abs((s * square1) * (s * square1) + (2.0 * a * along1) * (2.0 * a * along1)))
+        return abs(Q1)
+    return math.sqrt(abs((s * square1) ** 2 + (2.0 * a) ** 2 * (Q1 * Q1 + (s * along1) ** 2)))

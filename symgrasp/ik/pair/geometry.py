@@ -11,12 +11,12 @@ from symgrasp.poses import Array
 __all__ = [
     "CHAIN_DIRECTION", "CHAIN_POINT", "COSINE", "COSINE_56", "FIRST_AXIS", "FIRST_POINT", "FRAME", "GENERAL",
     "KIND", "LENGTH", "MEETING", "MEETING_PAIR", "OUTER_LAST", "PAIR_PHI", "PARALLEL", "SHIFTED",
-    "SHOULDER_POINT", "SINE", "SIZE", "SPECIAL", "VARIES", "WORTH", "WRIST_POINT", "PairGeometry",
+    "SHOULDER_POINT", "SINE", "SIZE", "SPECIAL", "TILT", "VARIES", "WORTH", "WRIST_POINT", "PairGeometry",
 ]  # fmt: skip
 
 WRIST_POINT, SHOULDER_POINT, FRAME, FIRST_AXIS, FIRST_POINT = 30, 33, 36, 45, 48
 CHAIN_POINT, CHAIN_DIRECTION, LENGTH, COSINE, SINE, COSINE_56 = 51, 60, 69, 70, 71, 72
-KIND, OUTER_LAST, PAIR_PHI, SHIFTED, SIZE = 73, 74, 75, 76, 77
+KIND, OUTER_LAST, PAIR_PHI, SHIFTED, TILT, SIZE = 73, 74, 75, 76, 77, 78
 """Where the parts of a row of a `PairGeometry` begin that other geometries do not have, and its length."""
 
 MEETING_PAIR = 2
@@ -43,6 +43,8 @@ class PairGeometry(NamedTuple):
     The first four parts of the row are in the base frame at zero; the others in the frames of joints 2 and 3,
     whose origins are the feet of the common normal, and whose axes are the normal n, h × n and the axis h of
     the joint. Where joint 4 is the outer joint, the frames are turned around: n and h point the other way.
+    The feet of axes that are nearly parallel are far away: there n is normal to the inner joint's axis alone,
+    and begins at a point on the other axis, whose frame has the part of n that is normal to its own axis.
     In this order the row has
 
     - the unit axes h (6, 3), reversed where the arm is read backwards, and the tool's orientation (3, 3) and
@@ -55,13 +57,14 @@ class PairGeometry(NamedTuple):
       coefficients (3,) of cosine and of sine;
     - `CHAIN_DIRECTION`: the same of h5;
     - `LENGTH`: the length a of the normal (m); exactly 0 where the axes meet;
-    - `COSINE` and `SINE`: of the angle of the two axes, by which the inner joint's axis h is
-      ``cosine·h' − sine·(h' × n)`` of the outer one's h'; the sine is exactly 0 where they are parallel;
+    - `COSINE` and `SINE`: the outer joint's axis is ``tilt·n + sine·(h × n) + cosine·h`` with the inner one's
+      h; the sine is exactly 0 where they are parallel, or meet far away;
     - `COSINE_56`: the cosine of the angle of the axes of joints 5 and 6;
     - `KIND`: `GENERAL`, `MEETING` or `PARALLEL`;
     - `OUTER_LAST`: 1 where joint 4 is the outer joint, 0 where joint 1 is;
     - `PAIR_PHI`: the value φ (rad);
-    - `SHIFTED`: 1 where the pair is parallel at φ, and the geometry that of a value beside it; else 0.
+    - `SHIFTED`: 1 where the pair is parallel at φ, and the geometry that of a value beside it; else 0;
+    - `TILT`: the cosine of the angle of n and the outer joint's axis; 0 for the common normal.
 
     Attributes:
         backwards: whether the arm is read from the tool to the base.

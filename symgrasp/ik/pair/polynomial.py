@@ -21,6 +21,7 @@ from symgrasp.ik.pair.geometry import (
     OUTER_LAST,
     SHOULDER_POINT,
     SINE,
+    TILT,
     WRIST_POINT,
 )  # fmt: skip
 from symgrasp.ik.roots import find_roots, inverse_of, size2, start_circle_quartic
@@ -89,14 +90,14 @@ def _complex(circle):
 def equations_of(g, R, p):
     """Return the equations at a pose: constants, polynomials of the inner joint, circles of the outer one."""
     inner, outer = _circles(g, R, p)
-    arm = (g[LENGTH], g[COSINE], g[SINE], g[COSINE_56], g[KIND])
+    arm = (g[LENGTH], g[COSINE], g[SINE], g[COSINE_56], g[KIND], g[TILT])
     return arm, _inner_polynomial(inner[0]), _complex(inner[1]), outer
 
 
 @njit(**STRICT)
 def may_reach(equations):
     """Whether the distances of the point allow that any values of the two joints bring it together."""
-    (a, _, _, _, _), polynomial, _, (outer, _) = equations
+    (a, _, _, _, _, _), polynomial, _, (outer, _) = equations
     square, square1 = polynomial[5], 2.0 * math.sqrt(size2(polynomial[6]))
     least, most = math.sqrt(max(square - square1, 0.0)), math.sqrt(square + square1)
     rest, c, s = outer
@@ -124,9 +125,14 @@ def _inner_polynomial(circle):
 @njit(**STRICT)
 def _numerators(arm, polynomial, w):
     """Return the coefficients of 1 and b in 2a P and in sin(α) Q, for an outer point w."""
-    a, cosine = arm[0], arm[1]
+    a, cosine, _, _, _, tilt = arm
     _, _, _, along, along1, square, square1 = polynomial
-    return dot(w, w) - a * a - square, -square1, w[2] - cosine * along, -cosine * along1
+    P, P1 = dot(w, w) - a * a - square, -square1
+    Q, Q1 = w[2] - cosine * along, -cosine * along1
+    if tilt != 0.0:  # then the outer axis is not normal to that along which P is
+        share = 0.5 * tilt / a
+        Q, Q1 = Q - a * tilt - share * P, Q1 - share * P1
+    return P, P1, Q, Q1
 
 
 @njit(**STRICT)
@@ -152,7 +158,7 @@ def solve_inner(equations, c, s, work):
 @njit(**STRICT)
 def _poles(arm, polynomial, numerators):
     """Return K: the square of the resultant of ``v·n + i v·(h × n)`` and ``P − i Q``, times a constant."""
-    a, _, sine, _, kind = arm
+    a, _, sine, _, kind, _ = arm
     low, rest, high = polynomial[0], polynomial[1], polynomial[2]
     P, P1, Q, Q1 = numerators
     if kind == GENERAL:
@@ -169,7 +175,7 @@ def _poles(arm, polynomial, numerators):
 @njit(**STRICT)
 def _reach(arm, polynomial, numerators, work):
     """Write the four values of b at which the first three joints reach a point."""
-    a, _, sine, _, kind = arm
+    a, _, sine, _, kind, _ = arm
     _, _, _, along, along1, square, square1 = polynomial
     P, P1, Q, Q1 = numerators
     if kind == GENERAL:
@@ -201,7 +207,7 @@ def _refine(arm, polynomial, numerators, work, i):
 
     With the other coordinate from P² + Q² = |z|² − (h3·z)², the equation of P or Q is solved to all digits.
     """
-    a, _, sine, _, _ = arm
+    a, _, sine, _, _, _ = arm
     _, P1, _, Q1 = numerators
     b, P, Q = _solution(arm, polynomial, numerators, work, i)
     value, x1 = _defect(arm, numerators, b, P, Q), P1 if 2.0 * a < abs(sine) else Q1
@@ -213,7 +219,7 @@ def _refine(arm, polynomial, numerators, work, i):
 @njit(**STRICT)
 def _defect(arm, numerators, b, P, Q):
     """Return by how much b misses the equation of that of P and Q that is divided by the smaller number."""
-    a, _, sine, _, _ = arm
+    a, _, sine, _, _, _ = arm
     X, X1, Y, Y1 = numerators
     if 2.0 * a < abs(sine):
         return X + X1 * b + X1.conjugate() * inverse_of(b) - 2.0 * a * P
@@ -223,7 +229,7 @@ def _defect(arm, numerators, b, P, Q):
 @njit(**STRICT)
 def _solution(arm, polynomial, numerators, work, i):
     """Return b, P and Q of one of the four."""
-    a, _, sine, _, kind = arm
+    a, _, sine, _, kind, _ = arm
     _, _, _, along, along1, square, square1 = polynomial
     P, P1, Q, Q1 = numerators
     b = work[INNER + i]
@@ -272,7 +278,9 @@ def residual_at(equations, c, s, work, i):
     from the axis of one of these: on it, the joint may have any value, and has whichever rounding makes it.
     """
     arm, polynomial, direction, (outer, outer_direction) = equations
-    a, cosine, sine, wanted, _ = arm
+    a, cosine, sine, wanted, _, tilt = arm
+    rise = math.sqrt(1.0 - tilt * tilt)
+    lean, scale = tilt / rise, 1.0 / rise
     w, m = _at(outer, c, s), _at(outer_direction, c, s)
     b, P, Q = _solution(arm, polynomial, _numerators(arm, polynomial, w), work, i)
     low, rest, high, along, along1, _, _ = polynomial
@@ -286,9 +294,10 @@ def residual_at(equations, c, s, work, i):
     d_ = (high.conjugate() * back + rest.conjugate() + low.conjugate() * b) * e_
     dh = along + along1 * b + along1.conjugate() * back
     x, y = 0.5 * (d + d_), -0.5j * (d - d_)
-    y, h = cosine * y - sine * dh, cosine * dh + sine * y
-    side = cosine * Q - sine * zh
-    f, f_, further = _turn(complex(w[0], w[1]), complex(w[0], -w[1]), P + a + 1j * side, P + a - 1j * side)
+    h = cosine * dh + sine * y
+    x, y, h = rise * x - lean * h, scale * (cosine * y - sine * dh), h + tilt * x
+    out, side = rise * (P + a) - lean * (cosine * zh + sine * Q), scale * (cosine * Q - sine * zh)
+    f, f_, further = _turn(complex(w[0], w[1]), complex(w[0], -w[1]), out + 1j * side, out - 1j * side)
     u, u_ = (x + 1j * y) * f, (x - 1j * y) * f_
     r = 0.5 * (complex(m[0], -m[1]) * u + complex(m[0], m[1]) * u_) + m[2] * h - wanted
     return r, b, e, f, min(far, further)

@@ -267,6 +267,26 @@ def test_an_inner_joint_that_moves_the_point_along_no_coordinate(H, P):
             assert distance(solver.solve(arm.tool_pose(q)).q, q).min(initial=np.inf) < 1e-5
 
 
+@pytest.mark.parametrize("angle", [1e-6, 4e-6, 2e-5, 1e-4, 1e-3, 1e-2, 3e-2])
+@pytest.mark.parametrize("skew", [True, False], ids=["skew", "in a plane"])
+def test_axes_that_are_nearly_parallel(angle, skew):
+    """As where a URDF has 1.5708 for a right angle: the feet of their common normal are kilometres away."""
+    rng = np.random.default_rng(5)
+    for k in range(12):
+        H, P = list(rng.normal(size=(6, 3))), list(0.3 * rng.normal(size=(7, 3)))
+        P[5] = 0.1 * H[4] - 0.2 * H[5]
+        h = H[1] / np.linalg.norm(H[1])
+        side = np.cross(h, P[2])
+        H[2] = h + angle * (side if skew else np.cross(side, h)) / np.linalg.norm(side)
+        if k % 2:
+            H, P = [-h for h in H[::-1]], [-p for p in P[::-1]]
+        arm = synthetic(H, P)
+        solver = solver_for(arm, 1)
+        for q in samples(arm, 10, k):
+            if least_singular_value(arm, q) > 3e-3:
+                assert distance(solver.solve(arm.tool_pose(q)).q, q).min(initial=np.inf) < 1e-5
+
+
 def test_double_zeros_that_are_close_to_each_other():
     """Joints 3 and 4 also do half a turn the other way: all zeros are double, and N is faint between them."""
     z, y = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
