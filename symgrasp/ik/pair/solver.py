@@ -17,7 +17,12 @@ normal n of axes 2 and 3 as origins of w and z, a its length and α the angle of
 
 for the coordinates P and Q of R3 z along n and h3 × n: a polynomial of degree 4 in b = exp(i q4) (D. L.
 Pieper, The Kinematics of Manipulators under Computer Control, 1968); where axes 2 and 3 meet or are parallel,
-two of degree 2. Its four complex roots give four residuals r of the second equation. Their product, times
+two of degree 2. Where they are nearly parallel, the feet are far away and the digits are lost in distances
+from there: then n leads from a point of axis 2 to what is nearest to it on axis 3, h2·n is not 0, and
+
+    sin α Q = h2·w − a (h2·n) − cos α h3·z − (h2·n) P,   sin α = h2·(h3 × n),   cos α = h2·h3.
+
+Its four complex roots give four residuals r of the second equation. Their product, times
 ρ⁴ K for the poles at which q2 or q3 is infinite,
 
     N(q1) = ρ⁴ K r₁ r₂ r₃ r₄,   ρ² = |w|² − (h2·w)²,   K = |Res_b(z·n + i z·(h3 × n), P − i Q)|²,
