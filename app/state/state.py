@@ -36,6 +36,9 @@ from .surveys.survey import Places, SurveyRequest, SurveyState
 
 __all__ = ["Pick", "State"]
 
+SAME_PHI = 1e-6
+"""Difference (rad) of two redundancy values up to which they are one."""
+
 
 @dataclass(frozen=True)
 class Pick:
@@ -319,9 +322,15 @@ class State:
         if self.map_view.candidate is not None:
             return min(self.map_view.candidate, len(self.explanation.candidates) - 1)
         witness = self.map.witness(self.cell) if self.map and self.cell else None
-        choices = [(candidate.sample, candidate.branch) for candidate in self.explanation.candidates]
-        shown = witness and (witness.sample, witness.branch)
-        return choices.index(shown) if shown in choices else 0
+        if witness is None:
+            return 0
+        # By its value: a value that is not among the samples has other indices on the map and here.
+        same = (
+            k
+            for k, candidate in enumerate(self.explanation.candidates)
+            if candidate.branch == witness.branch and abs(candidate.phi - witness.phi) < SAME_PHI
+        )
+        return next(same, 0)
 
     @property
     def shown_candidate(self) -> CandidateResult | None:

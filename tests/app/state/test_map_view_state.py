@@ -226,6 +226,18 @@ def test_the_candidates_are_those_of_the_picked_cell(service, reason, delta):
         assert state.candidate == 0
 
 
+def test_the_witness_is_shown_that_only_the_search_of_the_redundancy_found(service):
+    scene = load_small("talos_bottle", 6, 12).with_settings(redundancy="auto")
+    opened = State.of(scene, "")
+    opened = job_changes.map_arrived(opened, 0, service.map(opened.request, quiet))
+    searched = np.argwhere(opened.map.feasible & (opened.map.sample > scene.settings.samples))
+    assert len(searched)
+    for roll, *cell in searched[::4].tolist():
+        state = changes.choose_cell(changes.choose_roll(opened, list(RollChoice)[1 + roll]), *cell)
+        state = explained(service, state)
+        assert np.allclose(state.shown_candidate.q, state.map.witness(state.cell).q, atol=1e-5)
+
+
 def test_candidates_are_stepped_through_and_forgotten_with_the_cell(service):
     state = opened()
     state = explained(service, changes.choose_cell(state, *cell_with(state, Reason.FEASIBLE)))
