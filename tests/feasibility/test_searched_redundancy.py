@@ -1,5 +1,6 @@
 """Maps for which all of the redundancy is searched, against maps at many samples."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,7 @@ from symgrasp.feasibility.create import MapMaker, create_map
 from symgrasp.feasibility.exact import redundancy_search
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.ik import solver_for
-from symgrasp.poses import inverse
+from symgrasp.poses import inverse, translation
 from symgrasp.reason import Reason
 from symgrasp.scene.format import AUTO_SAMPLES, MOST_SAMPLES, MapSettings
 from symgrasp.scene.scene import Scene
@@ -196,6 +197,17 @@ def test_an_explanation_says_what_the_map_rests_on():
     with open_world(scene.with_settings(redundancy=6)) as world:
         sampled = MapMaker(world).explain(None, None, Cell(*cells[1]))
     assert sampled.rests_on == "6 redundancy samples"
+
+
+@pytest.mark.parametrize("redundancy", ["auto", 6])
+def test_nothing_is_left_open_where_bodies_collide_whatever_the_arm_does(redundancy):
+    scene = Scene.load("bottle_on_table").with_settings(heights=6, angles=12, redundancy=redundancy)
+    task = scene.task()
+    inside = replace(task, T_world_object=scene.arm().robot.T_world_base @ translation([0, 0, 0.05]))
+    with open_world(scene) as world:
+        m = MapMaker(world).map(None, inside)
+    assert not m.feasible.any()
+    assert m.proven.all()
 
 
 def test_scenes_search_all_of_the_redundancy_unless_they_say_otherwise():

@@ -348,7 +348,8 @@ class ExactEngine:
             yield
         if inputs.always_collides:
             draft.proven[cells] = True
-        if locked is None or inputs.always_collides:
+            return
+        if locked is None:
             return
         draft.proven[tuple(part[found.proven] for part in cells)] = True
         which = np.flatnonzero(left & ~found.proven)
