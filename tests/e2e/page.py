@@ -32,6 +32,12 @@ PACE = 80
 TRIES = 3
 """How often a number is typed until the box shows it."""
 
+HIDE_NOTICE = """() => {
+    for (const notice of document.querySelectorAll('.mantine-Notification-root[style*="orange"]'))
+        notice.style.visibility = "hidden";
+}"""
+"""Hides viser's notice of slow drawing, which lies over the 3D view until it goes by itself."""
+
 MAP_SHARE = 1.5e-4
 """Share of the 3D view that has the colour of feasible cells at least, when the map is in it."""
 
@@ -136,6 +142,7 @@ class GraspPage:
 
     def view(self) -> np.ndarray:
         """Return the 3D view between the panels: (H, W, 3)."""
+        self.frame.evaluate(HIDE_NOTICE)
         png = self.frame.locator("canvas").first.screenshot()
         return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
 
