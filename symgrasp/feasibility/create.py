@@ -223,6 +223,7 @@ class MapMaker:
         torso, at = arm.robot.torso, np.zeros(len(cells), dtype=int)
         if torso is not None:
             at = np.array([torso_sample(m, torso, cell) for cell in map(tuple, cells)], dtype=int)
+        witnesses = [w and (w.branch, w.phi) for w in (m.witness(Cell(*cell)) for cell in cells.tolist())]
         found: list[tuple[Window, ...]] = [()] * len(cells)
         values = [t for t in np.unique(at).tolist() if t >= 0]
         for k, t in enumerate(values):
@@ -235,9 +236,9 @@ class MapMaker:
                 )
             these = np.flatnonzero(at == t)
             step = part_of(progress, k, len(values))
-            for c, windows in zip(
-                these, engine.windows(task, cells[these], m.manifold, step, settle=settle), strict=True
-            ):
+            own_witnesses = [witnesses[c] for c in these]
+            listed = engine.windows(task, cells[these], m.manifold, own_witnesses, step, settle=settle)
+            for c, windows in zip(these, listed, strict=True):
                 found[int(c)] = windows
         return found
 

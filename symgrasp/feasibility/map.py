@@ -236,8 +236,8 @@ class FeasibilityMap:
             cell: the cell, at its centre.
 
         Returns:
-            The windows, by branch, then by φ; none where nothing is free, and of an arm on a torso only at
-            the value of the torso at which the witness is.
+            The windows, by branch, then by φ: one holds the witness, and there is none where nothing is free.
+            Those of an arm on a torso are at the value of the torso at which the witness is.
 
         Raises:
             InputError: the arm has six joints or fewer, of which a grasp leaves none free.

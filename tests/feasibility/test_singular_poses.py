@@ -47,6 +47,15 @@ MISSED = {
 """Configurations that are free, to whose poses few others lead."""
 
 
+SOUGHT = {
+    "tiago_pro": [
+        (0.758988782982596, -1.6428245799321703, 0.11564727314550893, -0.14939949608704994,
+         1.283845076367042, 0.959310173424254, -1.215621525781324),
+    ],
+}  # fmt: skip
+"""Configurations to whose poses only Newton's method leads, all joints free."""
+
+
 def starter(name: str) -> Scene:
     """Return a scene with a robot of the catalogue, whose maps have one cell."""
     robot = next(robot for robot in CATALOGUE if robot.name == name)
@@ -83,6 +92,15 @@ class Comparison:
         assert found.feasible[0, 0, 0] or not free, f"{kind}: {q.tolist()} is free, the map: {why}"
         return free
 
+    def holds_its_witness(self, q: np.ndarray) -> bool:
+        """Whether one of the windows of the cell that a configuration (n,) reaches holds its witness."""
+        task = Task("other", (self.arm.name,), self.arm.world_tool_pose(q) @ self._T_tool_object)
+        found = self._maker.map(task=task)
+        witness = found.witness((0, 0, 0))
+        assert witness
+        (windows,) = self._maker.windows(found, np.zeros((1, 3)))
+        return any(w.branch == witness.branch and w.low <= witness.phi <= w.high for w in windows)
+
 
 @pytest.mark.parametrize("name", some(2, ["iiwa", "z1", "panda", "gen3", "alex", "tiago_pro", "ur5"]))
 def test_what_is_free_is_feasible(name):
@@ -104,3 +122,13 @@ def test_single_poses(name):
         comparison = Comparison(scene, world)
         for q in MISSED[name]:
             assert comparison.is_free(np.array(q), "single"), q
+
+
+@pytest.mark.parametrize("name", ["tiago_dual", "tiago_pro"])
+def test_windows_hold_the_witness(name):
+    """Also where the arm is free at single values of its redundancy, or only Newton's method finds any."""
+    scene = starter(name)
+    with open_world(scene) as world:
+        comparison = Comparison(scene, world)
+        for q in [*MISSED.get(name, ()), *SOUGHT.get(name, ())]:
+            assert comparison.holds_its_witness(np.array(q)), q

@@ -379,6 +379,7 @@ class ExactEngine:
         task: Task,
         cells: np.ndarray,
         manifold: Manifold,
+        witnesses: Sequence[tuple[int, float] | None],
         progress: Progress | None = None,
         *,
         settle: bool = True,
@@ -389,6 +390,7 @@ class ExactEngine:
             task: the task; it need not be one of the scene's.
             cells: (c, 3) the cells.
             manifold: the grid, with the engine's heights.
+            witnesses: branch and φ (rad) of the witness of each cell, None of cells without.
             progress: called with the finished share; may raise `Cancelled`.
             settle: whether PyBullet decides what pieces that all but touch leave open, at the ends of
                 windows; else only where nothing else is free.
@@ -416,8 +418,9 @@ class ExactEngine:
             inputs = inputs._replace(parts=min(len(some), PARTS * core_count()))
             tell = between(progress, these.start / len(which), these.stop / len(which))
             own = self._redundancy.windows(
-                inputs, batch, locked, self._scratches(), settle=settle, progress=tell
-            )
+                inputs, batch, locked, self._scratches(), [witnesses[c] for c in which[these]],
+                settle=settle, progress=tell,
+            )  # fmt: skip
             for cell, listed in zip(which[these].tolist(), own, strict=True):
                 found[cell] = listed
         self.world.set_arms(())

@@ -22,7 +22,7 @@ from symgrasp.feasibility.cell import Window
 from symgrasp.feasibility.creation.map_draft import MapDraft
 from symgrasp.feasibility.exact.batches import Batch
 from symgrasp.feasibility.exact.open_candidates import OpenCandidates
-from symgrasp.feasibility.exact.settling import settled
+from symgrasp.feasibility.exact.settling import settled, with_witness
 from symgrasp.ik.at_phi import Locked
 from symgrasp.poses import Array
 from symgrasp.progress import Progress
@@ -136,6 +136,7 @@ class RedundancySearch:
         batch: Batch,
         locked: Locked,
         scratches: Sequence[Scratch],
+        witnesses: Sequence[tuple[int, float] | None],
         *,
         settle: bool,
         progress: Progress | None = None,
@@ -147,6 +148,7 @@ class RedundancySearch:
             batch: their inverse kinematics and pieces.
             locked: the joint that is the redundancy.
             scratches: of the threads.
+            witnesses: branch and φ (rad) of the witness of each cell, None of cells without.
             settle: whether PyBullet decides what pieces that all but touch leave open, at the ends of
                 windows; else only where nothing else is free.
             progress: called with the finished share, also before every question to PyBullet, of which a cell
@@ -163,12 +165,13 @@ class RedundancySearch:
             listed = [Window(*row) for row in zip(*(c.tolist() for c in columns), strict=True)]
             if settle or not listed:
                 phi, branch = own.undecided.of(k)
-                left = list(zip(branch.tolist(), phi.tolist(), strict=True))
+                left = [*zip(branch.tolist(), phi.tolist(), strict=True), *filter(None, [witnesses[k]])]
                 tell = progress and partial(progress, k / len(tools))
                 is_free = partial(self._is_free, batch, tools[k], int(inputs.row[k]), tell)
-                yield settled(listed, left, is_free, (locked.lower, locked.upper))
+                found = settled(listed, left, is_free, (locked.lower, locked.upper))
             else:
-                yield tuple(sorted(listed))
+                found = tuple(sorted(listed))
+            yield with_witness(found, witnesses[k])
 
     def _covered(self, which: np.ndarray, locked: Locked) -> CoverInput:
         return CoverInput(which, locked, self._inner, STEP)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from symgrasp.engine.redundancy.windows import FINEST, STEP
 from symgrasp.feasibility.cell import Window
 
-__all__ = ["settled"]
+__all__ = ["settled", "with_witness"]
 
 IsFree = Callable[[int, float], bool]
 """Whether a branch is free at a value of φ (rad)."""
@@ -45,6 +45,23 @@ def settled(
         else:
             refuted[branch] = phi
     return _joined(windows)
+
+
+def with_witness(windows: tuple[Window, ...], witness: tuple[int, float] | None) -> tuple[Window, ...]:
+    """Return windows of a cell, with one of no width at its witness where none of them holds it.
+
+    At singular poses a branch may be free at single values of φ, between which the halving steps.
+
+    Args:
+        windows: by branch, then by φ.
+        witness: branch and φ (rad) of the cell's witness, if it has one.
+    """
+    if witness is None:
+        return windows
+    branch, phi = witness
+    if any(w.branch == branch and w.low - FINEST <= phi <= w.high + FINEST for w in windows):
+        return windows
+    return tuple(sorted((*windows, Window(branch, phi, phi, whole=True))))
 
 
 def _walk(branch: int, phi: float, sign: int, is_free: IsFree, limits: tuple[float, float]) -> float:
