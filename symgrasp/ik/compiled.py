@@ -10,7 +10,7 @@ from symgrasp.compiling import interpreted
 from symgrasp.ik.arm_ik import ArmIK, Lock, Solutions, Tolerance
 from symgrasp.ik.branches import branch_count, new_memory, solve_range
 from symgrasp.ik.chain import COSINE_TOLERANCE, Chain
-from symgrasp.ik.families import EXACT, chain_geometries
+from symgrasp.ik.families import EXACT, chain_geometries, further_geometries
 from symgrasp.ik.pair.geometry import MEETING_PAIR
 from symgrasp.ik.self_motion import BARELY
 from symgrasp.poses import Array
@@ -48,6 +48,7 @@ class CompiledIK(ArmIK):
         self, arm: Arm, samples: int, tolerance: Tolerance | None = None, lock: Lock | None = None
     ) -> None:
         super().__init__(arm, samples, tolerance, lock)
+        self._known = self.phi
         self.chain = self._pack_chain(self.phi)
 
     @property
@@ -73,9 +74,12 @@ class CompiledIK(ArmIK):
     def at(self, phi: Array) -> Self:
         """Return the solver of the same arm at other samples (K,) of its redundancy (rad)."""
         other = super().at(phi)
-        # With those that are known, because at single values the arm may be of no family.
-        chain = self._pack_chain(np.concatenate([self.phi, phi]))
-        other.chain = chain._replace(geometry=chain.geometry[len(self.phi) :])
+        rows = further_geometries(self.arm, self.locked, self._known, phi)
+        if rows is not None:
+            other.chain = self.chain._replace(geometry=np.array([row.packed() for row in rows]))
+        else:
+            chain = self._pack_chain(np.concatenate([self._known, phi]))
+            other.chain = chain._replace(geometry=chain.geometry[len(self._known) :])
         return other
 
     def solve(self, T_base_tool: Array) -> Solutions:

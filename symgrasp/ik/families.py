@@ -16,7 +16,7 @@ from symgrasp.robot.robot import Arm
 
 __all__ = [
     "BESIDE", "COARSE", "EXACT", "Joints", "Precision", "chain_geometries", "cosine_constants", "free_joints",
-    "has_exact_pair", "parallel_below",
+    "further_geometries", "has_exact_pair", "parallel_below",
 ]  # fmt: skip
 
 
@@ -97,8 +97,32 @@ def chain_geometries(
     Returns:
         Up to what its axes meet or are parallel, and K geometries of one family.
     """
-    # For a pitched arm it is asked row by row, though the limits are all that differs.
-    return _geometries((arm.H.tobytes(), arm.P.tobytes(), arm.R0.tobytes()), locked, phi.tobytes())
+    found = _geometries(_screws(arm), locked, phi.tobytes())
+    return found and (found.precision, found.rows)
+
+
+def further_geometries(
+    arm: Arm, locked: int | None, known: Array, phi: Array
+) -> Sequence[ChainGeometry] | None:
+    """Return an arm's geometry at more values of its redundancy, of the family that it has at known ones.
+
+    Args:
+        arm: the arm.
+        locked: index of the locked joint; None for a 6-joint arm.
+        known: (K,) values of the locked joint (rad) at which `chain_geometries` is known.
+        phi: (M,) the other values (rad).
+
+    Returns:
+        M geometries, or None where that family has none at one of the values.
+    """
+    found = _geometries(_screws(arm), locked, known.tobytes())
+    assert found is not None  # or nothing would be known
+    rows = [
+        found.find(free_joints(arm, locked, float(x), found.rows[0].backwards), found.precision) for x in phi
+    ]
+    if isinstance(found.rows[0], SphericalGeometry) and None in rows:
+        return None
+    return _filled(arm, locked, rows, phi, found.rows[0], found.precision)
 
 
 class _Screws(NamedTuple):
@@ -109,10 +133,27 @@ class _Screws(NamedTuple):
     R0: Array
 
 
+class _Found(NamedTuple):
+    """The family of an arm, and its geometry at some values of the redundancy.
+
+    Attributes:
+        precision: up to what its axes meet or are parallel.
+        find: returns the geometry at one value.
+        rows: the geometries.
+    """
+
+    precision: Precision
+    find: _Find
+    rows: Sequence[ChainGeometry]
+
+
+def _screws(arm: Arm) -> tuple[bytes, bytes, bytes]:
+    # For a pitched arm it is asked row by row, though the limits are all that differs.
+    return arm.H.tobytes(), arm.P.tobytes(), arm.R0.tobytes()
+
+
 @lru_cache(maxsize=256)
-def _geometries(
-    screws: tuple[bytes, bytes, bytes], locked: int | None, values: bytes
-) -> tuple[Precision, Sequence[ChainGeometry]] | None:
+def _geometries(screws: tuple[bytes, bytes, bytes], locked: int | None, values: bytes) -> _Found | None:
     """Do what `chain_geometries` does, for the bytes of H, P, R0 and phi."""
     phi = np.frombuffer(values)
     arm = _Screws(*(np.frombuffer(part).reshape(-1, 3) for part in screws))
@@ -124,16 +165,26 @@ def _geometries(
             rows = _rows(find, joints(backwards), precision, most)
             if rows is None:
                 continue
-            known = [row for row in rows if row is not None]
-            if len(known) == len(rows):
-                return precision, known
-            one, filled = known[0], zip(rows, phi, strict=True)
-            assert not isinstance(one, SphericalGeometry)  # which has no such values
-            return precision, [
-                row or _beside(arm, locked, float(value), one, precision) or one.nowhere(float(value))
-                for row, value in filled
-            ]
+            one = next(row for row in rows if row is not None)
+            return _Found(precision, find, _filled(arm, locked, rows, phi, one, precision))
     return None
+
+
+def _filled(
+    arm: Arm | _Screws,
+    locked: int | None,
+    rows: Sequence[ChainGeometry | None],
+    phi: Array,
+    one: ChainGeometry,
+    precision: Precision,
+) -> list[ChainGeometry]:
+    """Return geometries (K,) at values of the redundancy (rad), with others of one's family for None."""
+    if isinstance(one, SphericalGeometry):  # of which none is missing
+        return [row for row in rows if row is not None]
+    return [
+        row or _beside(arm, locked, float(value), one, precision) or one.nowhere(float(value))
+        for row, value in zip(rows, phi, strict=True)
+    ]
 
 
 def _rows(
@@ -252,7 +303,7 @@ def _meeting_pair(joints: Joints, precision: Precision) -> PairGeometry | None:
 
 
 def _beside(
-    arm: _Screws, locked: int | None, phi: float, known: ChainGeometry, precision: Precision
+    arm: Arm | _Screws, locked: int | None, phi: float, known: ChainGeometry, precision: Precision
 ) -> PairGeometry | None:
     """Return the geometry of a pair that is parallel at φ, as it is at a value beside it.
 
