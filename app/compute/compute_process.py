@@ -26,6 +26,8 @@ from ..state.plans.plan_results import PlanResult
 from ..state.requests import (
     CompareRequest,
     Comparison,
+    ElbowMotions,
+    ElbowRequest,
     ExplainRequest,
     ExplainResult,
     MapRequest,
@@ -137,6 +139,10 @@ class ComputeProcess:
     def windows(self, request: WindowsRequest, shown: FeasibilityMap, progress: Progress) -> Windows:
         """Compute how wide the windows of a map's cells are."""
         return self._call("windows", progress, request, shown)
+
+    def elbow(self, request: ElbowRequest, shown: FeasibilityMap, progress: Progress) -> ElbowMotions:
+        """Compute how the elbow may move at a cell."""
+        return self._call("elbow", progress, request, shown)
 
     def read_scene(self, name: str, content: bytes, folder: Path | None, progress: Progress) -> UploadedScene:
         """Read an uploaded scene; see `UploadService.read_scene`."""

@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from symgrasp.errors import InputError
+from symgrasp.errors import InputError, SymgraspError
 from symgrasp.feasibility.create import MapMaker
 from symgrasp.feasibility.creation.coarse import coarse_map, is_map_compiled
+from symgrasp.feasibility.creation.torso_maps import torso_sample
 from symgrasp.feasibility.map import FeasibilityMap
+from symgrasp.feasibility.self_motion import self_motion
 from symgrasp.poses import rotation_z
 from symgrasp.progress import Progress
 from symgrasp.scene.scene import Scene
@@ -20,6 +22,9 @@ from symgrasp.world import RESTING_DEPTH, BulletWorld, open_world
 from ..state.requests import (
     CompareRequest,
     Comparison,
+    ElbowMotion,
+    ElbowMotions,
+    ElbowRequest,
     ExplainRequest,
     ExplainResult,
     MapRequest,
@@ -35,6 +40,12 @@ __all__ = ["DRAWS", "MapService"]
 
 DRAWS = 100
 """Of how many poses a map is computed for the probabilities of grasps."""
+
+ELBOW_STEP = 0.01
+"""Distance (rad) of the values of the redundancy between which the elbow moves straight, at most."""
+
+LEAST_MOTION = 2e-3
+"""Width (rad) from which on a window is a motion that can be seen, and set by a slider."""
 
 
 class MapService:
@@ -162,6 +173,35 @@ class MapService:
         except InputError:
             widest = None
         return Windows(request, np.full(shown.reason.shape, np.nan) if widest is None else widest)
+
+    def elbow(self, request: ElbowRequest, shown: FeasibilityMap, progress: Progress) -> ElbowMotions:
+        """Compute how the elbow may move while the hand stays at a feasible cell.
+
+        Args:
+            request: which cell of which map.
+            shown: that map, for the object that is not turned.
+            progress: called with the finished share; may raise `Cancelled`.
+        """
+        scene, cell = request.map.scene, request.cell
+        maker, arm = self._maker_for(scene, progress), scene.arm(request.map.arm)
+        m = replace(shown, shown_in=scene)
+        try:
+            (windows,) = maker.windows(m, np.array([cell]), progress, settle=False)
+        except InputError:  # the arm has no redundancy, or none that is known at any value
+            return ElbowMotions(request, ())
+        motions: list[ElbowMotion] = []
+        for window in windows:
+            if window.width < LEAST_MOTION:
+                continue
+            try:
+                q = self_motion(m, cell, window, ELBOW_STEP)
+            except SymgraspError:  # a joint would have to go back by a full turn
+                continue
+            if arm.robot.torso is not None:
+                q = arm.with_torso(torso_sample(m, arm.robot.torso, cell), q)
+            phi = np.linspace(window.low, window.high, len(q))
+            motions.append(ElbowMotion(window.branch, phi, q))
+        return ElbowMotions(request, tuple(motions))
 
     def _maker_for(self, scene: Scene, progress: Progress) -> MapMaker:
         """Return the present map maker if it is for the same robots, obstacles and object, else a new one."""

@@ -75,6 +75,7 @@ class _Server:
         self._methods: dict[str, Callable[..., Any]] = {
             "map": self._map, "compare": self._maps.compare, "explain": self._maps.explain,
             "probability": self._maps.probability, "windows": self._maps.windows,
+            "elbow": self._maps.elbow,
             "plan": plans.plan, "more": plans.more, "motion": plans.motion, "open": plans.open,
             "write": plans.write,
             "read_scene": uploads.read_scene, "file_kind": uploads.file_kind,

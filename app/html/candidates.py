@@ -57,8 +57,21 @@ def candidate_html(state: State) -> str:
         f'<div class="sg sg-candidate"><b>Candidate {where}</b>: φ = {np.rad2deg(shown_candidate.phi):.1f}°, '
         f"branch {shown_candidate.branch + 1}{pitch}<br>"
         f'<i style="background:{shown_candidate.reason.color}"></i>'
-        f"{escape(candidate_text(shown_candidate))}</div>"
+        f"{escape(candidate_text(shown_candidate))}{_elbow_text(state)}</div>"
     )
+
+
+def _elbow_text(state: State) -> str:
+    """Say where the elbow was moved to, or that it cannot move; nothing where that is not asked for."""
+    candidate, motion = state.shown_candidate, state.elbow_motion
+    if candidate is None or candidate.reason != Reason.FEASIBLE or not state.are_elbow_motions_known:
+        return ""
+    if motion is None:
+        return "<br>The elbow cannot move from here."
+    if state.elbow is None or state.shown_values is None:
+        return ""
+    joints = ", ".join(f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(state.shown_values)))
+    return f"<br>Elbow at φ = {np.rad2deg(state.elbow):.1f}°, joints {joints}"
 
 
 def candidate_text(candidate: CandidateResult) -> str:

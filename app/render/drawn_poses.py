@@ -19,7 +19,7 @@ def drawn_joint_values(state: State) -> dict[str, Array]:
 
     Those of the plan's motion where one is shown. Else robots park at home, except the arms that hold the
     object in the plan's task that is shown, or the chosen arm at the chosen candidate of the picked cell, if
-    that is feasible, or its witness.
+    that is feasible, with the elbow where it was moved to, or its witness.
 
     Returns:
         Robot name → values (n,) of all its joints, in rad or m.
@@ -42,7 +42,8 @@ def drawn_joint_values(state: State) -> dict[str, Array]:
     elif state.shown_candidate and state.explanation:
         if state.shown_candidate.reason == Reason.FEASIBLE:
             arm = state.scene.arm(state.arm)
-            values[arm.robot.name] = arm.robot_values(state.shown_candidate.q, state.explanation.opening)
+            assert state.shown_values is not None
+            values[arm.robot.name] = arm.robot_values(state.shown_values, state.explanation.opening)
     elif state.is_current and state.map and state.cell and (witness := state.map.witness(state.cell)):
         arm = state.scene.arm(state.arm)
         values[arm.robot.name] = arm.robot_values(witness.q, witness.opening)

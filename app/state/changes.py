@@ -36,6 +36,7 @@ __all__ = [
     "clear_pick",
     "drag",
     "linked",
+    "move_elbow",
     "moved",
     "open_scene",
     "open_upload",
@@ -232,6 +233,11 @@ def choose_roll(state: State, roll: RollChoice) -> State:
 def choose_candidate(state: State, candidate: int) -> State:
     """Show a candidate of the picked cell by its index; 0 is the best."""
     return replace(state, map_view=state.map_view.with_candidate(candidate), step=None)
+
+
+def move_elbow(state: State, phi: float) -> State:
+    """Move the elbow of the arm that holds the object to a value of the redundancy (rad)."""
+    return replace(state, map_view=replace(state.map_view, elbow=phi), step=None)
 
 
 def clear_pick(state: State) -> State:

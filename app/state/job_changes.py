@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .requests import Busy, Comparison, ExplainResult, MapResult, Probability, Request, Windows
+from .requests import Busy, Comparison, ElbowMotions, ExplainResult, MapResult, Probability, Request, Windows
 from .state import State
 
 __all__ = [
@@ -100,9 +100,9 @@ def _follows(state: State, result: MapResult, awaited: bool) -> bool:
 
 
 def result_arrived(
-    state: State, job_id: int, result: Comparison | ExplainResult | Probability | Windows
+    state: State, job_id: int, result: Comparison | ExplainResult | Probability | Windows | ElbowMotions
 ) -> State:
-    """Show a comparison, an explanation or probabilities, unless it is about another map."""
+    """Show what was found out about a map, unless it is about another map."""
     if not is_awaited(state, job_id):
         return state
     is_about_it = result.request.map == state.request

@@ -11,11 +11,14 @@ from symgrasp.feasibility.cell import Cell
 from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.feasibility.refined import Refined
+from symgrasp.reason import Reason
 from symgrasp.survey.success import PoseNoise
 
 from .requests import (
     CompareRequest,
     Comparison,
+    ElbowMotions,
+    ElbowRequest,
     ExplainRequest,
     ExplainResult,
     MapRequest,
@@ -107,6 +110,9 @@ class MapViewState:
         noise: how uncertain the object's pose is where the colours show probabilities.
         probability: the newest result of that.
         windows: how wide the windows of cells are, the newest result.
+        moves_elbow: whether the elbow of the arm that holds the object can be moved.
+        elbow_motions: how it may move at a cell, the newest result.
+        elbow: where it was moved to, the redundancy (rad); None where it was not.
     """
 
     roll: RollChoice = RollChoice.EITHER
@@ -122,6 +128,9 @@ class MapViewState:
     noise: PoseNoise = NOISE
     probability: Probability | None = None
     windows: Windows | None = None
+    moves_elbow: bool = False
+    elbow_motions: ElbowMotions | None = None
+    elbow: float | None = None
 
     @property
     def input_values(self) -> tuple[object, ...]:
@@ -129,7 +138,7 @@ class MapViewState:
         return (
             self.roll, self.color_by, self.handprint, self.compare, self.candidate, self.rolls_apart,
             self.patterns,
-            self.noise,
+            self.noise, self.moves_elbow, self.elbow,
         )  # fmt: skip
 
     def missing_request(self, request: MapRequest, delta: float, cell: Cell | None) -> Request | None:
@@ -147,6 +156,10 @@ class MapViewState:
             explain = ExplainRequest(request, cell)
             if self.explained is None or self.explained.request != explain:
                 return explain
+            elbow = ElbowRequest(request, cell)
+            known = self.elbow_motions and self.elbow_motions.request == elbow
+            if self.moves_elbow and not known and self.explained.explanation.reason == Reason.FEASIBLE:
+                return elbow
         if self.color_by is ColorBy.PROBABILITY and self.probability_of(request) is None:
             return ProbabilityRequest(request, self.noise)
         if self.color_by is ColorBy.WINDOW and self.windows_of(request) is None:
@@ -170,22 +183,31 @@ class MapViewState:
     def with_candidate(self, candidate: int) -> MapViewState:
         """Show a candidate by its index among the explained ones; 0 is the best."""
         count = len(self.explained.explanation.candidates) if self.explained else 0
-        return replace(self, candidate=int(np.clip(candidate, 0, count - 1)) if count else None)
+        return replace(self, candidate=int(np.clip(candidate, 0, count - 1)) if count else None, elbow=None)
 
-    def with_result(self, result: Comparison | ExplainResult | Probability | Windows) -> MapViewState:
+    def with_result(
+        self, result: Comparison | ExplainResult | Probability | Windows | ElbowMotions
+    ) -> MapViewState:
         """Store a result about the map."""
         if isinstance(result, Probability):
             return replace(self, probability=result)
         if isinstance(result, Windows):
             return replace(self, windows=result)
+        if isinstance(result, ElbowMotions):
+            return replace(self, elbow_motions=result)
         if isinstance(result, Comparison):
             return replace(self, comparison=result if self.compare else None)
-        # A candidate without an explanation was restored by an undo: keep it.
-        return replace(self, explained=result, candidate=None if self.explained else self.candidate)
+        # A candidate without an explanation was restored by an undo: keep it, and where its elbow was.
+        if self.explained is None:
+            return replace(self, explained=result)
+        return replace(self, explained=result, candidate=None, elbow=None)
 
     def without_results(self) -> MapViewState:
         """Drop what was computed."""
-        return replace(self, comparison=None, explained=None, hovered=None, probability=None, windows=None)
+        return replace(
+            self, comparison=None, explained=None, hovered=None, probability=None, windows=None,
+            elbow_motions=None,
+        )  # fmt: skip
 
     def for_another_scene(self) -> MapViewState:
         """Return it for another scene: both rolls, the same display options, nothing computed."""
@@ -196,8 +218,9 @@ class MapViewState:
             rolls_apart=self.rolls_apart,
             patterns=self.patterns,
             noise=self.noise,
+            moves_elbow=self.moves_elbow,
         )
 
     def for_another_cell(self) -> MapViewState:
-        """Return it for another picked cell: the default candidate."""
-        return replace(self, candidate=None)
+        """Return it for another picked cell: the default candidate, the elbow as it has it."""
+        return replace(self, candidate=None, elbow=None)

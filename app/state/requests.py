@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from symgrasp.feasibility.cell import Cell
-from symgrasp.feasibility.explain import Explanation
+from symgrasp.feasibility.explain import CandidateResult, Explanation
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.poses import Array
 from symgrasp.scene.parts import Task
@@ -19,9 +19,13 @@ from .cached import cached
 from .object_pose import ObjectPose, with_poses
 
 __all__ = [
+    "SAME_PHI",
     "Busy",
     "CompareRequest",
     "Comparison",
+    "ElbowMotion",
+    "ElbowMotions",
+    "ElbowRequest",
     "ExplainRequest",
     "ExplainResult",
     "MapKey",
@@ -34,6 +38,9 @@ __all__ = [
     "Windows",
     "WindowsRequest",
 ]
+
+SAME_PHI = 1e-6
+"""Difference (rad) of two redundancy values up to which they are one."""
 
 MapKey = tuple[str, str, bytes]
 """All that a map depends on: hash of the scene without tasks (and who shares the load), name of the arm,
@@ -188,7 +195,24 @@ class WindowsRequest:
         return False
 
 
-Request = MapRequest | CompareRequest | ExplainRequest | ProbabilityRequest | WindowsRequest
+@dataclass(frozen=True)
+class ElbowRequest:
+    """A cell of which is to be known how the elbow may move while the hand holds the object there.
+
+    Attributes:
+        map: the map.
+        cell: a cell of it, unshifted.
+    """
+
+    map: MapRequest
+    cell: Cell
+
+    def differs_only_in_pose(self, other: object) -> bool:
+        """Return False: the motions at another cell are not shown meanwhile."""
+        return False
+
+
+Request = MapRequest | CompareRequest | ExplainRequest | ProbabilityRequest | WindowsRequest | ElbowRequest
 """What a state may need computed; it is started without an action of a person."""
 
 
@@ -276,3 +300,43 @@ class Windows:
 
     request: WindowsRequest
     widest: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ElbowMotion:
+    """A motion of the elbow along a window of a cell, see `symgrasp.self_motion`.
+
+    Attributes:
+        branch: branch of the closed form.
+        phi: (k,) values of the redundancy (rad), rising.
+        q: (k, n) joint values (rad or m) of the arm there, a torso's first.
+    """
+
+    branch: int
+    phi: Array
+    q: Array
+
+    def holds(self, candidate: CandidateResult, torso: int) -> bool:
+        """Return whether a candidate lies on it, of an arm with so many joints of a torso."""
+        return (
+            self.branch == candidate.branch
+            and self.phi[0] - SAME_PHI <= candidate.phi <= self.phi[-1] + SAME_PHI
+            and np.allclose(self.q[0, :torso], candidate.q[:torso], atol=SAME_PHI)
+        )
+
+    def at(self, phi: float) -> Array:
+        """Return the joint values (n,) at a value of the redundancy (rad), at its ends beyond them."""
+        return np.array([np.interp(phi, self.phi, values) for values in self.q.T])
+
+
+@dataclass(frozen=True, eq=False)
+class ElbowMotions:
+    """How the elbow may move while the hand holds the object at a cell.
+
+    Attributes:
+        request: what it answers.
+        motions: all that can be seen; none of arms without redundancy.
+    """
+
+    request: ElbowRequest
+    motions: tuple[ElbowMotion, ...]

@@ -17,6 +17,7 @@ from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.plan.plan import PlanTask
 from symgrasp.planners.bimanual import ClimbStep
 from symgrasp.poses import Array, rotation_z
+from symgrasp.reason import Reason
 from symgrasp.robot.robot import Robot
 from symgrasp.scene.scene import Scene
 
@@ -31,13 +32,20 @@ from .map_view_state import MapViewState
 from .object_pose import ObjectPose, with_poses
 from .page_link import PageLink
 from .plans.plan_results import PlanKind, PlanResult, PlanResults
-from .requests import Busy, ExplainRequest, MapRequest, MapResult, Probability, Request
+from .requests import (
+    SAME_PHI,
+    Busy,
+    ElbowMotion,
+    ElbowRequest,
+    ExplainRequest,
+    MapRequest,
+    MapResult,
+    Probability,
+    Request,
+)
 from .surveys.survey import Places, SurveyRequest, SurveyState
 
 __all__ = ["Pick", "State"]
-
-SAME_PHI = 1e-6
-"""Difference (rad) of two redundancy values up to which they are one."""
 
 
 @dataclass(frozen=True)
@@ -338,6 +346,47 @@ class State:
         if self.explanation is None or self.candidate is None:
             return None
         return self.explanation.candidates[self.candidate]
+
+    @property
+    def has_elbow(self) -> bool:
+        """Whether a grasp leaves the chosen arm a motion: it has seven joints, those of a torso aside."""
+        return not self.scene.arm(self.arm).pitched and self.scene.arm(self.arm).dof - self._torso_dof > 6
+
+    @property
+    def _torso_dof(self) -> int:
+        return len(self.robot.torso.joint_names) if self.robot.torso else 0
+
+    @property
+    def are_elbow_motions_known(self) -> bool:
+        """Whether it is known how the elbow may move at the picked cell, where that is asked for."""
+        found, explanation = self.map_view.elbow_motions, self.explanation
+        if not self.map_view.moves_elbow or found is None or explanation is None or self.base_cell is None:
+            return False
+        return found.request == ElbowRequest(self.request, self.base_cell)
+
+    @property
+    def elbow_motion(self) -> ElbowMotion | None:
+        """The motion of the elbow from the candidate shown, if that is feasible and it is asked for."""
+        candidate = self.shown_candidate
+        if candidate is None or candidate.reason != Reason.FEASIBLE or not self.are_elbow_motions_known:
+            return None
+        assert self.map_view.elbow_motions
+        motions = self.map_view.elbow_motions.motions
+        return next((motion for motion in motions if motion.holds(candidate, self._torso_dof)), None)
+
+    @property
+    def elbow(self) -> float | None:
+        """Where the elbow was moved to: the redundancy (rad); None where it was not."""
+        return self.map_view.elbow if self.elbow_motion else None
+
+    @property
+    def shown_values(self) -> Array | None:
+        """Joint values (n,) of the candidate shown, with the elbow where it was moved to."""
+        if self.shown_candidate is None:
+            return None
+        if self.elbow_motion is None or self.elbow is None:
+            return self.shown_candidate.q
+        return self.elbow_motion.at(self.elbow)
 
     # -- plans ------------------------------------------------------------------------------
 

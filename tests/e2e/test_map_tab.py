@@ -171,3 +171,24 @@ def test_the_candidates_of_a_cell(open_page, bottle_map):
     assert page.shown_map.has_prints
     shoot(page, "handprint")
     assert page.complaints == []
+
+
+def test_the_elbow_is_moved_by_a_slider(open_page, bottle_map):
+    page = open_page()
+    cells = np.argwhere(RollChoice.EITHER.reason(bottle_map) == Reason.FEASIBLE)
+    row, column = cells[len(cells) // 2]
+    page.number("h (cm)", 100 * bottle_map.manifold.h[row])
+    page.number("θ (°)", np.rad2deg(bottle_map.manifold.theta[column]))
+    expect(page.text("panda holds it: feasible")).to_be_visible()
+    page.frame.get_by_label("Move the elbow").check()
+    box = page.slider_box("Elbow φ (°)")
+    expect(box).to_be_visible()
+    expect(page.text("Ready.")).to_be_visible()
+    before = page.settled_view()
+    page.slide("Elbow φ (°)", float(box.input_value()) - 10.0)
+    expect(page.text("Elbow at φ = ")).to_be_visible()
+    page.wait_for_change(before, 0.003)
+    shoot(page, "elbow")
+    page.button("Undo").click()
+    expect(page.text("Elbow at φ = ")).to_have_count(0)
+    assert page.complaints == []

@@ -31,6 +31,7 @@ from ...state.plans.plan_changes import change_plan_results
 from ...state.plans.plan_results import PlanResults
 from ...state.requests import (
     CompareRequest,
+    ElbowRequest,
     ExplainRequest,
     MapRequest,
     ProbabilityRequest,
@@ -265,6 +266,10 @@ class Session:
             assert state.result  # windows are requested only while their map is shown
             label, known = "Computing how far the elbow may swing", state.result.map
             run = lambda progress: process.windows(request, known, progress)  # noqa: E731
+        elif isinstance(request, ElbowRequest):
+            assert state.result
+            label, whole = "Computing how the elbow may move here", state.result.map
+            run = lambda progress: process.elbow(request, whole, progress)  # noqa: E731
         else:
             assert isinstance(request, ExplainRequest)
             label = "Trying every way to hold it here"
