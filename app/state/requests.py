@@ -147,8 +147,8 @@ class CompareRequest:
 
 
 @dataclass(frozen=True)
-class ExplainRequest:
-    """A cell whose candidates are all to be checked.
+class _CellRequest:
+    """Something to be computed of a cell.
 
     Attributes:
         map: the map.
@@ -159,8 +159,16 @@ class ExplainRequest:
     cell: Cell
 
     def differs_only_in_pose(self, other: object) -> bool:
-        """Return False: the candidates of another cell are not shown meanwhile."""
+        """Return False: what is known of another cell is not shown meanwhile."""
         return False
+
+
+class ExplainRequest(_CellRequest):
+    """A cell whose candidates are all to be checked."""
+
+
+class ElbowRequest(_CellRequest):
+    """A cell of which is to be known how the elbow may move while the hand holds the object there."""
 
 
 @dataclass(frozen=True)
@@ -192,23 +200,6 @@ class WindowsRequest:
 
     def differs_only_in_pose(self, other: object) -> bool:
         """Return False: it takes as long as maps, and is not waited for where another is wanted."""
-        return False
-
-
-@dataclass(frozen=True)
-class ElbowRequest:
-    """A cell of which is to be known how the elbow may move while the hand holds the object there.
-
-    Attributes:
-        map: the map.
-        cell: a cell of it, unshifted.
-    """
-
-    map: MapRequest
-    cell: Cell
-
-    def differs_only_in_pose(self, other: object) -> bool:
-        """Return False: the motions at another cell are not shown meanwhile."""
         return False
 
 
