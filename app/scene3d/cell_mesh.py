@@ -1,8 +1,9 @@
-"""The map in 3D: one coloured quad for every cell, on the object's surface or in a plane."""
+"""The map in 3D: one coloured quad for every cell or part of it, on the object's surface or in a plane."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import viser
@@ -63,25 +64,40 @@ def flat_quads(grid: Manifold, width: float, height: float) -> tuple[Array, Arra
 class CellMesh:
     """A batch of quads, one for each cell (i, j) of a map, that can be coloured and clicked.
 
+    Where the cells are split, there is one for each part.
+
     Args:
         client: the browser.
-        name: path of the node.
-        poses, sizes: as `surface_quads` and `flat_quads` return them.
-        angles: number of columns of the map.
-        on_cell: called with (row, column) when a quad is clicked.
+        name: path of the node, to which a number is added.
+        quads: returns the poses and sizes for a grid, as `surface_quads` does.
+        grid: the cells.
+        on_cell: called with (row, column) of the cell when a quad is clicked.
+
+    Attributes:
+        node: the quads; another one once they are others.
     """
 
     def __init__(
         self,
         client: viser.ClientHandle,
         name: str,
-        poses: Array,
-        sizes: Array,
-        angles: int,
+        quads: Callable[[Manifold], tuple[Array, Array]],
+        grid: Manifold,
         on_cell: OnCell,
     ) -> None:
-        self.node = client.scene.add_batched_meshes_simple(
-            name,
+        self._client, self._name, self._quads, self._grid, self._on_cell = client, name, quads, grid, on_cell
+        self._builds = 0
+        self._shape = grid.heights, grid.angles
+        self._shown: bytes = b""
+        self.node = self._built()
+
+    def _built(self) -> viser.BatchedMeshHandle:
+        """Add the quads of the present grid; browsers keep the pose of a path, so each has its own."""
+        heights, angles = self._shape
+        poses, sizes = self._quads(replace(self._grid, heights=heights, angles=angles))
+        self._builds += 1
+        node = self._client.scene.add_batched_meshes_simple(
+            f"{self._name}{self._builds}",
             vertices=QUAD,
             faces=TRIANGLES,
             batched_wxyzs=quat_wxyz(poses),
@@ -93,15 +109,22 @@ class CellMesh:
             cast_shadow=False,
             receive_shadow=False,
         )
-        self._shown: bytes = b""
 
-        @self.node.on_click
+        @node.on_click
         def _(event: viser.SceneNodePointerEvent) -> None:
             if event.instance_index is not None:
-                on_cell(*divmod(event.instance_index, angles))
+                row, column = divmod(event.instance_index, angles)
+                self._on_cell(row * self._grid.heights // heights, column * self._grid.angles // angles)
+
+        return node
 
     def set_colors(self, colors: np.ndarray) -> None:
-        """Set the colours (H, A, 3), sRGB, of the cells."""
+        """Set the colours (H, A, 3), sRGB, of the cells, or of whole numbers of parts of each."""
+        if colors.shape[:2] != self._shape:
+            self._shape, before = colors.shape[:2], self.node
+            self.node, self._shown = self._built(), b""
+            self.node.position, self.node.wxyz = before.position, before.wxyz
+            before.remove()
         linear = to_linear(colors.reshape(-1, 3))
         if linear.tobytes() != self._shown:
             self._shown = linear.tobytes()

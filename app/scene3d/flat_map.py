@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import viser
@@ -46,7 +47,8 @@ class FlatMap:
             f"{root}/title", "unrolled map", position=(0, height / 2 + 0.02, 0),
             anchor="bottom-center", font_screen_scale=0.8,
         )  # fmt: skip
-        self.cells = CellMesh(client, f"{root}/cells", *flat_quads(grid, width, height), grid.angles, on_cell)
+        quads = partial(flat_quads, width=width, height=height)
+        self.cells = CellMesh(client, f"{root}/cells", quads, grid, on_cell)
 
     def face(self, camera: Sequence[float]) -> None:
         """Turn to a camera that sees it from behind or at a flat angle.

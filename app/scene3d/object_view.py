@@ -61,9 +61,7 @@ class ObjectView:
         )  # fmt: skip
         _add_seam(client, f"{root}/object/seam", scene.profile)
         self.pick = add.add_icosphere(f"{root}/object/pick", radius=0.007, color=rgb(PICK), visible=False)
-        self.surface = CellMesh(
-            client, f"{root}/surface", *surface_quads(self.grid), self.grid.angles, on_cell
-        )
+        self.surface = CellMesh(client, f"{root}/surface", surface_quads, self.grid, on_cell)
         self.gizmo = add.add_transform_controls(f"{root}/gizmo", scale=0.16, line_width=3.0, depth_test=False)
 
         @self.gizmo.on_update

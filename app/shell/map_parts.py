@@ -25,12 +25,12 @@ from typing import Any
 
 import numpy as np
 
-from symgrasp.feasibility.color_by import ColorBy, color_map
+from symgrasp.feasibility.color_by import ColorBy
 from symgrasp.feasibility.map import FeasibilityMap
 from symgrasp.object.manifold import wrap
 from symgrasp.reason import Reason
 
-from ..render.cell_colors import colored_map
+from ..render.cell_colors import colored_map, colored_parts
 from ..render.holds import hand_holds
 from ..render.marks import marks_of
 from ..render.palette import OVERLAP, PRINTS
@@ -94,10 +94,9 @@ def _cells(m: FeasibilityMap, roll: RollChoice, color_by: ColorBy, layer: int | 
         head["layer"] = layer
     rolls = np.packbits(m.feasible, axis=0, bitorder="little")[0]
     parts: list[np.ndarray] = []
-    if m.refined is not None and color_by.has_parts:
-        reason, certified = roll.parts(m.refined)
-        head["parts"] = list(reason.shape)
-        parts.append(color_map(color_by, reason, np.full(reason.shape, np.nan), certified).index)
+    if (split := colored_parts(m, roll, color_by)) is not None:
+        head["parts"] = list(split.index.shape)
+        parts.append(split.index)
     return _message(
         "cells",
         head,

@@ -2,6 +2,7 @@
 
 # States have a map and a pick here.
 # pyright: reportOptionalMemberAccess=false, reportOptionalSubscript=false, reportArgumentType=false
+# pyright: reportOptionalOperand=false
 
 from __future__ import annotations
 
@@ -74,6 +75,7 @@ def test_the_hand_stays_while_the_elbow_moves(service, name):
         assert off < 1e-4
         assert turned < 1e-4
     assert np.abs(np.diff(seen, axis=0)).max(axis=1).min() > 0.0
+    moved = changes.move_elbow(state, float(motion.phi[-1]))
     assert f"Elbow at φ = {np.rad2deg(motion.phi[-1]):.1f}°" in candidate_html(moved)
     beyond = changes.move_elbow(state, float(motion.phi[-1]) + 1.0)
     assert np.array_equal(beyond.shown_values, motion.q[-1])
