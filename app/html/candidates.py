@@ -62,12 +62,12 @@ def candidate_html(state: State) -> str:
 
 
 def _elbow_text(state: State) -> str:
-    """Say where the elbow was moved to, or that it cannot move; nothing where that is not asked for."""
+    """Say where the elbow was moved to, or that no motion is known; nothing where that is not asked for."""
     candidate, motion = state.shown_candidate, state.elbow_motion
     if candidate is None or candidate.reason != Reason.FEASIBLE or not state.are_elbow_motions_known:
         return ""
     if motion is None:
-        return "<br>The elbow cannot move from here."
+        return "<br>No motion of the elbow is known from here."
     if state.elbow is None or state.shown_values is None:
         return ""
     joints = ", ".join(f"{angle + 0.0:.0f}°" for angle in np.round(np.rad2deg(state.shown_values)))

@@ -96,6 +96,7 @@ def test_an_arm_of_six_joints_has_none(service):
     assert not state.has_elbow
     assert state.are_elbow_motions_known
     assert state.elbow_motion is None
+    assert "No motion of the elbow is known" in candidate_html(state)
 
 
 def test_another_candidate_or_cell_puts_it_back(service):
